@@ -1,0 +1,46 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO_OUT := out/demo
+
+.PHONY: help setup demo test lint types unit benchmark models clean
+
+help:
+	@echo "make setup      create $(VENV) and install the project with its tools"
+	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
+	@echo "make test       linters, types and the whole test suite"
+	@echo "make benchmark  measure the controller tick"
+	@echo "make models     write the robot models anew from their parameters"
+
+setup: $(VENV)/.installed
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Python 3.11 or newer is needed; found $$($(PYTHON) --version). Try: make PYTHON=python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[experiments,dev]'
+	@touch $@
+
+demo: setup
+	$(BIN)/python -m experiments run pfc_elastic_6r --out $(DEMO_OUT)
+
+test: lint types unit
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: setup
+	$(BIN)/mypy
+
+unit: setup
+	$(BIN)/python -m pytest
+
+benchmark: setup
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
+
+models: setup
+	$(BIN)/python -m pfsc_drake.robot.model_writer
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache
