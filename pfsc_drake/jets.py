@@ -135,6 +135,8 @@ class Jet:
         return constant(other, self.order) / self
 
     def __pow__(self, exponent: float) -> "Jet":
+        if exponent == 2:
+            return _square(self)
         if isinstance(exponent, int) and exponent >= 0:
             power = constant(1.0, self.order)
             for _ in range(exponent):
@@ -162,6 +164,16 @@ def bilinear(product: Callable[[Coefficient, Coefficient], Coefficient], x: Jet,
         for j in range(1, k + 1):
             total = total + product(a[j], b[k - j])
         result.append(total)
+    return Jet(result)
+
+
+def _square(x: Jet) -> Jet:
+    """Return the square of a scalar signal; every mixed product stands once."""
+    a = x.coefficients
+    result = []
+    for k in range(len(a)):
+        mixed = sum((a[j] * a[k - j] for j in range((k + 1) // 2)), start=0.0)
+        result.append(2 * mixed + (a[k // 2] * a[k // 2] if k % 2 == 0 else 0.0))
     return Jet(result)
 
 
@@ -236,7 +248,7 @@ def atan2(y: Jet, x: Jet) -> Jet:
     angle = ca.atan2(y0, x0) if _is_symbolic(y0, x0) else np.arctan2(y0, x0)
     if min(x.order, y.order) == 0:
         return Jet([angle])
-    rate = (x * y.differentiate() - y * x.differentiate()) / (x * x + y * y)
+    rate = (x * y.differentiate() - y * x.differentiate()) / (x**2 + y**2)
     return rate.integrate(angle)
 
 

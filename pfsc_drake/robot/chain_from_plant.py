@@ -102,7 +102,8 @@ def chain_from_plant(
         if following is not None and following.index() in springs:
             _check_elastic_pair(plant, context, joint, following)
             flex = next(remaining)
-        links.append(_link(plant, context, parent, joint, flex, springs))
+        carried = _next_motor(joints, flex or joint, springs)
+        links.append(_link(plant, context, parent, joint, flex, carried, springs))
         motors.append(joint)
         flexes.append(flex)
         parent = (flex or joint).frame_on_child()
@@ -188,6 +189,15 @@ def _next_joint(joints: list[Joint], joint: Joint) -> Joint | None:
     return joints[position] if position < len(joints) else None
 
 
+def _next_motor(
+    joints: list[Joint], joint: Joint, springs: dict[JointIndex, float]
+) -> Joint | None:
+    """Return the motor joint after a joint if it drives a sprung joint."""
+    motor = _next_joint(joints, joint)
+    flex = None if motor is None else _next_joint(joints, motor)
+    return motor if flex is not None and flex.index() in springs else None
+
+
 def _axis(joint: Joint) -> np.ndarray:
     revolute = isinstance(joint, RevoluteJoint)
     return joint.revolute_axis() if revolute else joint.translation_axis()
@@ -218,9 +228,13 @@ def _link(
     parent: Frame,
     motor: Joint,
     flex: Joint | None,
+    next_motor: Joint | None,
     springs: dict[JointIndex, float],
 ) -> ChainLink:
-    """Describe one joint, with everything welded to its child, in the joint's child frame."""
+    """Describe one joint, with everything welded to its child, in the joint's child frame.
+
+    The body between the next motor joint and its flex joint belongs to this link too.
+    """
     outer = flex or motor
     frame_L = outer.frame_on_child()
     X_PF = plant.CalcRelativeTransform(context, parent, motor.frame_on_parent())
@@ -230,7 +244,10 @@ def _link(
         )
         X_PF = X_PF @ RigidTransform(offset.translation())
     M = SpatialInertia.Zero()
-    for body in plant.GetBodiesWeldedTo(outer.child_body()):
+    bodies = plant.GetBodiesWeldedTo(outer.child_body())
+    if next_motor is not None:
+        bodies = [*bodies, *plant.GetBodiesWeldedTo(next_motor.child_body())]
+    for body in bodies:
         M_B = body.CalcSpatialInertiaInBodyFrame(context)
         X_LB = plant.CalcRelativeTransform(context, frame_L, body.body_frame())
         M += M_B.ReExpress(X_LB.rotation()).Shift(-X_LB.translation())

@@ -1,0 +1,1 @@
+"""Experiments: scenario files, runs, logs, metrics, figures and reports."""

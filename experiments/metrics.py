@@ -1,0 +1,137 @@
+"""Metrics: named numbers with unit and target, and the file they are kept in."""
+
+import json
+import math
+import operator
+import re
+from collections import UserDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from pfsc_drake.errors import InputError
+
+_COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_TARGET = re.compile(r"\s*(<=|>=|<|>)\s*(\S+)\s*")
+
+
+@dataclass
+class Metric:
+    """One number that a run is judged by.
+
+    Attributes:
+        value: In ``unit``; NaN where the run gave none (e.g. it never settled).
+        unit: SI unit, e.g. ``"m"``; ``"1"`` without unit.
+        target: What it should be, ``"< 0.05e-3"`` (in ``unit``; also ``<= > >=``) or free text.
+        source: Where the target or the definition comes from, e.g. ``"Sec. 3.8.3"``.
+    """
+
+    value: float
+    unit: str
+    target: str | None = None
+    source: str | None = None
+
+    @property
+    def bound(self) -> tuple[str, float] | None:
+        """Comparison and number [unit] of the target, None if it is free text or missing."""
+        match = _TARGET.fullmatch(self.target or "")
+        if match is None:
+            return None
+        try:
+            return match[1], float(match[2])
+        except ValueError:
+            return None
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the target is met; None without a comparable target. NaN meets no target."""
+        if self.bound is None:
+            return None
+        comparison, number = self.bound
+        return _COMPARISONS[comparison](self.value, number)
+
+
+class Metrics(UserDict[str, Metric]):
+    """Metrics by name, in the order they were added."""
+
+    def add(
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        target: str | None = None,
+        source: str | None = None,
+    ) -> None:
+        """Adds or replaces a metric; the arguments are those of :class:`Metric`."""
+        self[name] = Metric(float(value), unit, target, source)
+
+    def set_target(self, name: str, target: str, source: str | None = None) -> None:
+        """Gives an existing metric its target.
+
+        Args:
+            name: Name of the metric.
+            target: See :class:`Metric`.
+            source: Where the target comes from; None keeps the metric's source.
+
+        Raises:
+            InputError: If there is no metric of this name.
+        """
+        if name not in self:
+            raise InputError(
+                f"target {target!r} names an unknown metric {name!r}; known: {', '.join(self)}"
+            )
+        self[name].target = target
+        self[name].source = source or self[name].source
+
+    def write(self, path: Path) -> None:
+        """Writes flat JSON ``name: {value, unit, target?, source?}``; NaN and infinity are null.
+
+        Args:
+            path: File to write; its directory must exist.
+        """
+        flat = {name: _to_json(metric) for name, metric in self.items()}
+        path.write_text(json.dumps(flat, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Reads what :meth:`write` wrote; null becomes NaN.
+
+        Args:
+            path: JSON file.
+
+        Returns:
+            The metrics.
+
+        Raises:
+            InputError: If the file cannot be read or is no such file.
+        """
+        try:
+            flat = json.loads(path.read_text(encoding="utf-8"))
+            return cls({name: _from_json(entry) for name, entry in flat.items()})
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{path}: not a readable metrics file: {error!r}") from None
+
+
+def _to_json(metric: Metric) -> dict[str, Any]:
+    """One entry of the file."""
+    entry: dict[str, Any] = {
+        "value": metric.value if math.isfinite(metric.value) else None,
+        "unit": metric.unit,
+    }
+    if metric.target is not None:
+        entry["target"] = metric.target
+    if metric.source is not None:
+        entry["source"] = metric.source
+    return entry
+
+
+def _from_json(entry: dict[str, Any]) -> Metric:
+    """The metric of one entry."""
+    value = math.nan if entry["value"] is None else float(entry["value"])
+    return Metric(value, entry["unit"], entry.get("target"), entry.get("source"))

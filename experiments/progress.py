@@ -1,0 +1,99 @@
+"""Progress of a run on the terminal: a bar, or plain lines where there is no terminal."""
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+PLAIN_LINES = 10  # plain lines per run of known length
+ROUNDING = 1e-9  # relative
+
+
+class ProgressDisplay:
+    """Shows simulated time, real-time factor and remaining time; call it with each advance.
+
+    Attributes:
+        simulated_time: s, the largest so far.
+    """
+
+    def __init__(self, console: Console, title: str, duration: float | None) -> None:
+        """Starts at zero.
+
+        Args:
+            console: Where to write.
+            title: Name of the run.
+            duration: s, simulated time at the end; None if unknown.
+        """
+        self.simulated_time = 0.0
+        self._console = console
+        self._title = title
+        self._duration = duration
+        self._phase = ""
+        self._phase_start = (time.monotonic(), 0.0)
+        self._next_line = 0.0
+        self._bar: Progress | None = None
+        self._task = TaskID(0)
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._bar = Progress(
+                SpinnerColumn(),
+                TextColumn("[bold]{task.description}"),
+                BarColumn(bar_width=None),
+                TextColumn("{task.fields[status]}"),
+                TimeRemainingColumn(),
+                console=self._console,
+                transient=True,
+            )
+            self._task = self._bar.add_task(escape(self._title), total=self._duration, status="")
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Shows how far the run is.
+
+        Args:
+            simulated_time: s.
+            phase: What goes on, e.g. ``"simulating"``.
+        """
+        new_phase = phase != self._phase
+        if new_phase:
+            self._phase = phase
+            self._phase_start = (time.monotonic(), simulated_time)
+        self.simulated_time = max(self.simulated_time, simulated_time)
+        if self._bar is not None:
+            self._bar.update(self._task, completed=self.simulated_time, status=self._status())
+        elif new_phase or simulated_time >= self._next_line * (1.0 - ROUNDING):
+            self._console.print(f"{self._title}: {self._status()}", highlight=False, markup=False)
+            step = self._duration / PLAIN_LINES if self._duration else 1.0
+            # Times are sums of steps; rounding must not repeat a line.
+            self._next_line = (simulated_time / step + ROUNDING) // 1.0 * step + step
+
+    def _status(self) -> str:
+        """Phase, simulated time and, once time advances, how much faster than real time."""
+        wall = time.monotonic() - self._phase_start[0]
+        advanced = self.simulated_time - self._phase_start[1]
+        if advanced <= 0.0 or wall <= 0.0:
+            return self._phase
+        total = f" of {self._duration:.2f}" if self._duration else ""
+        factor = advanced / wall
+        return f"{self._phase} {self.simulated_time:.2f}{total} s, {factor:.1f} x real time"

@@ -1,0 +1,189 @@
+"""From the drive input to the joint motion: one description for every kind of drive.
+
+Whatever the drives are, the joints' motion is known from the state up to order
+r - 1, and the drive input is affine in the joint derivative of order r, the
+relative degree: ``u = gain q^(r) + drift + offset``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.newton_euler import inverse_dynamics, mass_matrix
+from pfsc_drake.robot.serial_chain import SerialChain
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """What is measured, as expressions.
+
+    Attributes:
+        q_J: Joint coordinates [rad or m], shape (N, 1).
+        v_J: Joint velocities, shape (N, 1).
+        q_M: Motor coordinates on the joint side, shape (N, 1).
+        v_M: Motor velocities on the joint side, shape (N, 1).
+        tau_ext: External joint torques and their time derivatives [Nm],
+            orders 0..r-2, each (N, 1).
+    """
+
+    q_J: ca.SX
+    v_J: ca.SX
+    q_M: ca.SX
+    v_M: ca.SX
+    tau_ext: Sequence[ca.SX]
+
+
+@dataclass(frozen=True)
+class DrivenMotion:
+    """Joint motion implied by the state, and the input that continues it.
+
+    Attributes:
+        q: Joint coordinates and their time derivatives, orders 0..r-1, each (N, 1).
+        gain: Matrix of ``u = gain q^(r) + drift + offset``, shape (N, N).
+        drift: Vector that belongs to the gain, shape (N, 1).
+        offset: Vector of the rest, already averaged over the sampling interval
+            where the law respects the hold, shape (N, 1).
+    """
+
+    q: Sequence[ca.SX]
+    gain: ca.SX
+    drift: ca.SX
+    offset: ca.SX
+
+
+def velocity_servo(chain: SerialChain, state: DriveState) -> DrivenMotion:
+    """Joint velocity servos (3.48), r = 1: the input is ``q'``."""
+    n = chain.dimension
+    return DrivenMotion([state.q_J], ca.SX.eye(n), ca.SX(n, 1), ca.SX(n, 1))
+
+
+def rigid(chain: SerialChain, state: DriveState) -> DrivenMotion:
+    """Rigid joints (2.42), r = 2: the inverse dynamics of (3.29).
+
+    On a robot with elastic joints the law acts on the motor coordinates, because
+    with link coordinates the loop is unstable (Sec. 3.8.3).
+    """
+    q, v = (state.q_M, state.v_M) if chain.is_elastic else (state.q_J, state.v_J)
+    D_E = mass_matrix(chain, q)
+    n_E = _link_torque(chain, [q, v, ca.SX(chain.dimension, 1)], 0)
+    return DrivenMotion([q, v], D_E + ca.diag(chain.D_M), ca.SX(*n_E.shape), n_E - state.tau_ext[0])
+
+
+def singular_perturbation(
+    chain: SerialChain, state: DriveState, boundary_layer_damping: np.ndarray
+) -> DrivenMotion:
+    """Composite law for stiff elastic joints, r = 2: slow (3.70) plus fast (3.71).
+
+    Args:
+        chain: The robot.
+        state: Its state.
+        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,).
+    """
+    _require_elastic(chain, "singular_perturbation")
+    D_E = mass_matrix(chain, state.q_J)
+    n_E = _link_torque(chain, [state.q_J, state.v_J, ca.SX(chain.dimension, 1)], 0)
+    tau_J_rate = chain.K_s * (state.v_M - state.v_J)
+    fast = -ca.DM(boundary_layer_damping) * tau_J_rate
+    return DrivenMotion(
+        [state.q_J, state.v_J],
+        D_E + ca.diag(chain.D_M),
+        ca.SX(*n_E.shape),
+        n_E - state.tau_ext[0] + fast,
+    )
+
+
+def visco_elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> DrivenMotion:
+    """Visco-elastic joints (2.65), (2.66), r = 3, in the form that respects the hold.
+
+    The joint torque must change by ``T_s tau_J'`` over one sampling interval in
+    which the motor acceleration is constant::
+
+        a_M = (tau_J' - K_s (v_M - v_J) + (K_d + K_s T_s) a_J) / (K_d + K_s T_s)
+
+    ``T_s = 0`` gives (3.58) as printed, whose zero dynamics (3.60) decay with
+    K_s / K_d, often too fast for a sampled controller.
+
+    Args:
+        chain: The robot.
+        state: Its state.
+        sampling_time: Sampling time ``T_s`` of the controller [s].
+    """
+    _require_elastic(chain, "visco_elastic")
+    K_s, K_d, D_M = ca.DM(chain.K_s), ca.DM(chain.K_d), ca.DM(chain.D_M)
+    tau_J = K_s * (state.q_M - state.q_J) + K_d * (state.v_M - state.v_J)
+    D_E = mass_matrix(chain, state.q_J)
+    a_J = _link_acceleration(chain, state, D_E, tau_J)
+    # tau_J' = D_E q''' + known
+    known = _link_torque(chain, [state.q_J, state.v_J, a_J, ca.SX(*a_J.shape)], 1)
+    known = known - state.tau_ext[1]
+    K = K_d + K_s * sampling_time
+    drift = D_M / K * (known - K_s * (state.v_M - state.v_J))
+    return DrivenMotion(
+        [state.q_J, state.v_J, a_J], ca.diag(D_M / K) @ D_E, drift, D_M * a_J + tau_J
+    )
+
+
+def elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> DrivenMotion:
+    """Purely elastic joints (2.65), (2.67), r = 4: the exact law (3.65) for any number of axes.
+
+    ``a_M = a_J + K_s^-1 tau_J''``, ``tau_d = D_M a_M + tau_J``. While the torque is held,
+    ``tau_J`` and ``a_J`` go on changing at known rates; their mean values over the
+    sampling interval take the place of the present ones. The rest, ``D_M K_s^-1 tau_J''``,
+    is ``gain q^(4) + drift``; its rate would need one more derivative of everything, so
+    that the controller extrapolates it from its last two values.
+
+    Args:
+        chain: The robot.
+        state: Its state.
+        sampling_time: Sampling time ``T_s`` of the controller [s]; 0 gives (3.65) as printed.
+    """
+    _require_elastic(chain, "elastic")
+    K_s, D_M = ca.DM(chain.K_s), ca.DM(chain.D_M)
+    tau_J = K_s * (state.q_M - state.q_J)
+    tau_J_rate = K_s * (state.v_M - state.v_J)
+    D_E = mass_matrix(chain, state.q_J)
+    a_J = _link_acceleration(chain, state, D_E, tau_J)
+    unknown = ca.SX(*a_J.shape)
+    residual = _link_torque(chain, [state.q_J, state.v_J, a_J, unknown], 1) - state.tau_ext[1]
+    jerk = ca.ldl_solve(tau_J_rate - residual, *ca.ldl(D_E))
+    # the joint torque's second derivative is D_E q^(4) + known
+    known = _link_torque(chain, [state.q_J, state.v_J, a_J, jerk, unknown], 2)
+    known = known - state.tau_ext[2]
+    first, second = sampling_time / 2, sampling_time**2 / 6
+    return DrivenMotion(
+        [state.q_J, state.v_J, a_J, jerk],
+        ca.diag(D_M / K_s + second) @ D_E + second * ca.diag(D_M),
+        (D_M / K_s + second) * known,
+        D_M * (a_J + first * jerk) + tau_J + first * tau_J_rate,
+    )
+
+
+def _link_acceleration(chain: SerialChain, state: DriveState, D_E: ca.SX, tau_J: ca.SX) -> ca.SX:
+    """Solve (2.65a) for ``q_J''``."""
+    n_E = _link_torque(chain, [state.q_J, state.v_J, ca.SX(chain.dimension, 1)], 0)
+    return ca.ldl_solve(tau_J + state.tau_ext[0] - n_E, *ca.ldl(D_E))
+
+
+def _link_torque(chain: SerialChain, derivatives: Sequence[ca.SX], order: int) -> ca.SX:
+    """Return the time derivative of some order of the link-side inverse dynamics."""
+    q = joint_jets(derivatives)
+    return ca.vertcat(*[tau.derivative(order) for tau in inverse_dynamics(chain, q)])
+
+
+def joint_jets(derivatives: Sequence[ca.SX]) -> list[Jet]:
+    """Return one scalar jet per joint from ``q, q', q'', ...``, each (N, 1)."""
+    return [
+        Jet.from_derivatives([d[i] for d in derivatives]) for i in range(derivatives[0].numel())
+    ]
+
+
+def _require_elastic(chain: SerialChain, law: str) -> None:
+    if not chain.is_elastic:
+        stiff = [link.name for link in chain.links if not np.isfinite(link.stiffness)]
+        raise InputError(
+            f"law '{law}': needs a robot with elastic joints; rigid are {', '.join(stiff)}"
+        )

@@ -1,0 +1,78 @@
+"""Reference motions along a path."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+
+# velocity on a ramp of unit length and height: C^3 at both ends, so that the
+# position is C^4, which the elastic law needs (3.67)
+_RAMP = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])
+_RAMP_PEAK_SLOPE = 35.0 / 16.0
+
+
+def rest_to_rest(
+    points: Sequence[float], *, velocity: float, acceleration: float, dwell: float = 0.0
+) -> PiecewisePolynomialCurve:
+    """Return a C^4 motion that comes to rest at every one of several points.
+
+    Each move ramps the velocity up by a polynomial of degree 7, cruises, and ramps
+    it down; a move too short for the full velocity is made of two ramps.
+
+    Args:
+        points: Positions to visit [m]; the first is the start.
+        velocity: Largest velocity [m/s].
+        acceleration: Largest acceleration [m/s^2].
+        dwell: Rest before the first and after every move [s].
+
+    Returns:
+        A curve of dimension 1 over time [s], starting at t = 0.
+
+    Raises:
+        InputError: If there are fewer than two points, or a limit is not positive.
+    """
+    for name, value in {"velocity": velocity, "acceleration": acceleration}.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(f"reference {name}: {value}; must be a positive number")
+    if not (np.isfinite(dwell) and dwell >= 0.0):
+        raise InputError(f"reference dwell: {dwell}; must be zero or a positive number")
+    if len(points) < 2 or not np.all(np.isfinite(points)):
+        raise InputError(f"reference points: {list(points)}; two or more finite numbers are needed")
+    times = [0.0]
+    pieces: list[np.ndarray] = []
+
+    def add(duration: float, polynomial: np.polynomial.Polynomial) -> None:
+        if duration > 0.0:
+            pieces.append(np.pad(polynomial.coef, (0, 9 - len(polynomial.coef))))
+            times.append(times[-1] + duration)
+
+    position = float(points[0])
+    add(dwell, np.polynomial.Polynomial([position]))
+    for target in points[1:]:
+        for duration, motion in _move(float(target) - position, velocity, acceleration):
+            add(duration, motion + position)
+            position += motion(duration)
+        position = float(target)
+        add(dwell, np.polynomial.Polynomial([position]))
+    if not pieces:
+        raise InputError(f"reference points: {list(points)}; at least two must differ")
+    return PiecewisePolynomialCurve(np.array(times), np.array(pieces)[:, :, None], closed=False)
+
+
+def _move(
+    distance: float, velocity: float, acceleration: float
+) -> list[tuple[float, np.polynomial.Polynomial]]:
+    """Return durations and polynomials in local time of one move, each from 0."""
+    if distance == 0.0:
+        return []
+    # a ramp of duration T covers velocity T / 2 and peaks at _RAMP_PEAK_SLOPE velocity / T
+    peak = min(velocity, float(np.sqrt(abs(distance) * acceleration / _RAMP_PEAK_SLOPE)))
+    ramp_time = _RAMP_PEAK_SLOPE * peak / acceleration
+    cruise_time = max(abs(distance) / peak - ramp_time, 0.0)
+    speed = float(np.copysign(peak, distance))
+    identity = np.polynomial.Polynomial([0.0, 1.0 / ramp_time])
+    rise = (_RAMP(identity) * speed).integ()
+    cruise = np.polynomial.Polynomial([0.0, speed])
+    return [(ramp_time, rise), (cruise_time, cruise), (ramp_time, cruise - rise)]

@@ -1,0 +1,117 @@
+"""Stabilization of the integrator chains that exact linearization leaves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+
+
+@dataclass(frozen=True)
+class CoordinateGains:
+    """Gains of one coordinate: ``v = y_p^(r) - sum_k a_{k+1} e^(k) - a_0 integral(e)``.
+
+    The error ``e = y - y_p`` then obeys the polynomial
+    ``s^r + a_r s^(r-1) + ... + a_1`` (times s, plus ``a_0``, with an integral part),
+    see (3.34), (3.61), (3.67), (3.86).
+
+    Attributes:
+        proportional: ``a_1 .. a_r`` in the dissertation's order, 1/s^r .. 1/s.
+        integral: ``a_0`` [1/s^(r+1)]; 0 for none.
+    """
+
+    proportional: tuple[float, ...]
+    integral: float = 0.0
+
+    @property
+    def polynomial(self) -> np.ndarray:
+        """Characteristic polynomial, highest power first."""
+        tail = [*self.proportional[::-1]]
+        return np.array([1.0, *tail, self.integral] if self.integral else [1.0, *tail])
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Poles of the error dynamics [1/s]."""
+        return np.roots(self.polynomial)
+
+
+def gains_from_poles(poles: Sequence[float | complex]) -> CoordinateGains:
+    """Return the gains that place r poles, without integral part.
+
+    Raises:
+        InputError: If complex poles do not come in conjugate pairs.
+    """
+    polynomial = np.poly(np.array(poles, dtype=complex))
+    if np.max(np.abs(polynomial.imag)) > 1e-9 * np.max(np.abs(polynomial)):
+        raise InputError(f"poles {list(poles)}: complex poles must come in conjugate pairs")
+    return CoordinateGains(tuple(float(a) for a in polynomial.real[:0:-1]))
+
+
+def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None:
+    """Refuse gains that do not make the error vanish.
+
+    Args:
+        gains: Gains of one coordinate.
+        relative_degree: ``r`` of the law they are for.
+        name: What they belong to, for the message.
+
+    Raises:
+        InputError: If their number is not r, or the polynomial is not Hurwitz.
+    """
+    if len(gains.proportional) != relative_degree:
+        raise InputError(
+            f"{name}: {len(gains.proportional)} gains given; "
+            f"a law of relative degree {relative_degree} needs {relative_degree}"
+        )
+    if not np.all(np.isfinite(gains.polynomial)):
+        raise InputError(f"{name}: gains {list(gains.polynomial)} must be finite numbers")
+    rightmost = gains.poles[np.argmax(gains.poles.real)]
+    if rightmost.real >= 0.0:
+        raise InputError(
+            f"{name}: gains a_0 = {gains.integral:g}, a_1.. = "
+            f"{[float(f'{a:g}') for a in gains.proportional]} are not Hurwitz, pole at "
+            f"{rightmost:.4g} 1/s; all poles must have negative real parts"
+        )
+
+
+class Stabilization:
+    """The linear control law of all coordinates (3.33), (3.52), (3.61), (3.67), (3.86).
+
+    Args:
+        gains: Gains of each of the m coordinates.
+        relative_degree: ``r``.
+        names: Names of the coordinates, for messages.
+
+    Raises:
+        InputError: See :func:`check_gains`.
+    """
+
+    def __init__(
+        self, gains: Sequence[CoordinateGains], relative_degree: int, names: Sequence[str]
+    ) -> None:
+        for coordinate, name in zip(gains, names, strict=True):
+            check_gains(coordinate, relative_degree, f"gains of {name}")
+        self.relative_degree = relative_degree
+        # row k holds a_{k+1} of all coordinates
+        self.proportional = np.array([g.proportional for g in gains]).T
+        self.integral = np.array([g.integral for g in gains])
+
+    @property
+    def has_integral_part(self) -> bool:
+        """Whether any coordinate has one."""
+        return bool(np.any(self.integral))
+
+    def virtual_input(self, Y: Sequence, reference: Sequence, integral: Any) -> Any:
+        """Return ``v``, shape (m,).
+
+        Args:
+            Y: Derivatives 0..r-1 of the virtual output, each (m,); arrays or expressions.
+            reference: Derivatives 0..r of its reference, each (m,).
+            integral: Integral of the error [m s or rad s], shape (m,).
+        """
+        v = reference[self.relative_degree] - self.integral * integral
+        for gains, y, y_p in zip(self.proportional, Y, reference, strict=False):
+            v = v - gains * (y - y_p)
+        return v

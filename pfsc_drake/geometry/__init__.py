@@ -1,0 +1,62 @@
+"""Paths in space: curves, orientations, arc length, frames and projections.
+
+Knows neither robots nor Drake. Numbers in parentheses are equations of the dissertation.
+"""
+
+from pfsc_drake.geometry.arc_length import ArcLength
+from pfsc_drake.geometry.curve import Curve
+from pfsc_drake.geometry.fourier import FourierCurve
+from pfsc_drake.geometry.frame import ParallelTransportFrame
+from pfsc_drake.geometry.orientation import OrientationCurve, interpolate_orientation
+from pfsc_drake.geometry.path import Path
+from pfsc_drake.geometry.path_evaluator import PathEvaluator
+from pfsc_drake.geometry.path_point import PathPointLayout, PathStatus
+from pfsc_drake.geometry.polynomial import PiecewisePolynomialCurve
+from pfsc_drake.geometry.projection import Projection, Projector, project_globally
+from pfsc_drake.geometry.rotation import (
+    check_rotation_matrix,
+    matrix_to_quaternion,
+    matrix_to_zyx,
+    matrix_to_zyz,
+    quaternion_to_matrix,
+    quaternion_to_zyx,
+    quaternion_to_zyz,
+    zyx_to_matrix,
+    zyx_to_quaternion,
+    zyz_to_matrix,
+    zyz_to_quaternion,
+)
+from pfsc_drake.geometry.spline import interpolate
+from pfsc_drake.geometry.waypoints import WaypointTable, path_from_waypoints, read_waypoints
+
+__all__ = [
+    "ArcLength",
+    "Curve",
+    "FourierCurve",
+    "OrientationCurve",
+    "ParallelTransportFrame",
+    "Path",
+    "PathEvaluator",
+    "PathPointLayout",
+    "PathStatus",
+    "PiecewisePolynomialCurve",
+    "Projection",
+    "Projector",
+    "WaypointTable",
+    "check_rotation_matrix",
+    "interpolate",
+    "interpolate_orientation",
+    "matrix_to_quaternion",
+    "matrix_to_zyx",
+    "matrix_to_zyz",
+    "path_from_waypoints",
+    "project_globally",
+    "quaternion_to_matrix",
+    "quaternion_to_zyx",
+    "quaternion_to_zyz",
+    "read_waypoints",
+    "zyx_to_matrix",
+    "zyx_to_quaternion",
+    "zyz_to_matrix",
+    "zyz_to_quaternion",
+]

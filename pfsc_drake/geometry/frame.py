@@ -1,0 +1,189 @@
+"""Parallel transport frame along a curve."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curve import Curve
+from pfsc_drake.geometry.piecewise_fit import chebyshev_nodes, power_coefficients
+from pfsc_drake.geometry.polynomial import PiecewisePolynomialCurve
+
+# The dense output of the method is a polynomial of degree 7 on each of its steps.
+_DENSE_DEGREE = 7
+_RELATIVE, _ABSOLUTE = 1e-13, 1e-14
+_VERTICAL = 0.9
+
+Vector = tuple[float, float, float]
+
+
+class ParallelTransportFrame:
+    """Orthonormal frame (e_par, e_perp, e_cross) that does not turn about the tangent.
+
+    e_par = sigma'/|sigma'| (3.1); e_perp solves (3.4), e_perp' = -(e_par' . e_perp) e_par,
+    from the begin of the domain; e_cross = e_par x e_perp (3.5). Defined where the curvature
+    is zero. The equation is solved once, so the frame is a function of theta alone: unlike
+    the iteration (3.81) it needs no memory and does not depend on the speed.
+
+    On a closed curve the frame comes back turned about e_par by the holonomy angle;
+    e_perp then also depends on the lap, which is taken from the unwrapped theta.
+
+    Args:
+        curve: Regular curve in R^3, at least of class C^1.
+        initial_normal: e_perp at the begin of the domain, [3]: made perpendicular to the
+            tangent and a unit vector. The default is the direction closest to the world's
+            z, or x where the tangent is within 26 degrees of z.
+
+    Attributes:
+        holonomy: Angle from e_perp(theta) to e_perp(theta + period) about e_par, rad, in
+            (-pi, pi]; zero for an open curve.
+
+    Raises:
+        InputError: the curve is not three-dimensional or has a corner, or the initial
+            normal is parallel to the tangent.
+    """
+
+    def __init__(self, curve: Curve, initial_normal: ArrayLike | None = None) -> None:
+        if curve.dimension != 3:
+            raise InputError(f"frame: curve of dimension {curve.dimension}; 3 is required")
+        corner = curve.first_discontinuity(1)
+        if corner is not None:
+            raise InputError(
+                f"frame: tangent jumps at theta = {corner:.9g}; class C^1 or better is required"
+            )
+        self._curve = curve
+        start = _unit(curve.derivatives(curve.domain[0], 1)[1])
+        normal = _initial_normal(start, initial_normal)
+        breaks, table, last = _transport(curve, normal)
+        self._begin, self._end = curve.domain
+        self._period = curve.period
+        self.holonomy = 0.0
+        if curve.closed:
+            self.holonomy = math.atan2(last @ np.cross(start, normal), last @ normal)
+        self._laps_matter = curve.closed and self.holonomy != 0.0
+        self._table = PiecewisePolynomialCurve(breaks, table, known_smoothness=1)
+        self._sample = self._table.flat_sampler(0)
+
+    def normal_at(self, theta: float, tangent: Vector) -> Vector:
+        """The first normal vector, for each tick.
+
+        Args:
+            theta: Unwrapped path parameter; clamped to the domain of an open curve.
+            tangent: e_par(theta), a unit vector.
+
+        Returns:
+            e_perp(theta), exactly perpendicular to the tangent given, of length one.
+        """
+        begin, end = self._begin, self._end
+        laps = 0
+        if not begin <= theta <= end:
+            if self._curve.closed:
+                laps = math.floor((theta - begin) / self._period)
+                theta -= laps * self._period
+            else:
+                theta = begin if theta < begin else end
+        x, y, z = self._sample(theta).tolist()
+        tx, ty, tz = tangent
+        along = x * tx + y * ty + z * tz
+        x -= along * tx
+        y -= along * ty
+        z -= along * tz
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+        x *= scale
+        y *= scale
+        z *= scale
+        if laps and self._laps_matter:
+            c, s = math.cos(laps * self.holonomy), math.sin(laps * self.holonomy)
+            x, y, z = (
+                c * x + s * (ty * z - tz * y),
+                c * y + s * (tz * x - tx * z),
+                c * z + s * (tx * y - ty * x),
+            )
+        return x, y, z
+
+    def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Both normal vectors.
+
+        Args:
+            theta: Unwrapped path parameters, shape [...].
+
+        Returns:
+            e_perp and e_cross, each [..., 3].
+
+        Raises:
+            InputError: theta lies outside the domain of an open curve.
+        """
+        values = np.asarray(theta, dtype=float)
+        tangents = self._curve.derivatives(values, 1)[..., 1, :]
+        tangents = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
+        pairs = zip(values.ravel().tolist(), tangents.reshape(-1, 3).tolist(), strict=True)
+        e_perp = np.array([self.normal_at(value, tangent) for value, tangent in pairs])
+        e_perp = e_perp.reshape(tangents.shape)
+        return e_perp, np.cross(tangents, e_perp)
+
+
+def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solution of (3.4): breakpoints, power coefficients, and e_perp at the last end."""
+    sample = curve.flat_sampler(2)
+    breaks: list[np.ndarray] = [curve.breakpoints[:1]]
+    tables: list[np.ndarray] = []
+    for begin, end in zip(curve.breakpoints[:-1], curve.breakpoints[1:], strict=True):
+        # The curvature may jump at a breakpoint; the segment's own value counts.
+        inside = math.nextafter(float(end), float(begin))
+
+        def rate(theta: float, e_perp: np.ndarray, inside: float = inside) -> Vector:
+            _, _, _, dx, dy, dz, cx, cy, cz = sample(min(theta, inside)).tolist()
+            x, y, z = e_perp.tolist()
+            square = dx * dx + dy * dy + dz * dz
+            along = (dx * cx + dy * cy + dz * cz) / square
+            # e_par' = (sigma'' - along sigma') / |sigma'|
+            bend = (cx - along * dx) * x + (cy - along * dy) * y + (cz - along * dz) * z
+            gamma = -bend / square
+            return gamma * dx, gamma * dy, gamma * dz
+
+        solution = solve_ivp(
+            rate,
+            (begin, end),
+            normal,
+            method="DOP853",
+            rtol=_RELATIVE,
+            atol=_ABSOLUTE,
+            dense_output=True,
+        )
+        if not solution.success:
+            raise InputError(
+                f"frame: no solution between theta = {begin:.9g} and {end:.9g};"
+                " a regular curve is required"
+            )
+        steps = np.diff(solution.t)
+        nodes = chebyshev_nodes(solution.t[:-1], steps, _DENSE_DEGREE + 1)
+        values = solution.sol(nodes.ravel()).T.reshape(*nodes.shape, 3)
+        tables.append(power_coefficients(values, steps))
+        breaks.append(solution.t[1:])
+        tangent = _unit(sample(inside)[3:6])
+        normal = solution.y[:, -1]
+        normal = _unit(normal - (normal @ tangent) * tangent)
+    return np.concatenate(breaks), np.concatenate(tables), normal
+
+
+def _initial_normal(tangent: np.ndarray, wanted: ArrayLike | None) -> np.ndarray:
+    if wanted is None:
+        vertical = abs(tangent[2]) > _VERTICAL
+        direction = np.array([1.0, 0.0, 0.0] if vertical else [0.0, 0.0, 1.0])
+    else:
+        direction = np.asarray(wanted, dtype=float)
+        if direction.shape != (3,) or not np.all(np.isfinite(direction)):
+            raise InputError(f"initial normal: {direction.tolist()}; 3 finite values are required")
+    across = direction - (direction @ tangent) * tangent
+    if not np.linalg.norm(across) > 1e-6 * np.linalg.norm(direction):
+        raise InputError(
+            f"initial normal: {direction.tolist()}; a direction not parallel to the tangent"
+            f" {tangent.tolist()} is required"
+        )
+    return _unit(across)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)

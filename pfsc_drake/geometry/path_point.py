@@ -1,0 +1,94 @@
+"""Layout of what a path tells the controller at each tick."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from pfsc_drake.errors import InputError
+
+_MAX_ORDER = 5
+
+
+class PathStatus(IntEnum):
+    """Value of the field `status`."""
+
+    OK = 0
+    BEYOND_END = 1
+    NOT_CONVERGED = 2
+
+
+@dataclass(frozen=True)
+class PathPointLayout:
+    """Where the quantities of a path point lie in a flat array of floats.
+
+    | field        | length          | meaning                                              |
+    |--------------|-----------------|------------------------------------------------------|
+    | `theta`      | 1               | parameter of the closest point (3.6), unwrapped      |
+    | `eta`        | 1               | arc length (3.12), m                                 |
+    | `alpha`      | 1               | (3.9); below one in the feasible neighbourhood       |
+    | `status`     | 1               | a `PathStatus`                                       |
+    | `normal`     | 3               | e_perp, (3.4)                                        |
+    | `position`   | 3 (order + 2)   | derivatives 0..order + 1 of sigma_t, row-major, m    |
+    | `quaternion` | 4 (order + 1)   | derivatives 0..order of q; empty if not oriented     |
+
+    Derivatives are with respect to theta, the index of the derivative is the slow one.
+    Beyond an end of an open path theta is clamped and the path goes on along its tangent:
+    derivatives of sigma_t from the second and of q from the first, and alpha, are zero,
+    e_perp is kept, and eta = s(theta) + e_par . (y - sigma_t(theta)).
+
+    Args:
+        order: Relative degree r of the law that reads it, 1..5.
+        oriented: True if the path has an orientation.
+
+    Raises:
+        InputError: order out of range.
+    """
+
+    order: int
+    oriented: bool
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.order, int) or not 1 <= self.order <= _MAX_ORDER:
+            raise InputError(
+                f"order of path point: {self.order}; an integer from 1 to {_MAX_ORDER} is required"
+            )
+
+    @property
+    def theta(self) -> slice:
+        """Slice of theta*, [1]."""
+        return slice(0, 1)
+
+    @property
+    def eta(self) -> slice:
+        """Slice of the arc length, [1], m."""
+        return slice(1, 2)
+
+    @property
+    def alpha(self) -> slice:
+        """Slice of alpha, [1]."""
+        return slice(2, 3)
+
+    @property
+    def status(self) -> slice:
+        """Slice of the status, [1]."""
+        return slice(3, 4)
+
+    @property
+    def normal(self) -> slice:
+        """Slice of e_perp, [3]."""
+        return slice(4, 7)
+
+    @property
+    def position(self) -> slice:
+        """Slice of the derivatives of sigma_t, [3 (order + 2)]."""
+        return slice(7, 7 + 3 * (self.order + 2))
+
+    @property
+    def quaternion(self) -> slice:
+        """Slice of the derivatives of q, [4 (order + 1)], or empty."""
+        begin = self.position.stop
+        return slice(begin, begin + (4 * (self.order + 1) if self.oriented else 0))
+
+    @property
+    def size(self) -> int:
+        """Length of the whole array."""
+        return self.quaternion.stop

@@ -1,0 +1,190 @@
+"""Rotation matrices, quaternions (w, x, y, z) and Euler angles.
+
+All functions work along leading axes: matrices [..., 3, 3], quaternions [..., 4],
+angles [..., 3] in rad.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from pfsc_drake.errors import InputError
+
+_ORTHONORMAL = 1e-6
+
+
+def zyx_to_matrix(angles: ArrayLike) -> np.ndarray:
+    """R = R_z(angle_1) R_y(angle_2) R_x(angle_3), equation (2.7).
+
+    Args:
+        angles: [..., 3], rad.
+
+    Returns:
+        Rotation matrices [..., 3, 3].
+    """
+    return _euler_to_matrix("ZYX", angles)
+
+
+def zyz_to_matrix(angles: ArrayLike) -> np.ndarray:
+    """R = R_z(angle_1) R_y(angle_2) R_z(angle_3), equation (2.6).
+
+    Args:
+        angles: [..., 3], rad.
+
+    Returns:
+        Rotation matrices [..., 3, 3].
+    """
+    return _euler_to_matrix("ZYZ", angles)
+
+
+def matrix_to_zyx(matrix: ArrayLike) -> np.ndarray:
+    """ZYX angles of rotation matrices, inverse of (2.7).
+
+    Args:
+        matrix: [..., 3, 3].
+
+    Returns:
+        Angles [..., 3], rad, the second in [-pi/2, pi/2]. At its ends only the sum or
+        difference of the other two is defined; the third is then zero.
+    """
+    R = np.asarray(matrix, dtype=float)
+    cos_2 = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    singular = cos_2 < 1e-12
+    first = np.where(
+        singular,
+        np.arctan2(-R[..., 0, 1], R[..., 1, 1]),
+        np.arctan2(R[..., 1, 0], R[..., 0, 0]),
+    )
+    third = np.where(singular, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    return np.stack([first, np.arctan2(-R[..., 2, 0], cos_2), third], axis=-1)
+
+
+def matrix_to_zyz(matrix: ArrayLike) -> np.ndarray:
+    """ZYZ angles of rotation matrices, inverse of (2.6).
+
+    Args:
+        matrix: [..., 3, 3].
+
+    Returns:
+        Angles [..., 3], rad, the second in [0, pi]. At its ends only the sum or
+        difference of the other two is defined; the third is then zero.
+    """
+    R = np.asarray(matrix, dtype=float)
+    sin_2 = np.hypot(R[..., 0, 2], R[..., 1, 2])
+    singular = sin_2 < 1e-12
+    # R_z(a) R_y(0 or pi): the second column is [-sin(a), cos(a), 0] in both cases.
+    first = np.where(
+        singular,
+        np.arctan2(-R[..., 0, 1], R[..., 1, 1]),
+        np.arctan2(R[..., 1, 2], R[..., 0, 2]),
+    )
+    third = np.where(singular, 0.0, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
+    return np.stack([first, np.arctan2(sin_2, R[..., 2, 2]), third], axis=-1)
+
+
+def matrix_to_quaternion(matrix: ArrayLike) -> np.ndarray:
+    """Unit quaternions of rotation matrices.
+
+    Args:
+        matrix: [..., 3, 3].
+
+    Returns:
+        Quaternions (w, x, y, z), [..., 4], with w >= 0.
+
+    Raises:
+        InputError: a matrix is not a rotation.
+    """
+    R = check_rotation_matrix(matrix)
+    q = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat().reshape(*R.shape[:-2], 4)
+    q = q[..., [3, 0, 1, 2]]
+    return np.where(q[..., :1] < 0.0, -q, q)
+
+
+def quaternion_to_matrix(quaternion: ArrayLike) -> np.ndarray:
+    """Rotation matrices H(q) / |q|^2 of quaternions of any length but zero.
+
+    Args:
+        quaternion: (w, x, y, z), [..., 4].
+
+    Returns:
+        Rotation matrices [..., 3, 3].
+
+    Raises:
+        InputError: a quaternion is zero or not finite.
+    """
+    q = np.asarray(quaternion, dtype=float)
+    if q.shape[-1:] != (4,):
+        raise InputError(f"quaternion: shape {q.shape}; [..., 4] is required")
+    square = np.einsum("...i,...i->...", q, q)
+    bad = ~((square > 0.0) & np.isfinite(square))
+    if np.any(bad):
+        value = q[bad].reshape(-1, 4)[0].tolist() if q.ndim > 1 else q.tolist()
+        raise InputError(f"quaternion: {value}; finite values, not all zero, are required")
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    rows = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    stacked = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return stacked / square[..., None, None]
+
+
+def zyx_to_quaternion(angles: ArrayLike) -> np.ndarray:
+    """Unit quaternions [..., 4] of ZYX angles [..., 3], rad, see `zyx_to_matrix`."""
+    return matrix_to_quaternion(zyx_to_matrix(angles))
+
+
+def zyz_to_quaternion(angles: ArrayLike) -> np.ndarray:
+    """Unit quaternions [..., 4] of ZYZ angles [..., 3], rad, see `zyz_to_matrix`."""
+    return matrix_to_quaternion(zyz_to_matrix(angles))
+
+
+def quaternion_to_zyx(quaternion: ArrayLike) -> np.ndarray:
+    """ZYX angles [..., 3], rad, of quaternions [..., 4], see `matrix_to_zyx`."""
+    return matrix_to_zyx(quaternion_to_matrix(quaternion))
+
+
+def quaternion_to_zyz(quaternion: ArrayLike) -> np.ndarray:
+    """ZYZ angles [..., 3], rad, of quaternions [..., 4], see `matrix_to_zyz`."""
+    return matrix_to_zyz(quaternion_to_matrix(quaternion))
+
+
+def check_rotation_matrix(matrix: ArrayLike, name: str = "rotation matrix") -> np.ndarray:
+    """Rotation matrices as an array, if they are orthonormal with determinant +1.
+
+    Args:
+        matrix: [..., 3, 3].
+        name: What the error message calls them.
+
+    Returns:
+        The same values, [..., 3, 3].
+
+    Raises:
+        InputError: wrong shape, not finite, not orthonormal to 1e-6, or a reflection.
+    """
+    R = np.asarray(matrix, dtype=float)
+    if R.shape[-2:] != (3, 3):
+        raise InputError(f"{name}: shape {R.shape}; [..., 3, 3] is required")
+    if not np.all(np.isfinite(R)):
+        raise InputError(f"{name}: not finite; finite values are required")
+    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
+    if error > _ORTHONORMAL:
+        raise InputError(
+            f"{name}: R'R differs from the identity by {error:.3g};"
+            f" at most {_ORTHONORMAL:g} is allowed"
+        )
+    determinant = np.linalg.det(R).min(initial=1.0)
+    if determinant < 0.0:
+        raise InputError(f"{name}: determinant {determinant:.6g}; +1 is required")
+    return R
+
+
+def _euler_to_matrix(sequence: str, angles: ArrayLike) -> np.ndarray:
+    values = np.asarray(angles, dtype=float)
+    if values.shape[-1:] != (3,):
+        raise InputError(f"Euler angles: shape {values.shape}; [..., 3] is required")
+    if not np.all(np.isfinite(values)):
+        raise InputError("Euler angles: not finite; finite values in rad are required")
+    rotation = Rotation.from_euler(sequence, values.reshape(-1, 3))
+    return rotation.as_matrix().reshape(*values.shape[:-1], 3, 3)

@@ -1,0 +1,1 @@
+"""Robot models: parameters, model files, kinematics and dynamics of serial chains."""

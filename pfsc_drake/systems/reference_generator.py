@@ -1,0 +1,42 @@
+"""Reference of the virtual output over time."""
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from pfsc_drake.geometry import Curve
+
+
+class ReferenceGenerator(LeafSystem):
+    """Motion along the path over time; transversal and rotational references are zero.
+
+    Ports:
+        reference (output): Derivatives 0..r of ``yhat_p = (eta_p, 0, ..)`` by rows,
+            shape ((r + 1) m,) [m, m/s, ...].
+
+    Args:
+        eta_p: Tangential reference [m] over time [s], a curve of dimension 1; before
+            its domain and after it the reference rests.
+        relative_degree: ``r``.
+        num_outputs: ``m``.
+    """
+
+    def __init__(self, eta_p: Curve, relative_degree: int, num_outputs: int) -> None:
+        super().__init__()
+        self._begin, self._end = eta_p.domain
+        self._sample = eta_p.sampler(relative_degree)
+        self._num_outputs = num_outputs
+        self.DeclareVectorOutputPort(
+            "reference",
+            (relative_degree + 1) * num_outputs,
+            self._calc_reference,
+            prerequisites_of_calc={self.time_ticket()},
+        )
+
+    def _calc_reference(self, context: Context, output: BasicVector) -> None:
+        time = context.get_time()
+        eta = self._sample(min(max(time, self._begin), self._end))
+        reference = np.zeros((len(eta), self._num_outputs))
+        reference[:, 0] = eta[:, 0]
+        if not self._begin <= time <= self._end:
+            reference[1:] = 0.0
+        output.SetFromVector(reference.ravel())

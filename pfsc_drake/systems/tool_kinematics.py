@@ -1,0 +1,46 @@
+"""Where the tool is."""
+
+import casadi as ca
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.newton_euler import link_motions, tool_pose
+from pfsc_drake.robot.serial_chain import SerialChain
+
+
+class ToolKinematics(LeafSystem):
+    """Direct kinematics (2.5) of a serial chain.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        tool_pose (output): ``[y_t, R_e]``, tool point [m] and orientation by rows, in
+            world axes, shape (12,).
+    """
+
+    def __init__(self, chain: SerialChain) -> None:
+        super().__init__()
+        n = chain.dimension
+        self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
+        self.DeclareVectorOutputPort(
+            "tool_pose",
+            12,
+            self._calc_tool_pose,
+            prerequisites_of_calc={self._joint_state.ticket()},
+        )
+        self._q, self._pose = np.zeros(n), np.zeros(12)
+        self._buffer, self._evaluate = _pose_function(chain).buffer()
+        self._buffer.set_arg(0, memoryview(self._q))
+        self._buffer.set_res(0, memoryview(self._pose))
+
+    def _calc_tool_pose(self, context: Context, output: BasicVector) -> None:
+        self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
+        self._evaluate()
+        output.SetFromVector(self._pose)
+
+
+def _pose_function(chain: SerialChain) -> ca.Function:
+    q = ca.SX.sym("q", chain.dimension)
+    at_rest = [Jet([q[i], ca.SX(0)]) for i in range(chain.dimension)]
+    y, R = (jet.coefficients[0] for jet in tool_pose(chain, link_motions(chain, at_rest)))
+    return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))])

@@ -1,0 +1,196 @@
+"""Command line: exit status, streams and messages; the simulation itself is replaced."""
+
+import json
+import subprocess
+import sys
+import types
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from experiments import scenario_catalog
+from experiments.cli import main
+from experiments.metrics import Metrics
+from experiments.provenance import PROJECT_ROOT
+from pfsc_drake import InputError
+
+
+@dataclass
+class Outcome:
+    """What a run hands back."""
+
+    fault: str | None = None
+    report: Path = Path("somewhere/report.html")
+    metrics: Metrics = field(default_factory=Metrics)
+
+
+class FakeRun:
+    """Stands in for ``experiments.run``: remembers the call, does what it is told."""
+
+    def __init__(self) -> None:
+        self.outcome = Outcome()
+        self.raises: BaseException | None = None
+        self.calls: list[tuple] = []
+
+    def run_scenario(self, scenario, out, duration, figures, recording, progress):
+        self.calls.append((scenario, out, duration, figures, recording))
+        progress(0.0, "building")
+        for step in range(11):
+            progress(0.1 * step, "simulating")
+        if self.raises is not None:
+            raise self.raises
+        return self.outcome
+
+
+@pytest.fixture
+def fake_run(monkeypatch):
+    fake = FakeRun()
+    module = types.ModuleType("experiments.run")
+    module.run_scenario = fake.run_scenario
+    monkeypatch.setitem(sys.modules, "experiments.run", module)
+    return fake
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    path = tmp_path / "my_run.yaml"
+    path.write_text("name: my_run\nsection: 3.8.3\ndescription: Test\nduration: 1.0\n")
+    return path
+
+
+def error_line(capsys) -> str:
+    """The one line on stderr."""
+    stderr = capsys.readouterr().err
+    assert stderr.count("\n") == 1
+    assert stderr.endswith("\n")
+    return stderr
+
+
+def test_completed_run(fake_run, scenario, tmp_path, capsys):
+    fake_run.outcome.metrics.add("max_path_deviation", 4.3e-5, "m", "< 0.05e-3")
+    fake_run.outcome.metrics.add("real_time_factor", 4.0, "1", ">= 5")
+    out = tmp_path / "out"
+    assert main(["run", str(scenario), "--out", str(out)]) == 0
+    ((loaded, used_out, duration, figures, recording),) = fake_run.calls
+    assert (loaded.name, loaded.path) == ("my_run", scenario)
+    assert (used_out, duration, figures, recording) == (out, None, True, True)
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    lines = captured.out.splitlines()
+    assert lines[-1] == "Open the report: somewhere/report.html"
+    (row,) = [line for line in lines if "max_path_deviation" in line]
+    assert row.split()[1:] == ["43", "µm", "<", "50", "µm", "met"]
+    (row,) = [line for line in lines if "real_time_factor" in line]
+    assert row.split()[-1] == "missed"
+
+
+def test_options_reach_the_run(fake_run, scenario):
+    arguments = ["--duration", "0.5", "--no-figures", "--no-recording"]
+    overrides = ["--set", "controller.law=rigid", "--set", "a.b=[1, 2]"]
+    assert main(["run", str(scenario), *arguments, *overrides]) == 0
+    ((loaded, out, duration, figures, recording),) = fake_run.calls
+    assert (out, duration, figures, recording) == (Path("out/my_run"), 0.5, False, False)
+    assert loaded.data["controller"] == {"law": "rigid"}
+    assert loaded.data["a"] == {"b": [1, 2]}
+
+
+def test_progress_in_plain_lines(fake_run, scenario, capsys):
+    main(["run", str(scenario)])
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("my_run:")]
+    assert lines[:2] == ["my_run: building", "my_run: simulating"]
+    assert [line.split()[2] for line in lines[2:]] == [f"{0.1 * i:.2f}" for i in range(1, 11)]
+    assert "of 1.00 s" in lines[-1]
+    assert "x real time" in lines[-1]
+
+
+def test_fault(fake_run, scenario, tmp_path, capsys):
+    fake_run.outcome.fault = "left the feasible\nneighbourhood"
+    assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 3
+    line = error_line(capsys)
+    assert line.startswith("fault: left the feasible neighbourhood; stopped at t = 1.000 s,")
+    assert f"kept in {tmp_path / 'out'}" in line
+
+
+def test_input_error_of_the_run(fake_run, scenario, capsys):
+    fake_run.raises = InputError("my_run.yaml: key 'law'\n is wrong")
+    assert main(["run", str(scenario)]) == 2
+    assert error_line(capsys) == "error: my_run.yaml: key 'law' is wrong\n"
+
+
+def test_interrupt(fake_run, scenario, capsys):
+    fake_run.raises = KeyboardInterrupt()
+    assert main(["run", str(scenario)]) == 130
+    assert error_line(capsys) == "interrupted\n"
+
+
+def test_other_exceptions_are_not_hidden(fake_run, scenario):
+    fake_run.raises = ZeroDivisionError()
+    with pytest.raises(ZeroDivisionError):
+        main(["run", str(scenario)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "Missing command"),
+        (["frob"], "frob"),
+        (["run"], "scenario"),
+        (["run", "FILE", "--bogus"], "--bogus"),
+        (["run", "FILE", "--duration", "abc"], "--duration"),
+        (["run", "FILE", "--duration", "0"], "--duration 0: allowed: a positive number"),
+        (["run", "FILE", "--duration", "inf"], "--duration inf: allowed"),
+        (["run", "FILE", "--set", "a"], "--set a: malformed"),
+        (["run", "FILE", "--out", "FILE"], "is a file; allowed: a folder"),
+        (["run", "none.yaml"], "scenario file none.yaml: no such file"),
+        (["run", "zzz"], "unknown scenario 'zzz'"),
+    ],
+)
+def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, arguments, message):
+    arguments = [str(scenario) if argument == "FILE" else argument for argument in arguments]
+    assert main(arguments) == 2
+    line = error_line(capsys)
+    assert line.startswith("error: ")
+    assert message in line
+    assert fake_run.calls == []
+
+
+def test_list(monkeypatch, scenario, capsys):
+    entries = [scenario_catalog.CatalogEntry("my_run", "3.8.3", "Test [brackets]")]
+    monkeypatch.setattr("experiments.cli.list_scenarios", lambda: entries)
+    assert main(["list"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split() == [
+        "my_run",
+        "3.8.3",
+        "Test",
+        "[brackets]",
+    ]
+    assert main(["list", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == [
+        {"name": "my_run", "section": "3.8.3", "description": "Test [brackets]"}
+    ]
+
+
+def run_process(*arguments: str, code: str | None = None) -> subprocess.CompletedProcess:
+    command = ["-c", code] if code else ["-m", "experiments"]
+    return subprocess.run(
+        [sys.executable, *command, *arguments], cwd=PROJECT_ROOT, capture_output=True, text=True
+    )
+
+
+def test_module_exits_with_the_status():
+    result = run_process("run", "no_such_scenario")
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: unknown scenario 'no_such_scenario'")
+    assert run_process("--help").returncode == 0
+
+
+def test_listing_stays_light():
+    """What makes a start slow must not be imported for ``list``."""
+    code = (
+        "import sys; from experiments.cli import main; main(['list']);"
+        "heavy = {'pydrake', 'casadi', 'matplotlib', 'h5py', 'scipy'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else 0)"
+    )
+    result = run_process(code=code)
+    assert result.returncode == 0, result.stderr

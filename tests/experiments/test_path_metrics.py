@@ -1,0 +1,131 @@
+"""Metrics of path following against logs whose answers are known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from experiments.path_metrics import (
+    max_orientation_error_after,
+    max_path_deviation_after,
+    max_path_deviation_while_moving,
+    path_distance,
+    path_following_metrics,
+    peak_speed,
+    peak_torque,
+    rms_path_deviation,
+    saturation_count,
+    settling_time,
+    static_path_deviation,
+    tangential_error,
+)
+from experiments.run_log import RunLog
+
+RATE = 8.0  # 1/s
+START = 0.01  # m
+STEP = 1e-3  # s
+
+
+def decaying_log() -> RunLog:
+    """Distance START exp(-RATE t), shared 3:4 by the two coordinates, over 2 s."""
+    time = STEP * np.arange(2001)
+    log = RunLog(time)
+    log.add("xi", START * np.exp(-RATE * time)[:, None] * [0.6, -0.8], "m")
+    return log
+
+
+def test_distance_is_euclidean():
+    log = decaying_log()
+    np.testing.assert_allclose(path_distance(log), START * np.exp(-RATE * log.time), rtol=1e-14)
+
+
+def test_settling_time_of_an_exponential():
+    tolerance = 0.05e-3
+    exact = math.log(START / tolerance) / RATE
+    # The first sample at or after the exact instant.
+    assert settling_time(decaying_log(), tolerance) == pytest.approx(
+        math.ceil(exact / STEP) * STEP, abs=1e-12
+    )
+
+
+def test_settling_time_counts_the_last_exit():
+    log = RunLog(np.arange(6.0))
+    log.add("xi", np.array([[5, 0], [0, 0], [0, 3], [0, 0], [0, 0], [0, 0]]) * 1e-3, "m")
+    assert settling_time(log, 1e-3) == 3.0
+    assert settling_time(log, 4e-3) == 1.0
+    assert settling_time(log, 5e-3) == 0.0
+
+
+@pytest.mark.parametrize("last", [2e-3, math.nan])
+def test_never_settled_is_nan(last):
+    log = RunLog(np.arange(3.0))
+    log.add("xi", [[0, 0], [0, 0], [last, 0]], "m")
+    assert math.isnan(settling_time(log, 1e-3))
+
+
+def test_deviation_after():
+    log = decaying_log()
+    assert max_path_deviation_after(log, 0.5) == pytest.approx(START * math.exp(-RATE * 0.5))
+    assert math.isnan(max_path_deviation_after(log, 3.0))
+
+
+def test_deviation_while_moving():
+    log = RunLog(np.arange(5.0))
+    log.add("xi", np.array([[9, 0], [1, 0], [0, 2], [0, 7], [8, 0]]) * 1e-3, "m")
+    log.add("eta_dot", [0.0, 1.0, -1.0, 0.2, 0.0], "m/s")
+    assert max_path_deviation_while_moving(log, 0.5) == pytest.approx(2e-3)
+    assert max_path_deviation_while_moving(log, 0.1) == pytest.approx(7e-3)
+    assert math.isnan(max_path_deviation_while_moving(log, 0.5, t=2.5))
+
+
+def test_rms_of_an_exponential():
+    log = decaying_log()
+    # Mean of START^2 exp(-2 RATE t) over [0, 2]; the sum over samples differs by O(STEP).
+    exact = START * math.sqrt((1 - math.exp(-4 * RATE)) / (4 * RATE))
+    assert rms_path_deviation(log) == pytest.approx(exact, rel=5e-3)
+    assert rms_path_deviation(log, 1.0) < 1e-3 * exact
+
+
+def test_static_deviation_is_the_mean_of_the_end():
+    time = 0.1 * np.arange(11)
+    log = RunLog(time)
+    log.add("xi", np.where(time[:, None] > 0.75, [3e-3, 4e-3], [1.0, 0.0]), "m")
+    assert static_path_deviation(log, 0.2001) == pytest.approx(5e-3)
+    assert static_path_deviation(log, 0.3001) == pytest.approx((1.0 + 3 * 5e-3) / 4)
+
+
+def test_orientation_speed_and_tangential_error():
+    log = RunLog(np.arange(4.0))
+    log.add("phi", np.array([[9, 0, 0], [1, 2, 2], [0, 0, 1], [0, 0, 0]]) * 1e-3, "rad")
+    log.add("eta_dot", [0.1, -1.5, 1.2, 0.0], "m/s")
+    log.add("eta", [0.0, 1.0, 2.0, 3.0], "m")
+    log.add("eta_p", [0.0, 1.3, 1.9, 3.0], "m")
+    assert max_orientation_error_after(log, 1.0) == pytest.approx(3e-3)
+    assert peak_speed(log) == 1.5
+    assert tangential_error(log) == pytest.approx(0.3)
+    assert tangential_error(log, 2.0) == pytest.approx(0.1)
+
+
+def test_torques_and_saturation():
+    torque = np.array([[1.0, -5.0], [-3.0, 2.0], [2.9, 5.0 * (1 - 1e-12)], [0.0, 4.9]])
+    log = RunLog(np.arange(4.0))
+    log.add("tau_d", torque, "Nm", limits=[3.0, 5.0])
+    np.testing.assert_allclose(peak_torque(log), [3.0, 5.0])
+    assert saturation_count(log) == 3
+    log.add("tau_d", torque, "Nm")
+    assert saturation_count(log) == 0
+
+
+def test_collection_has_what_the_log_allows():
+    log = decaying_log()
+    names = {"settling_time", "max_path_deviation", "rms_path_deviation", "static_path_deviation"}
+    assert set(path_following_metrics(log, 5e-5, 0.5, 0.1)) == names
+    log.add("tau_d", np.full((2001, 3), 2.0), "Nm", limits=2.0)
+    log.add("eta_dot", np.full(2001, 0.2), "m/s")
+    metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
+    assert metrics["peak_torque_3"].value == 2.0
+    assert metrics["saturated_samples"].value == 2001
+    assert metrics["max_path_deviation_while_moving"].value == pytest.approx(
+        START * math.exp(-RATE * 0.5)
+    )
+    assert metrics["settling_time"].unit == "s"

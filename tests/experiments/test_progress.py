@@ -1,0 +1,45 @@
+"""Progress display: plain lines at even distances, a bar on a terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from experiments.progress import ProgressDisplay
+
+
+def plain_lines(duration: float | None, step: float, count: int) -> list[str]:
+    """Lines for a run whose times are sums of a step, as a simulation reports them."""
+    stream = io.StringIO()
+    with ProgressDisplay(Console(file=stream, width=200), "x", duration) as progress:
+        time = 0.0
+        for _ in range(count + 1):
+            progress(time, "simulating")
+            time += step
+    return stream.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1])
+def test_ten_lines_however_the_sums_round(step):
+    lines = plain_lines(2.0, step, round(2.0 / step))
+    assert lines[0] == "x: simulating"
+    times = [float(line.split()[2]) for line in lines[1:]]
+    assert times == pytest.approx([0.2 * i for i in range(1, 11)])
+
+
+def test_unknown_duration_gives_a_line_per_second():
+    lines = plain_lines(None, 0.25, 12)
+    assert [line.split()[2] for line in lines[1:]] == ["1.00", "2.00", "3.00"]
+    assert " of " not in lines[1]
+
+
+def test_terminal_shows_a_bar_with_the_title_as_it_is():
+    stream = io.StringIO()
+    console = Console(file=stream, force_terminal=True, width=120)
+    with ProgressDisplay(console, "[red]x", 1.0) as progress:
+        progress(0.0, "simulating")
+        progress(0.5, "simulating")
+        progress(0.0, "drawing figures")
+        assert progress.simulated_time == 0.5
+    assert "[red]x" in stream.getvalue()
+    assert "drawing figures" in stream.getvalue()

@@ -1,0 +1,145 @@
+"""Path quantities at each tick against the parts and quadrature."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import (
+    Path,
+    PathStatus,
+    PiecewisePolynomialCurve,
+    WaypointTable,
+    path_from_waypoints,
+    zyx_to_quaternion,
+)
+
+
+def _path(closed: bool) -> Path:
+    angle = 2 * np.pi * np.arange(12) / 12
+    positions = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(2 * angle + 0.4)], axis=1)
+    # A full turn about z per lap: the quaternion returns with its sign flipped.
+    quaternions = zyx_to_quaternion(np.stack([angle, 0.2 * np.sin(angle), 0 * angle], axis=1))
+    return path_from_waypoints(
+        WaypointTable(0.4 * positions, quaternions), smoothness=5, closed=closed
+    )
+
+
+OPEN, CLOSED = _path(False), _path(True)
+
+
+@pytest.mark.parametrize("path", [OPEN, CLOSED], ids=["open", "closed"])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_fields(path: Path, order: int) -> None:
+    evaluator = path.evaluator(order)
+    layout = evaluator.layout
+    rng = np.random.default_rng(order)
+    laps = [0] if not path.closed else [-1, 0, 1, 2]
+    period = path.position.period
+    for lap in laps:
+        theta = rng.uniform(0.1, 0.9) * period + lap * period
+        sigma, first, second = path.position.derivatives(theta, 2)
+        e_perp, e_cross = path.frame.normals(theta)
+        point = sigma + 0.01 * e_perp - 0.02 * e_cross
+        out = evaluator(point.tolist(), theta + 0.01)
+        assert out.shape == (layout.size,)
+        assert out[layout.theta] == pytest.approx(theta, abs=1e-11)
+        assert out[layout.status] == PathStatus.OK
+        alpha = (point - sigma) @ second / (first @ first)
+        assert out[layout.alpha] == pytest.approx(alpha, abs=1e-9)
+        eta = sum(
+            quad(lambda t: float(np.linalg.norm(path.position.derivatives(t, 1)[1])), a, b)[0]
+            for a, b in zip(*(lambda g: (g[:-1], g[1:]))(np.linspace(0, theta, 40)), strict=True)
+        )
+        assert out[layout.eta] == pytest.approx(eta, abs=1e-8)
+        np.testing.assert_allclose(out[layout.normal], e_perp, atol=1e-9)
+        expected = path.position.derivatives(theta, order + 1)
+        found = out[layout.position].reshape(order + 2, 3)
+        scale = np.abs(expected).max(axis=1, keepdims=True)
+        np.testing.assert_allclose(found / scale, expected / scale, atol=1e-8)
+        q = path.orientation.derivatives(theta, order)
+        found = out[layout.quaternion].reshape(order + 1, 4)
+        scale = np.abs(q).max(axis=1, keepdims=True)
+        np.testing.assert_allclose(found / scale, q / scale, atol=1e-8)
+
+
+def test_everything_is_continuous_across_the_seam() -> None:
+    evaluator = CLOSED.evaluator(3)
+    period = CLOSED.position.period
+    for lap in (-1, 0, 1, 2):
+        before = evaluator.evaluate_at(lap * period - 1e-9)
+        after = evaluator.evaluate_at(lap * period + 1e-9)
+        np.testing.assert_allclose(before / (1 + abs(after)), after / (1 + abs(after)), atol=1e-6)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_beyond_an_open_end(end: int) -> None:
+    evaluator = OPEN.evaluator(2)
+    layout = evaluator.layout
+    theta = OPEN.position.domain[end]
+    sign = 1.0 if end else -1.0
+    sigma, first = OPEN.position.derivatives(theta, 1)
+    e_par = first / np.linalg.norm(first)
+    e_perp, _ = OPEN.frame.normals(theta)
+    point = sigma + sign * 0.03 * e_par + 0.01 * e_perp
+    out = evaluator(point.tolist(), theta - sign * 0.02)
+    assert out[layout.status] == PathStatus.BEYOND_END
+    assert out[layout.theta] == theta
+    assert out[layout.alpha] == 0.0
+    assert out[layout.eta] == pytest.approx(end * OPEN.length + sign * 0.03, abs=1e-11)
+    np.testing.assert_allclose(out[layout.normal], e_perp, atol=1e-14)
+    position = out[layout.position].reshape(-1, 3)
+    np.testing.assert_allclose(position[:2], [sigma, first], atol=1e-12)
+    assert not position[2:].any()
+    quaternion = out[layout.quaternion].reshape(-1, 4)
+    np.testing.assert_allclose(quaternion[0], OPEN.orientation.derivatives(theta, 0)[0], atol=1e-12)
+    assert not quaternion[1:].any()
+
+
+def test_eta_is_continuous_through_an_open_end() -> None:
+    evaluator = OPEN.evaluator(2)
+    end = OPEN.position.domain[1]
+    sigma, first = OPEN.position.derivatives(end, 1)
+    e_par = first / np.linalg.norm(first)
+    etas = [evaluator((sigma + d * e_par).tolist(), end)[1] for d in (-1e-7, 0.0, 1e-7)]
+    np.testing.assert_allclose(np.diff(etas), 1e-7, rtol=1e-4)
+
+
+def test_without_orientation() -> None:
+    line = Path(PiecewisePolynomialCurve.line([0, 0, 0], [2, 0, 0]))
+    evaluator = line.evaluator(4)
+    out = evaluator([0.5, 0.1, 0.2], 0.4)
+    assert out.size == evaluator.layout.size == 7 + 18
+    np.testing.assert_allclose(out[:13], [0.5, 0.5, 0, 0, 0, 0, 1, 0.5, 0, 0, 1, 0, 0], atol=1e-14)
+    beyond = evaluator([2.5, 0.1, 0.0], 1.9)
+    assert beyond[1] == pytest.approx(2.5)
+
+
+def test_input_that_is_not_finite() -> None:
+    evaluator = CLOSED.evaluator(4)
+    for point, guess in (
+        ([math.nan, 0, 0], 0.1),
+        ([0.0, 0, math.inf], 0.1),
+        ([0.0, 0, 0], math.nan),
+    ):
+        out = evaluator(point, guess)
+        assert out[3] == PathStatus.NOT_CONVERGED
+        assert np.isnan(np.delete(out, 3)).all()
+
+
+def test_has_no_memory() -> None:
+    evaluator = CLOSED.evaluator(3)
+    first = evaluator([0.3, 0.2, 0.0], 0.3)
+    kept = first.copy()
+    evaluator([-0.3, 0.1, 0.1], 1.2)
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(evaluator([0.3, 0.2, 0.0], 0.3), kept)
+
+
+def test_evaluate_at_refuses_what_is_not_on_the_path() -> None:
+    with pytest.raises(InputError, match="theta: -1; the path is defined on"):
+        OPEN.evaluator(2).evaluate_at(-1.0)
+    with pytest.raises(InputError, match="nan"):
+        CLOSED.evaluator(2).evaluate_at(math.nan)
