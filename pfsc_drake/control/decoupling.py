@@ -46,8 +46,7 @@ class DecouplingInverse:
         lu, pivots, info = lapack.dgetrf(A)
         if info != 0:
             return DecouplingSolution(np.full(len(rhs), np.nan), 0.0)
-        norm = np.abs(A).sum(axis=0).max()
-        rcond, _ = lapack.dgecon(lu, norm)
+        rcond, _ = lapack.dgecon(lu, lapack.dlange("1", A))
         x, _ = lapack.dgetrs(lu, pivots, rhs)
         return DecouplingSolution(x, float(rcond))
 

@@ -97,9 +97,9 @@ def linearize_path(
     layout = PathPointLayout(r, oriented)
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("path_point", layout.size)
-    measured = DriveState(
-        *ca.vertsplit(state, n), tau_ext=ca.vertsplit(tau_ext, n) if r > 1 else []
-    )
+    external = ca.vertsplit(tau_ext, n) if r > 1 else []
+    q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
+    measured = DriveState(q_J, v_J, q_M, v_M, external)
     options = options or ActuationOptions()
     motion = _driven_motion(chain, law, measured, options)
     path = _path_geometry(layout, point)

@@ -3,7 +3,6 @@
 import enum
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -41,26 +40,25 @@ _EXPLANATIONS = {
 }
 
 
-class LawOutput(NamedTuple):
-    """What the law gives in one tick.
+class LawLayout:
+    """Where the results of a law lie in a flat array.
 
     Attributes:
         drive: Drive input within its limits, shape (N,) [Nm, or rad/s for servos].
-        Y: Derivatives 0..r-1 of the virtual output, shape (r, m).
-        v: Virtual input, shape (m,).
-        rcond: Reciprocal condition number of the decoupling matrix.
+        manifold_state: Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
+        virtual_input: ``v``, shape (m,).
+        status: Fault (:class:`Fault`), reciprocal condition number of the decoupling
+            matrix, number of drives at their limit; shape (3,).
         held: The part of the drive input that is extrapolated over the hold, shape (N,).
-        saturated: How many drives are at their limit.
-        fault: Why ``drive`` must not be used, or ``Fault.NONE``.
+        size: Length of the whole array.
     """
 
-    drive: np.ndarray
-    Y: np.ndarray
-    v: np.ndarray
-    held: np.ndarray
-    rcond: float
-    saturated: int
-    fault: Fault
+    def __init__(self, num_joints: int, num_outputs: int, relative_degree: int) -> None:
+        sizes = [num_joints, relative_degree * num_outputs, num_outputs, 3, num_joints]
+        ends = np.cumsum(sizes).tolist()
+        fields = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+        self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields
+        self.size: int = ends[-1]
 
 
 @dataclass(frozen=True)
@@ -90,6 +88,9 @@ class PathLaw:
         limits: Magnitude limits of the drive input, shape (N,).
         max_alpha: Where the feasible neighbourhood (3.9) ends for the controller, below 1.
         safe_state: What the drives do after a fault.
+
+    Attributes:
+        layout: Layout of the results.
 
     Raises:
         InputError: If dimensions do not match, or a limit is not positive.
@@ -122,28 +123,42 @@ class PathLaw:
         self._max_alpha = max_alpha
         self._safe_state = safe_state
         self._gravity = _gravity_function(chain)
+        self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
         self.function = _law_function(linearization, stabilization)
+        self._completion = _completion_function(linearization, self.limits)
+        self._half_hold = 0.5 if linearization.extrapolated else 0.0
+        self._fault_index = self.layout.status.start
+        self._alpha_index = linearization.layout.alpha.start
+        self._status_index = linearization.layout.status.start
         self._bind_buffers()
 
     def _bind_buffers(self) -> None:
-        n, m = self.linearization.num_joints, self.linearization.num_outputs
-        r = self.linearization.relative_degree
-        self._buffer, self._evaluate = self.function.buffer()
-        self._state, self._point, self._reference, self._integral, self._tau_ext = (
-            np.zeros(self.function.numel_in(i)) for i in range(5)
-        )
-        arguments = [self._state, self._point, self._reference, self._integral, self._tau_ext]
-        for i, argument in enumerate(arguments):
-            self._buffer.set_arg(i, memoryview(argument))
-        shapes = [(m, r), (m,), (m, n), (m,), (n, n), (n,), (n,)]
-        results = [np.zeros(int(np.prod(shape))) for shape in shapes]
-        for i, result in enumerate(results):
-            self._buffer.set_res(i, memoryview(result))
+        """Give both functions one set of arrays, so that nothing is copied between them."""
+        self._buffers = [self.function.buffer(), self._completion.buffer()]
+        (first, self._linearize), (second, self._complete) = self._buffers
+        arrays = {}
+        for i in range(self.function.n_in()):
+            arrays[self.function.name_in(i)] = np.zeros(self.function.numel_in(i))
+            first.set_arg(i, arrays[self.function.name_in(i)].data)
+        for i in range(self.function.n_out()):
+            arrays[self.function.name_out(i)] = np.zeros(self.function.numel_out(i))
+            first.set_res(i, arrays[self.function.name_out(i)].data)
+        for i in range(self._completion.n_in()):
+            name = self._completion.name_in(i)
+            arrays.setdefault(name, np.zeros(self._completion.numel_in(i)))
+            second.set_arg(i, arrays[name].data)
+        arrays["result"] = np.zeros(self.layout.size)
+        second.set_res(0, arrays["result"].data)
+        # the buffers know addresses only
+        self._arrays = arrays
+        self._state, self._point = arrays["state"], arrays["path_point"]
+        self._reference, self._integral = arrays["reference"], arrays["integral"]
+        self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
+        self._lead, self._rhs = arrays["lead"], arrays["rhs"]
         # CasADi stores by columns
-        views = [
-            result.reshape(shape, order="F") for result, shape in zip(results, shapes, strict=True)
-        ]
-        self._Y, self._v, self._A, self._rhs, self._gain, self._drift, self._offset = views
+        self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
+        self._solution, self._rcond = arrays["solution"], arrays["rcond"]
+        self._result = arrays["result"]
 
     def evaluate(
         self,
@@ -153,8 +168,8 @@ class PathLaw:
         integral: np.ndarray,
         last_held: np.ndarray | None = None,
         tau_ext: np.ndarray | None = None,
-    ) -> LawOutput:
-        """Return the drive input of one tick.
+    ) -> np.ndarray:
+        """Return the drive input of one tick and all that belongs to it.
 
         Args:
             state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -162,50 +177,48 @@ class PathLaw:
             reference: Derivatives 0..r of the virtual output's reference by rows,
                 shape ((r + 1) m,).
             integral: Integral of the virtual output's error, shape (m,).
-            last_held: ``held`` of the last tick, shape (N,); if omitted or NaN, nothing
-                is extrapolated.
+            last_held: ``held`` of the last tick, shape (N,); if omitted nothing is
+                extrapolated.
             tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
+
+        Returns:
+            New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
         """
         self._state[:] = state
         self._point[:] = point
         self._reference[:] = reference
         self._integral[:] = integral
         self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
-        self._evaluate()
+        self._linearize()
         solution = self._inverse.solve(self._A, self._rhs)
-        held = self._gain @ solution.x + self._drift
-        wanted = held + self._offset
-        if (
-            self.linearization.extrapolated
-            and last_held is not None
-            and last_held[0] == last_held[0]
-        ):
-            wanted += 0.5 * (held - last_held)
-        drive = np.minimum(np.maximum(wanted, -self.limits), self.limits)
-        fault = self._judge(solution, wanted)
-        saturated = int(np.count_nonzero(drive != wanted))
-        Y, v = self._Y.T.copy(), self._v.copy()
-        return LawOutput(drive, Y, v, held, solution.rcond, saturated, fault)
+        self._solution[:] = solution.x
+        self._rcond[0] = solution.rcond
+        if last_held is None:
+            self._lead[0] = 0.0
+        else:
+            self._lead[0] = self._half_hold
+            self._last_held[:] = last_held
+        self._complete()
+        result = self._result.copy()
+        result[self._fault_index] = self._judge(solution, result)
+        return result
 
-    def _judge(self, solution: DecouplingSolution, wanted: np.ndarray) -> Fault:
-        """Return what forbids the use of a drive input, the root cause first."""
+    def _judge(self, solution: DecouplingSolution, result: np.ndarray) -> Fault:
+        """Return what forbids the use of a result, the root cause first."""
+        alpha, status = self._point[self._alpha_index], self._point[self._status_index]
         # written so that NaN is a fault; a sum is finite only if all its terms are
-        usable = (
+        if (
             self._inverse.accepts(solution)
-            and self._point[2] < self._max_alpha
-            and self._point[3] != PathStatus.NOT_CONVERGED
-            and math.isfinite(wanted.sum())
-        )
-        if usable:
+            and alpha < self._max_alpha
+            and status != PathStatus.NOT_CONVERGED
+            and math.isfinite(result.sum())
+        ):
             return Fault.NONE
-        layout = self.linearization.layout
         if not np.isfinite(self._state).all():
             return Fault.STATE_NOT_FINITE
-        if self._point[layout.status][0] == PathStatus.NOT_CONVERGED:
+        if status == PathStatus.NOT_CONVERGED:
             return Fault.PROJECTION_FAILED
-        if not self._point[layout.alpha][0] < self._max_alpha:
-            return Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
-        return Fault.SINGULAR
+        return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
 
     def safe_drive(self, state: np.ndarray, last_good_state: np.ndarray) -> np.ndarray:
         """Return the drive input of the safe state, shape (N,).
@@ -245,4 +258,25 @@ def _law_function(linearization: Linearization, stabilization: Stabilization) ->
         [Y, ca.densify(v), A, v - b, gain, drift, offset],
         ["state", "path_point", "reference", "integral", "tau_ext"],
         ["Y", "v", "A", "rhs", "gain", "drift", "offset"],
+    )
+
+
+def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:
+    """Return everything after the decoupling matrix's inverse as one function."""
+    n, m = linearization.num_joints, linearization.num_outputs
+    solution, drift, offset, last_held = (ca.SX.sym(name, n) for name in "xdol")
+    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, linearization.relative_degree)
+    v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
+    held = gain @ solution + drift
+    wanted = held + lead * (held - last_held) + offset
+    drive = ca.fmin(ca.fmax(wanted, -limits), limits)
+    saturated = ca.sum1(ca.fabs(wanted) > limits)
+    # the fault is judged outside
+    result = ca.vertcat(drive, ca.vec(Y), v, 0.0, rcond, saturated, held)
+    return ca.Function(
+        "completion",
+        [solution, gain, drift, offset, last_held, lead, Y, v, rcond],
+        [ca.densify(result)],
+        ["solution", "gain", "drift", "offset", "last_held", "lead", "Y", "v", "rcond"],
+        ["result"],
     )

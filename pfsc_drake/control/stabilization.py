@@ -97,11 +97,7 @@ class Stabilization:
         # row k holds a_{k+1} of all coordinates
         self.proportional = np.array([g.proportional for g in gains]).T
         self.integral = np.array([g.integral for g in gains])
-
-    @property
-    def has_integral_part(self) -> bool:
-        """Whether any coordinate has one."""
-        return bool(np.any(self.integral))
+        self.has_integral_part = bool(np.any(self.integral))
 
     def virtual_input(self, Y: Sequence, reference: Sequence, integral: Any) -> Any:
         """Return ``v``, shape (m,).

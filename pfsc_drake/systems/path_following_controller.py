@@ -1,17 +1,16 @@
 """The path following law as a Drake system."""
 
-import numpy as np
-from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import (
     BasicVector,
-    CacheEntry,
     Context,
+    DependencyTicket,
     DiscreteValues,
+    InputPort,
     LeafSystem,
-    ValueProducer,
+    OutputPort,
 )
 
-from pfsc_drake.control.path_law import Fault, LawOutput, PathLaw
+from pfsc_drake.control.path_law import Fault, PathLaw
 
 
 class PathFollowingController(LeafSystem):
@@ -32,11 +31,13 @@ class PathFollowingController(LeafSystem):
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
+        law (output): All of these, laid out by the law's ``layout``; computed once per
+            tick, the others are parts of it.
 
     State:
-        Discrete: integral of the error, shape (m,); latched fault, shape (1,);
-        last state without fault, shape (4N,); part of the drive input that is
-        extrapolated over the hold, shape (N,).
+        Discrete: integral of the error, shape (m,); latched fault, shape (1,); whether
+        the next is known, shape (1,); part of the drive input that is extrapolated over
+        the hold, shape (N,); last ``joint_state`` without fault, shape (4N,).
 
     Args:
         law: The law.
@@ -45,93 +46,74 @@ class PathFollowingController(LeafSystem):
 
     def __init__(self, law: PathLaw, period: float) -> None:
         super().__init__()
-        self._law, self._period = law, period
+        self._law, self._period, self.layout = law, period, law.layout
         linearization = law.linearization
-        n, m, r = (
-            linearization.num_joints,
-            linearization.num_outputs,
-            linearization.relative_degree,
+        n, m = linearization.num_joints, linearization.num_outputs
+        r = linearization.relative_degree
+        self._integral, self._fault, self._known = slice(0, m), m, m + 1
+        self._held, self._last_good = slice(m + 2, m + 2 + n), slice(m + 2 + n, m + 2 + 5 * n)
+        memory = self.DeclareDiscreteState(self._last_good.stop)
+        self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
+        self._path_point: InputPort = self.DeclareVectorInputPort(
+            "path_point", linearization.layout.size
         )
-        self._num_outputs = m
-        self._integral = self.DeclareDiscreteState(m)
-        self._latched = self.DeclareDiscreteState(1)
-        self._last_good = self.DeclareDiscreteState(4 * n)
-        self._held = self.DeclareDiscreteState(np.full(n, np.nan))
-        self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
-        self._path_point = self.DeclareVectorInputPort("path_point", linearization.layout.size)
-        self._reference = self.DeclareVectorInputPort("reference", (r + 1) * m)
-        self._output: CacheEntry = self.DeclareCacheEntry(
-            "law output",
-            ValueProducer(allocate=_allocate, calc=self._calc_law),
-            {
-                self._joint_state.ticket(),
-                self._path_point.ticket(),
-                self._reference.ticket(),
-                self.discrete_state_ticket(self._integral),
-                self.discrete_state_ticket(self._latched),
-                self.discrete_state_ticket(self._held),
-            },
+        self._reference: InputPort = self.DeclareVectorInputPort("reference", (r + 1) * m)
+        sources = {
+            self._joint_state.ticket(),
+            self._path_point.ticket(),
+            self._reference.ticket(),
+            self.discrete_state_ticket(memory),
+        }
+        self._output: OutputPort = self.DeclareVectorOutputPort(
+            "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
-        ticket = {self._output.ticket()}
-        self.DeclareVectorOutputPort("drive", n, self._calc_drive, prerequisites_of_calc=ticket)
-        self.DeclareVectorOutputPort(
-            "manifold_state", r * m, self._calc_manifold_state, prerequisites_of_calc=ticket
-        )
-        self.DeclareVectorOutputPort(
-            "virtual_input", m, self._calc_virtual_input, prerequisites_of_calc=ticket
-        )
-        self.DeclareVectorOutputPort("status", 3, self._calc_status, prerequisites_of_calc=ticket)
+        for name in ("drive", "manifold_state", "virtual_input", "status"):
+            self._declare_part(name, getattr(self.layout, name), sources)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def _declare_part(self, name: str, part: slice, sources: set[DependencyTicket]) -> None:
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(self._output.Eval(context)[part])
+
+        self.DeclareVectorOutputPort(
+            name,
+            part.stop - part.start,
+            calc,
+            prerequisites_of_calc=sources,
+        )
 
     def fault(self, context: Context) -> Fault:
         """Return the fault that holds at the present instant."""
-        return self._evaluate(context).fault
+        return Fault(int(self._output.Eval(context)[self.layout.status][0]))
 
-    def _evaluate(self, context: Context) -> LawOutput:
-        return self._output.EvalAbstract(context).get_value()
-
-    def _calc_law(self, context: Context, value: AbstractValue) -> None:
+    def _calc_law(self, context: Context, output: BasicVector) -> None:
+        memory = context.get_discrete_state_vector().value()
         state = self._joint_state.Eval(context)
         result = self._law.evaluate(
             state,
             self._path_point.Eval(context),
             self._reference.Eval(context),
-            context.get_discrete_state(self._integral).value(),
-            context.get_discrete_state(self._held).value(),
+            memory[self._integral],
+            memory[self._held] if memory[self._known] else None,
         )
-        latched = context.get_discrete_state(self._latched).GetAtIndex(0)
-        if latched or result.fault:
-            last_good = context.get_discrete_state(self._last_good).value()
-            result = result._replace(
-                drive=self._law.safe_drive(state, last_good), fault=Fault(latched or result.fault)
-            )
-        value.set_value(result)
-
-    def _calc_drive(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._evaluate(context).drive)
-
-    def _calc_manifold_state(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._evaluate(context).Y.ravel())
-
-    def _calc_virtual_input(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._evaluate(context).v)
-
-    def _calc_status(self, context: Context, output: BasicVector) -> None:
-        result = self._evaluate(context)
-        output.SetFromVector([float(result.fault), result.rcond, float(result.saturated)])
+        status = self.layout.status.start
+        fault = memory[self._fault] or result[status]
+        if fault:
+            result[status] = fault
+            result[self.layout.drive] = self._law.safe_drive(state, memory[self._last_good])
+        output.SetFromVector(result)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        result = self._evaluate(context)
-        if result.fault:
-            state.set_value(self._latched, [float(result.fault)])
+        result = self._output.Eval(context)
+        memory = state.get_mutable_value()
+        fault = result[self.layout.status.start]
+        if fault:
+            memory[self._fault] = fault
             return
-        state.set_value(self._last_good, self._joint_state.Eval(context))
-        state.set_value(self._held, result.held)
+        memory[self._known] = 1.0
+        memory[self._held] = result[self.layout.held]
+        memory[self._last_good] = self._joint_state.Eval(context)
         if self._law.stabilization.has_integral_part:
-            error = result.Y[0] - self._reference.Eval(context)[: self._num_outputs]
-            integral = context.get_discrete_state(self._integral).value()
-            state.set_value(self._integral, integral + self._period * error)
-
-
-def _allocate() -> AbstractValue:
-    return Value(object())
+            m = self._fault
+            y = result[self.layout.manifold_state][:m]
+            memory[self._integral] += self._period * (y - self._reference.Eval(context)[:m])

@@ -23,20 +23,20 @@ class ReferenceGenerator(LeafSystem):
     def __init__(self, eta_p: Curve, relative_degree: int, num_outputs: int) -> None:
         super().__init__()
         self._begin, self._end = eta_p.domain
-        self._sample = eta_p.sampler(relative_degree)
+        self._sample = eta_p.flat_sampler(relative_degree)
         self._num_outputs = num_outputs
+        self._size = (relative_degree + 1) * num_outputs
         self.DeclareVectorOutputPort(
             "reference",
-            (relative_degree + 1) * num_outputs,
+            self._size,
             self._calc_reference,
             prerequisites_of_calc={self.time_ticket()},
         )
 
     def _calc_reference(self, context: Context, output: BasicVector) -> None:
         time = context.get_time()
-        eta = self._sample(min(max(time, self._begin), self._end))
-        reference = np.zeros((len(eta), self._num_outputs))
-        reference[:, 0] = eta[:, 0]
+        reference = np.zeros(self._size)
+        reference[:: self._num_outputs] = self._sample(min(max(time, self._begin), self._end))
         if not self._begin <= time <= self._end:
-            reference[1:] = 0.0
-        output.SetFromVector(reference.ravel())
+            reference[self._num_outputs :] = 0.0
+        output.SetFromVector(reference)

@@ -30,8 +30,8 @@ class ToolKinematics(LeafSystem):
         )
         self._q, self._pose = np.zeros(n), np.zeros(12)
         self._buffer, self._evaluate = _pose_function(chain).buffer()
-        self._buffer.set_arg(0, memoryview(self._q))
-        self._buffer.set_res(0, memoryview(self._pose))
+        self._buffer.set_arg(0, self._q.data)
+        self._buffer.set_res(0, self._pose.data)
 
     def _calc_tool_pose(self, context: Context, output: BasicVector) -> None:
         self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
