@@ -3,11 +3,9 @@
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml_reading import read_yaml
 
 SCENARIO_DIRECTORY = Path(__file__).resolve().parent / "scenarios"
 
@@ -25,18 +23,6 @@ class CatalogEntry:
     name: str
     section: str
     description: str
-
-
-class _UntypedLoader(yaml.SafeLoader):
-    """Reads typed mappings (``!Tag {...}``) as plain ones; enough for the top-level keys."""
-
-
-def _ignore_tag(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> Any:
-    """Value of a tagged node without its tag."""
-    return loader.construct_mapping(node) if isinstance(node, yaml.MappingNode) else None
-
-
-_UntypedLoader.add_multi_constructor("", _ignore_tag)
 
 
 def scenario_names(directory: Path = SCENARIO_DIRECTORY) -> list[str]:
@@ -84,7 +70,7 @@ def list_scenarios(directory: Path = SCENARIO_DIRECTORY) -> list[CatalogEntry]:
         One entry per YAML file, from its top-level keys ``section`` and ``description``.
 
     Raises:
-        InputError: If a file cannot be read as YAML.
+        InputError: If a file cannot be read (see :func:`pfsc_drake.yaml_reading.read_yaml`).
     """
     entries = [_entry(directory / f"{name}.yaml") for name in scenario_names(directory)]
     return sorted(entries, key=lambda entry: (entry.section, entry.name))
@@ -92,10 +78,6 @@ def list_scenarios(directory: Path = SCENARIO_DIRECTORY) -> list[CatalogEntry]:
 
 def _entry(path: Path) -> CatalogEntry:
     """Catalog entry of one file."""
-    try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UntypedLoader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not readable as YAML: {' '.join(str(error).split())}") from None
-    data = data if isinstance(data, dict) else {}
+    data = read_yaml(path)
     description = " ".join(str(data.get("description", "")).split())
     return CatalogEntry(path.stem, str(data.get("section", "")), description)

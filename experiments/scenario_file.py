@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from experiments.scenario_catalog import find_scenario
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml_reading import parse_yaml, read_yaml
 
 __all__ = ["ScenarioFile", "find_scenario", "load_scenario_data", "read_scenario"]
 
@@ -50,70 +49,12 @@ def load_scenario_data(path: Path, overrides: list[str]) -> dict[str, Any]:
         The data.
 
     Raises:
-        InputError: If the file is unreadable, invalid YAML or no mapping, holds a key twice, or an
+        InputError: If the file cannot be read (see :func:`pfsc_drake.yaml_reading.read_yaml`) or an
             override is malformed.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(f"{path}: cannot be read: {reason}") from None
-    data = _parse_yaml(text, str(path), private=False)
-    if not isinstance(data, dict):
-        kind = "empty" if data is None else f"a {type(data).__name__}"
-        raise InputError(f"{path}: the root is {kind}; allowed: a mapping of scenario keys")
+    data = read_yaml(path)
     for override in overrides:
         _apply_override(data, override)
-    return data
-
-
-def _parse_yaml(text: str, source: str, private: bool) -> Any:
-    """YAML with tags kept as ``_tag``; one-line InputError for anything invalid."""
-    from pydrake.common.yaml import yaml_load_data
-
-    try:
-        duplicate = _duplicate_key(yaml.compose(text, Loader=yaml.SafeLoader))
-        data = _without_sharing(yaml_load_data(text, private=private))
-    except RecursionError:
-        raise InputError(
-            f"{source}: an alias (*name) contains itself, or nesting is deep"
-        ) from None
-    except yaml.MarkedYAMLError as error:
-        problem = error.problem or "not YAML"
-        if problem == "expected a mapping node, but found scalar":
-            problem = "a !Tag needs a mapping after it, e.g. !Tag {}"
-        line = error.problem_mark.line + 1 if error.problem_mark else "?"
-        raise InputError(f"{source}: invalid YAML in line {line}: {problem}") from None
-    except yaml.YAMLError as error:
-        raise InputError(f"{source}: invalid YAML: {' '.join(str(error).split())}") from None
-    if duplicate is not None:
-        key, line = duplicate
-        raise InputError(f"{source}: key {key!r} appears a second time in line {line}")
-    return data
-
-
-def _duplicate_key(node: yaml.Node | None) -> tuple[str, int] | None:
-    """First key that a mapping holds twice, with its line; YAML itself would keep the last."""
-    children: list[yaml.Node] = []
-    if isinstance(node, yaml.MappingNode):
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                if key.value in seen:
-                    return key.value, key.start_mark.line + 1
-                seen.add(key.value)
-        children = [value for _, value in node.value]
-    elif isinstance(node, yaml.SequenceNode):
-        children = node.value
-    return next((found for child in children if (found := _duplicate_key(child))), None)
-
-
-def _without_sharing(data: Any) -> Any:
-    """Data in which aliases (``*name``) are copies, so that an override changes one place only."""
-    if isinstance(data, dict):
-        return {key: _without_sharing(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_without_sharing(value) for value in data]
     return data
 
 
@@ -124,7 +65,7 @@ def _apply_override(data: dict[str, Any], override: str) -> None:
     keys = path.strip().split(".")
     if not separator or not all(keys):
         raise InputError(f"{source}: malformed; allowed: key.path=value")
-    value = _parse_yaml(text, source, private=True)
+    value = parse_yaml(text, source)
     target: Any = data
     for depth, key in enumerate(keys):
         here = ".".join(keys[:depth]) or "the scenario"

@@ -12,7 +12,7 @@ from pfsc_drake.control.linearization import Linearization
 from pfsc_drake.control.stabilization import Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathStatus
-from pfsc_drake.robot.newton_euler import gravity_torque
+from pfsc_drake.robot.newton_euler import gravity_function
 from pfsc_drake.robot.serial_chain import SerialChain
 
 
@@ -122,7 +122,7 @@ class PathLaw:
         self._inverse = inverse
         self._max_alpha = max_alpha
         self._safe_state = safe_state
-        self._gravity = _gravity_function(chain)
+        self._gravity = gravity_function(chain)
         self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
         self.function = _law_function(linearization, stabilization)
         self._completion = _completion_function(linearization, self.limits)
@@ -236,11 +236,6 @@ class PathLaw:
             np.isfinite(state[3 * n :]), state[3 * n :], 0.0
         )
         return np.clip(holding - braking, -self.limits, self.limits)
-
-
-def _gravity_function(chain: SerialChain) -> ca.Function:
-    q = ca.SX.sym("q", chain.dimension)
-    return ca.Function("gravity", [q], [gravity_torque(chain, q)])
 
 
 def _law_function(linearization: Linearization, stabilization: Stabilization) -> ca.Function:

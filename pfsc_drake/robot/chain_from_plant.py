@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -47,11 +48,17 @@ class PlantCoordinates:
     motor_rows: np.ndarray
     actuators: np.ndarray
 
-    def plant_state(self, q_J: np.ndarray, q_M: np.ndarray) -> np.ndarray:
-        """Return the plant's state at rest for link and motor coordinates, shape (N,) each."""
-        rows = np.vstack([self.link_rows, self.motor_rows])
-        rest = np.zeros(len(q_J))
-        return np.linalg.lstsq(rows, np.concatenate([q_J, rest, q_M, rest]), rcond=None)[0]
+    def plant_state(self, joint_state: np.ndarray) -> np.ndarray:
+        """Return the plant's state ``[q, v]``, shape (num_states,).
+
+        Args:
+            joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        """
+        return self._inverse @ joint_state
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        return np.linalg.pinv(np.vstack([self.link_rows, self.motor_rows]))
 
 
 def chain_from_plant(

@@ -1,15 +1,17 @@
-"""What a robot looks like: primitive shapes per body, as held by ``appearance.yaml``."""
+"""What a robot looks like: primitive shapes per body, as held by ``appearance.yaml``.
+
+The file is read by ``load_file(Appearance, path)`` of :mod:`pfsc_drake.typed_yaml`.
+"""
 
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.model_files import load_yaml
+from pfsc_drake.typed_yaml import REQUIRED
 
 _DIGITS = 9  # of shape poses: the files do not depend on the last bits of a libm
 
@@ -39,8 +41,8 @@ class Shape:
         radius: of a sphere, cylinder or capsule [m].
     """
 
-    kind: str = ""
-    material: str = ""
+    kind: str = field(default="", metadata=REQUIRED)
+    material: str = field(default="", metadata=REQUIRED)
     center: np.ndarray = field(default_factory=_empty)
     size: np.ndarray = field(default_factory=_empty)
     start: np.ndarray = field(default_factory=_empty)
@@ -87,30 +89,23 @@ class Appearance:
     bodies: dict[str, list[Shape]] = field(default_factory=dict)
     axes: list[list[Shape]] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        for name, color in self.materials.items():
+            if color.shape != (4,) or not np.all((color >= 0) & (color <= 1)):
+                shown = color.tolist()
+                raise InputError(f"materials.{name} = {shown}: must be 4 numbers from 0 to 1")
+        if self.elastic_axis_material:
+            self._require_material("elastic_axis_material", self.elastic_axis_material)
+        groups = {f"bodies.{name}": shapes for name, shapes in self.bodies.items()}
+        groups |= {f"axes[{i}]": shapes for i, shapes in enumerate(self.axes)}
+        for group, shapes in groups.items():
+            for i, shape in enumerate(shapes):
+                _check_shape(f"{group}[{i}]", shape)
+                self._require_material(f"{group}[{i}].material", shape.material)
 
-def load_appearance(path: Path) -> Appearance:
-    """Reads the look of a robot from a YAML file and checks it.
-
-    Raises:
-        InputError: if the file cannot be read or a key is unknown or out of range.
-    """
-    appearance = load_yaml(Appearance, path)
-    groups = {f"bodies.{name}": shapes for name, shapes in appearance.bodies.items()}
-    groups |= {f"axes[{i}]": shapes for i, shapes in enumerate(appearance.axes)}
-    known = ", ".join(appearance.materials)
-    for name, color in appearance.materials.items():
-        if color.shape != (4,) or not np.all((color >= 0) & (color <= 1)):
-            raise InputError(f"{path}: materials.{name} = {color}: must be 4 numbers from 0 to 1")
-    elastic = appearance.elastic_axis_material
-    if elastic and elastic not in appearance.materials:
-        raise InputError(f"{path}: elastic_axis_material = {elastic!r}: must be one of {known}")
-    for group, shapes in groups.items():
-        for i, shape in enumerate(shapes):
-            _check_shape(f"{path}: {group}[{i}]", shape)
-            if shape.material not in appearance.materials:
-                where = f"{path}: {group}[{i}].material"
-                raise InputError(f"{where} = {shape.material!r}: must be one of {known}")
-    return appearance
+    def _require_material(self, key: str, material: str) -> None:
+        if material not in self.materials:
+            raise InputError(f"{key} = {material!r}: must be one of {', '.join(self.materials)}")
 
 
 def _check_shape(where: str, shape: Shape) -> None:
@@ -119,12 +114,12 @@ def _check_shape(where: str, shape: Shape) -> None:
     for key, size in _NEEDS[shape.kind].items():
         value = getattr(shape, key)
         if value.shape != (size,) or not np.all(np.isfinite(value)):
-            raise InputError(f"{where}.{key} = {value}: must be {size} finite numbers")
+            raise InputError(f"{where}.{key} = {value.tolist()}: must be {size} finite numbers")
     if shape.kind == "box":
         if not np.all(shape.size > 0):
-            raise InputError(f"{where}.size = {shape.size}: must be positive")
-    elif not shape.radius > 0:
-        raise InputError(f"{where}.radius = {shape.radius}: must be positive")
+            raise InputError(f"{where}.size = {shape.size.tolist()}: must be positive")
+    elif not 0 < shape.radius < math.inf:
+        raise InputError(f"{where}.radius = {shape.radius}: must be positive and finite")
 
 
 def add_shapes(

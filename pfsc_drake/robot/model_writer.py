@@ -24,13 +24,14 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from pfsc_drake.robot.model_files import models_directory
-from pfsc_drake.robot.model_visuals import Appearance, add_shapes, format_numbers, load_appearance
+from pfsc_drake.robot.model_visuals import Appearance, add_shapes, format_numbers
 from pfsc_drake.robot.parameters import (
     BodyParameters,
     RobotParameters,
     VariantParameters,
     load_parameters,
 )
+from pfsc_drake.typed_yaml import load_file
 
 _SDF_VERSION = "1.9"
 _DRAKE_NAMESPACE = "https://drake.mit.edu"
@@ -52,6 +53,9 @@ def write_sdf(
         appearance: the look of the robot; without it the bodies have no geometry.
         collisions: whether the shapes are collision geometry, too. The robot does not collide with
             itself.
+
+    Raises:
+        InputError: if a link is not physical any more once its rotor body is taken off.
     """
     return _Writer(parameters, variant, appearance or Appearance(), collisions).text()
 
@@ -60,7 +64,7 @@ def main() -> None:
     """Writes all variants of all shipped robots next to their parameters."""
     for path in sorted(models_directory().glob("*/parameters.yaml")):
         parameters = load_parameters(path)
-        appearance = load_appearance(path.with_name("appearance.yaml"))
+        appearance = load_file(Appearance, path.with_name("appearance.yaml"))
         for variant in parameters.variants:
             text = write_sdf(parameters, variant, appearance)
             path.with_name(f"{variant.name}.sdf").write_text(text, encoding="utf-8")
@@ -132,11 +136,10 @@ class _Writer:
             assert carrier is not None
             add_shapes(carrier, shapes, self._appearance, collisions=self._collisions)
             return
-        mass = self._robot.rotors.body_mass
-        body = BodyParameters(
-            name=f"rotor_{i + 1}", mass=mass, center_of_mass=np.zeros(3), inertia=np.zeros(6)
-        )
-        rotor = self._link(body.name, parent, [0.0] * 6, body)
+        name, mass, body = f"rotor_{i + 1}", self._robot.rotors.body_mass, None
+        if mass > 0:
+            body = BodyParameters(name, mass, center_of_mass=np.zeros(3), inertia=np.zeros(6))
+        rotor = self._link(name, parent, [0.0] * 6, body)
         material = self._appearance.elastic_axis_material
         add_shapes(rotor, shapes, self._appearance, material=material, collisions=self._collisions)
 

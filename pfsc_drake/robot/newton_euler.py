@@ -199,3 +199,9 @@ def gravity_torque(chain: SerialChain, q: ca.SX) -> ca.SX:
     """
     at_rest = [jets.constant(q[i], 2) for i in range(chain.dimension)]
     return ca.vertcat(*[tau.coefficients[0] for tau in inverse_dynamics(chain, at_rest)])
+
+
+def gravity_function(chain: SerialChain) -> ca.Function:
+    """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
+    q = ca.SX.sym("q", chain.dimension)
+    return ca.Function("gravity", [q], [gravity_torque(chain, q)])

@@ -1,7 +1,7 @@
 """Physical parameters of a serial robot, as held by ``models/<robot>/parameters.yaml``.
 
-The dataclasses mirror the file and say what each key means; ``source`` always says where the
-numbers are from. :func:`load_parameters` reads and checks the file.
+The dataclasses mirror the file, say what each key means and refuse what is out of range;
+``source`` always says where the numbers are from. :func:`load_parameters` reads the file.
 """
 
 from dataclasses import dataclass, field, fields
@@ -12,13 +12,25 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.denavit_hartenberg import DenavitHartenberg
-from pfsc_drake.robot.model_files import load_yaml, models_directory
+from pfsc_drake.robot.model_files import models_directory
+from pfsc_drake.typed_yaml import REQUIRED, load_file
 
-_POSITIVE, _NOT_NEGATIVE = {"sign": "positive"}, {"sign": "not negative"}
+# Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
+_PLACEHOLDER_NAME = "unnamed"
+_POSITIVE = {**REQUIRED, "sign": "positive"}
+_NOT_NEGATIVE = {**REQUIRED, "sign": "not negative"}
 
 
-def _empty() -> np.ndarray:
-    return np.zeros(0)
+def _zero() -> np.ndarray:
+    return np.zeros(1)
+
+
+def _one() -> np.ndarray:
+    return np.ones(1)
+
+
+def _origin() -> np.ndarray:
+    return np.zeros(3)
 
 
 @dataclass
@@ -31,10 +43,13 @@ class DhParameters:
         alpha_deg: twists about x_i [deg].
     """
 
-    d: np.ndarray = field(default_factory=_empty)
-    a: np.ndarray = field(default_factory=_empty)
-    alpha_deg: np.ndarray = field(default_factory=_empty)
+    d: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    a: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    alpha_deg: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.d.size)
 
     def table(self) -> DenavitHartenberg:
         """Returns the table with its direct kinematics."""
@@ -53,12 +68,18 @@ class JointLimitParameters:
         effort: largest absolute drive torques [Nm].
     """
 
-    position_lower_deg: np.ndarray = field(default_factory=_empty)
-    position_upper_deg: np.ndarray = field(default_factory=_empty)
-    velocity_deg: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
-    acceleration_deg: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
-    effort: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
+    position_lower_deg: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    position_upper_deg: np.ndarray = field(default_factory=_one, metadata=REQUIRED)
+    velocity_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    acceleration_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    effort: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        lower, upper = self.position_lower_deg, self.position_upper_deg
+        _check_entries(self, axes=lower.size)
+        allowed = f"less than position_upper_deg = {upper.tolist()}"
+        _require(bool(np.all(lower < upper)), "position_lower_deg", lower, allowed)
 
     @property
     def position_lower(self) -> np.ndarray:
@@ -92,11 +113,21 @@ class BodyParameters:
         inertia: ``[6]``, about the center of mass: xx, yy, zz, xy, xz, yz [kg m^2].
     """
 
-    name: str = ""
-    mass: float = 0.0
-    center_of_mass: np.ndarray = field(default_factory=_empty)
-    inertia: np.ndarray = field(default_factory=_empty)
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    mass: float = field(default=1.0, metadata=REQUIRED)
+    center_of_mass: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=REQUIRED)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        _require(bool(self.name), "name", self.name, "a name")
+        _require(0 < self.mass < np.inf, "mass", self.mass, "positive and finite")
+        _check_vector("center_of_mass", self.center_of_mass, 3)
+        _check_vector("inertia", self.inertia, 6)
+        principal = np.linalg.eigvalsh(self.inertia_matrix())
+        physical = principal[0] >= 0 and 2 * principal[2] <= principal.sum() * (1 + 1e-6)
+        allowed = "physical (no principal moment negative or above the sum of the other two)"
+        _require(bool(physical), "inertia", self.inertia, allowed)
 
     def inertia_matrix(self) -> np.ndarray:
         """Returns the inertia about the center of mass, ``[3, 3]`` [kg m^2]."""
@@ -112,7 +143,11 @@ class ToolParameters(BodyParameters):
         tool_point: ``[3]`` tool offset ``[x_NT, y_NT, z_NT]`` of (2.5) [m].
     """
 
-    tool_point: np.ndarray = field(default_factory=_empty)
+    tool_point: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_vector("tool_point", self.tool_point, 3)
 
 
 @dataclass
@@ -125,10 +160,14 @@ class RotorParameters:
         body_mass: of each rotor body in elastic models [kg]; a part of the carrying link's mass.
     """
 
-    inertia: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
-    gear_ratio: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
+    inertia: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    gear_ratio: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
     body_mass: float = 0.0
     source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.inertia.size)
+        _require(0 <= self.body_mass < np.inf, "body_mass", self.body_mass, "at least 0 and finite")
 
     @property
     def reflected_inertia(self) -> np.ndarray:
@@ -145,9 +184,12 @@ class ElasticityParameters:
         damping: diagonal of K_d [Nms/rad].
     """
 
-    stiffness: np.ndarray = field(default_factory=_empty, metadata=_POSITIVE)
-    damping: np.ndarray = field(default_factory=_empty, metadata=_NOT_NEGATIVE)
+    stiffness: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    damping: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.stiffness.size)
 
 
 @dataclass
@@ -159,9 +201,12 @@ class FrictionParameters:
         viscous: ``[N]`` f_v [Nms/rad].
     """
 
-    coulomb: np.ndarray = field(default_factory=_empty, metadata=_NOT_NEGATIVE)
-    viscous: np.ndarray = field(default_factory=_empty, metadata=_NOT_NEGATIVE)
+    coulomb: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    viscous: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.coulomb.size)
 
 
 @dataclass
@@ -174,9 +219,13 @@ class VariantParameters:
         fixed_deg: DH angles at which the last joints are welded [deg]; empty if all joints move.
     """
 
-    name: str = ""
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
     elasticity: str = ""
-    fixed_deg: np.ndarray = field(default_factory=_empty)
+    fixed_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        _require(bool(self.name), "name", self.name, "a name")
+        _check_vector("fixed_deg", self.fixed_deg, self.fixed_deg.size)
 
 
 @dataclass
@@ -195,19 +244,42 @@ class RobotParameters:
         variants: the model files that are written from these parameters.
     """
 
-    name: str = ""
-    denavit_hartenberg: DhParameters = field(default_factory=DhParameters)
-    joint_limits: JointLimitParameters = field(default_factory=JointLimitParameters)
-    links: list[BodyParameters] = field(default_factory=list)
-    tool: ToolParameters = field(default_factory=ToolParameters)
-    rotors: RotorParameters = field(default_factory=RotorParameters)
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    denavit_hartenberg: DhParameters = field(default_factory=DhParameters, metadata=REQUIRED)
+    joint_limits: JointLimitParameters = field(
+        default_factory=JointLimitParameters, metadata=REQUIRED
+    )
+    links: list[BodyParameters] = field(
+        default_factory=lambda: [BodyParameters()], metadata=REQUIRED
+    )
+    tool: ToolParameters = field(default_factory=ToolParameters, metadata=REQUIRED)
+    rotors: RotorParameters = field(default_factory=RotorParameters, metadata=REQUIRED)
     elasticities: dict[str, ElasticityParameters] = field(default_factory=dict)
-    friction: FrictionParameters = field(default_factory=FrictionParameters)
+    friction: FrictionParameters = field(default_factory=FrictionParameters, metadata=REQUIRED)
     variants: list[VariantParameters] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        axes = self.denavit_hartenberg.d.size
+        _require(bool(self.name), "name", self.name, "a name")
+        for key in ("joint_limits", "rotors", "friction"):
+            _check_entries(getattr(self, key), axes, prefix=f"{key}.")
+        _require(len(self.links) == axes, "links", len(self.links), f"{axes} links")
+        light = self.rotors.body_mass < min(link.mass for link in self.links)
+        _require(light, "rotors.body_mass", self.rotors.body_mass, "below every link's mass")
+        for i, variant in enumerate(self.variants):
+            self._check_variant(f"variants[{i}]", variant, axes)
+
+    def _check_variant(self, key: str, variant: VariantParameters, axes: int) -> None:
+        moving = axes - variant.fixed_deg.size
+        _require(moving > 0, f"{key}.fixed_deg", variant.fixed_deg, f"less than {axes} angles")
+        if variant.elasticity:
+            sets = [n for n, e in self.elasticities.items() if e.stiffness.size == moving]
+            allowed = f"empty or a set for {moving} joints: {', '.join(sets) or 'none'}"
+            _require(variant.elasticity in sets, f"{key}.elasticity", variant.elasticity, allowed)
 
 
 def load_parameters(robot: str | Path) -> RobotParameters:
-    """Reads the parameters of a robot and checks them.
+    """Returns the parameters of a robot.
 
     Args:
         robot: the name of a shipped robot (``"comau_racer_1_4"``) or the path of a YAML file.
@@ -223,76 +295,27 @@ def load_parameters(robot: str | Path) -> RobotParameters:
                 file.parent.name for file in models_directory().glob("*/parameters.yaml")
             )
             raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
-    parameters = load_yaml(RobotParameters, path)
-    _Checker(path).check(parameters)
-    return parameters
+    return load_file(RobotParameters, path)
 
 
-@dataclass
-class _Checker:
-    """Raises InputError where the parameters of one file are missing or out of range."""
+def _check_entries(group: Any, axes: int, prefix: str = "") -> None:
+    """Checks that every vector of a group has one entry per axis, with the sign of its field."""
+    for entry in fields(group):
+        key, value = prefix + entry.name, getattr(group, entry.name)
+        if isinstance(value, np.ndarray):
+            _require(axes > 0, key, value, "one number per joint")
+            _check_vector(key, value, axes)
+            sign = entry.metadata.get("sign", "")
+            fits = np.all(value > 0 if sign == "positive" else value >= 0) or not sign
+            _require(bool(fits), key, value, sign)
 
-    path: Path
 
-    def check(self, robot: RobotParameters) -> None:
-        dh, limits, rotors = robot.denavit_hartenberg, robot.joint_limits, robot.rotors
-        axes = dh.d.size
-        self._require(bool(robot.name), "name", robot.name, "a name")
-        self._require(axes > 0, "denavit_hartenberg.d", dh.d, "one number per joint")
-        for key in ("denavit_hartenberg", "joint_limits", "rotors", "friction"):
-            self._rows(key, getattr(robot, key), axes)
-        lower, upper = limits.position_lower_deg, limits.position_upper_deg
-        allowed = f"less than position_upper_deg = {upper.tolist()}"
-        key = "joint_limits.position_lower_deg"
-        self._require(bool(np.all(lower < upper)), key, lower, allowed)
-        self._require(len(robot.links) == axes, "links", len(robot.links), f"{axes} links")
-        for i, link in enumerate(robot.links):
-            self._body(f"links[{i}]", link)
-        self._body("tool", robot.tool)
-        self._size("tool.tool_point", robot.tool.tool_point, 3)
-        light = 0 <= rotors.body_mass < min(link.mass for link in robot.links)
-        allowed = "at least 0 and below every link's mass"
-        self._require(light, "rotors.body_mass", rotors.body_mass, allowed)
-        for name, elasticity in robot.elasticities.items():
-            self._rows(f"elasticities.{name}", elasticity, elasticity.stiffness.size)
-        for i, variant in enumerate(robot.variants):
-            self._variant(f"variants[{i}]", variant, robot)
+def _check_vector(key: str, value: np.ndarray, size: int) -> None:
+    fits = value.shape == (size,) and bool(np.all(np.isfinite(value)))
+    _require(fits, key, value, f"{size} finite numbers")
 
-    def _variant(self, key: str, variant: VariantParameters, robot: RobotParameters) -> None:
-        axes = robot.denavit_hartenberg.d.size
-        self._require(bool(variant.name), f"{key}.name", variant.name, "a name")
-        moving = axes - variant.fixed_deg.size
-        self._require(moving > 0, f"{key}.fixed_deg", variant.fixed_deg, f"less than {axes} angles")
-        if variant.elasticity:
-            sets = [n for n, e in robot.elasticities.items() if e.stiffness.size == moving]
-            allowed = f"empty or a set for {moving} joints: {', '.join(sets) or 'none'}"
-            key = f"{key}.elasticity"
-            self._require(variant.elasticity in sets, key, variant.elasticity, allowed)
 
-    def _body(self, key: str, body: BodyParameters) -> None:
-        self._require(bool(body.name), f"{key}.name", body.name, "a name")
-        self._require(0 < body.mass < np.inf, f"{key}.mass", body.mass, "positive")
-        self._size(f"{key}.center_of_mass", body.center_of_mass, 3)
-        self._size(f"{key}.inertia", body.inertia, 6)
-        principal = np.linalg.eigvalsh(body.inertia_matrix())
-        physical = principal[0] >= 0 and 2 * principal[2] <= principal.sum() * (1 + 1e-6)
-        allowed = "physical (no principal moment negative or above the sum of the other two)"
-        self._require(bool(physical), f"{key}.inertia", body.inertia, allowed)
-
-    def _rows(self, group_key: str, group: Any, size: int) -> None:
-        for entry in fields(group):
-            key, value = f"{group_key}.{entry.name}", getattr(group, entry.name)
-            if isinstance(value, np.ndarray):
-                self._size(key, value, size)
-                sign = entry.metadata.get("sign", "")
-                fits = np.all(value > 0 if sign == "positive" else value >= 0) or not sign
-                self._require(bool(fits), key, value, sign)
-
-    def _size(self, key: str, value: np.ndarray, size: int) -> None:
-        fits = value.shape == (size,) and bool(np.all(np.isfinite(value)))
-        self._require(fits, key, value, f"{size} finite numbers")
-
-    def _require(self, condition: bool, key: str, value: object, allowed: str) -> None:
-        if not condition:
-            shown = value.tolist() if isinstance(value, np.ndarray) else value
-            raise InputError(f"{self.path}: {key} = {shown!r}: must be {allowed}")
+def _require(condition: bool, key: str, value: object, allowed: str) -> None:
+    if not condition:
+        shown = value.tolist() if isinstance(value, np.ndarray) else value
+        raise InputError(f"{key} = {shown!r}: must be {allowed}")

@@ -46,7 +46,7 @@ class PathFollowingController(LeafSystem):
 
     def __init__(self, law: PathLaw, period: float) -> None:
         super().__init__()
-        self._law, self._period, self.layout = law, period, law.layout
+        self._law, self.period, self.layout = law, period, law.layout
         linearization = law.linearization
         n, m = linearization.num_joints, linearization.num_outputs
         r = linearization.relative_degree
@@ -116,4 +116,4 @@ class PathFollowingController(LeafSystem):
         if self._law.stabilization.has_integral_part:
             m = self._fault
             y = result[self.layout.manifold_state][:m]
-            memory[self._integral] += self._period * (y - self._reference.Eval(context)[:m])
+            memory[self._integral] += self.period * (y - self._reference.Eval(context)[:m])

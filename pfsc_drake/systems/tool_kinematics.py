@@ -1,11 +1,9 @@
 """Where the tool is."""
 
-import casadi as ca
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from pfsc_drake.jets import Jet
-from pfsc_drake.robot.newton_euler import link_motions, tool_pose
+from pfsc_drake.robot.inverse_kinematics import pose_function
 from pfsc_drake.robot.serial_chain import SerialChain
 
 
@@ -29,7 +27,7 @@ class ToolKinematics(LeafSystem):
             prerequisites_of_calc={self._joint_state.ticket()},
         )
         self._q, self._pose = np.zeros(n), np.zeros(12)
-        self._buffer, self._evaluate = _pose_function(chain).buffer()
+        self._buffer, self._evaluate = pose_function(chain).buffer()
         self._buffer.set_arg(0, self._q.data)
         self._buffer.set_res(0, self._pose.data)
 
@@ -37,10 +35,3 @@ class ToolKinematics(LeafSystem):
         self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
         self._evaluate()
         output.SetFromVector(self._pose)
-
-
-def _pose_function(chain: SerialChain) -> ca.Function:
-    q = ca.SX.sym("q", chain.dimension)
-    at_rest = [Jet([q[i], ca.SX(0)]) for i in range(chain.dimension)]
-    y, R = (jet.coefficients[0] for jet in tool_pose(chain, link_motions(chain, at_rest)))
-    return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))])

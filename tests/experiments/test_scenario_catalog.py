@@ -27,7 +27,7 @@ def test_listing_is_ordered_by_section_and_reads_typed_files(folder):
 
 def test_broken_file_is_named(folder):
     (folder / "broken.yaml").write_text("a: [")
-    with pytest.raises(InputError, match=r"broken\.yaml: not readable as YAML"):
+    with pytest.raises(InputError, match=r"broken\.yaml: invalid YAML in line 1"):
         list_scenarios(folder)
 
 

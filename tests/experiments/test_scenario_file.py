@@ -84,37 +84,6 @@ def test_malformed_overrides(scenario, override, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("a: [", "invalid YAML in line 1"),
-        ("a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n", "key 'c' appears a second time in line 5"),
-        ("", "the root is empty; allowed: a mapping"),
-        ("- 1\n", "the root is a list; allowed: a mapping"),
-        ("a: 1\npath: !Circle 3\n", "invalid YAML in line 2: a !Tag needs a mapping"),
-        ("a: &x [*x]\n", "contains itself"),
-        ("a: 1\n---\nb: 2\n", "invalid YAML in line 2"),
-        ("a: \x07\n", "invalid YAML"),
-    ],
-)
-def test_broken_files(tmp_path, text, message):
-    path = tmp_path / "broken.yaml"
-    path.write_text(text)
-    with pytest.raises(InputError) as caught:
-        load_scenario_data(path, [])
-    assert str(caught.value).startswith(str(path))
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_unreadable_files(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        load_scenario_data(tmp_path / "none.yaml", [])
-    (tmp_path / "latin.yaml").write_bytes(b"a: \xff\xfe\n")
-    with pytest.raises(InputError, match="not UTF-8 text"):
-        load_scenario_data(tmp_path / "latin.yaml", [])
-
-
 def test_read_scenario_knows_its_name(scenario):
     assert read_scenario(str(scenario), []).name == "made_up"
     scenario.write_text("duration: 1\n")

@@ -1,5 +1,7 @@
 """The SDF text that is written from parameters and appearance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
@@ -9,29 +11,29 @@ from pydrake.multibody.tree import JointIndex
 from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.robot.model_files import models_directory
-from pfsc_drake.robot.model_visuals import load_appearance
+from pfsc_drake.robot.model_visuals import Appearance
 from pfsc_drake.robot.model_writer import write_sdf
 from pfsc_drake.robot.parameters import VariantParameters, load_parameters
+from pfsc_drake.typed_yaml import load_file
 
 COMAU = load_parameters("comau_racer_1_4")
 DIRECTORY = models_directory() / "comau_racer_1_4"
+APPEARANCE = load_file(Appearance, DIRECTORY / "appearance.yaml")
 TABLE = COMAU.denavit_hartenberg.table()
 VARIANTS = {variant.name: variant for variant in COMAU.variants}
 
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_shipped_file_is_what_the_writer_gives(name):
-    appearance = load_appearance(DIRECTORY / "appearance.yaml")
-    text = write_sdf(COMAU, VARIANTS[name], appearance)
+    text = write_sdf(COMAU, VARIANTS[name], APPEARANCE)
     message = f"{name}.sdf is not up to date: run python -m pfsc_drake.robot.model_writer"
     assert (DIRECTORY / f"{name}.sdf").read_text(encoding="utf-8") == text, message
 
 
 def test_no_collision_geometry_unless_asked_for():
-    appearance = load_appearance(DIRECTORY / "appearance.yaml")
     variant = VARIANTS["comau_racer_1_4_elastic"]
-    assert "<collision" not in write_sdf(COMAU, variant, appearance)
-    text = write_sdf(COMAU, variant, appearance, collisions=True)
+    assert "<collision" not in write_sdf(COMAU, variant, APPEARANCE)
+    text = write_sdf(COMAU, variant, APPEARANCE, collisions=True)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(time_step=1e-3), builder)
     Parser(plant).AddModelsFromString(text, "sdf")
@@ -62,3 +64,16 @@ def test_bare_model_without_appearance():
     X_WT = plant.GetFrameByName("tool_point").CalcPoseInWorld(context)
     y_t, R_e = TABLE.pose([*q, 0.0, np.deg2rad(10.0)], COMAU.tool.tool_point)
     assert X_WT.IsNearlyEqualTo(RigidTransform(RotationMatrix(R_e), y_t), 1e-12)
+
+
+def test_rotor_bodies_may_be_without_mass():
+    """Elastic joints between massless rotor bodies still make a valid model: D_M is reflected."""
+    variant = VARIANTS["comau_racer_1_4_elastic_3r"]
+    rotors = replace(COMAU.rotors, body_mass=0.0)
+    plant = MultibodyPlant(0.0)
+    text = write_sdf(replace(COMAU, rotors=rotors), variant, APPEARANCE)
+    Parser(plant).AddModelsFromString(text, "sdf")
+    plant.Finalize()
+    mass = plant.CalcMassMatrix(plant.CreateDefaultContext())
+    assert plant.GetBodyByName("rotor_1").default_mass() == 0.0
+    assert np.linalg.eigvalsh(mass)[0] > 0.0

@@ -1,18 +1,31 @@
-"""Typed loading: data from YAML into a dataclass schema, with errors a person can act on.
+"""Typed YAML: files and data into dataclasses, with errors a person can act on.
 
 Drake's ``yaml_load_typed`` does the loading. Its messages name neither file nor key path, so the
-schema is walked first (:mod:`experiments.schema_check`) and the loaded object is validated after.
+schema is walked first (:mod:`pfsc_drake.schema_check`) and the loaded object is validated after.
+``pydrake`` is imported only when something is loaded.
 """
 
 import dataclasses
+from pathlib import Path
 from typing import Any, TypeVar
 
-from experiments.schema_check import REQUIRED, check_schema
 from pfsc_drake.errors import InputError
+from pfsc_drake.schema_check import REQUIRED, check_schema
+from pfsc_drake.yaml_reading import dump_yaml, read_yaml
 
-__all__ = ["REQUIRED", "load_typed"]
+__all__ = ["REQUIRED", "load_file", "load_typed"]
 
 Schema = TypeVar("Schema")
+
+
+def load_file(schema_class: type[Schema], path: str | Path) -> Schema:
+    """Loads a YAML file into a schema of mutable dataclasses; see :func:`load_typed`.
+
+    Raises:
+        InputError: if the file cannot be read (:func:`pfsc_drake.yaml_reading.read_yaml`) or does
+            not fit; one line that names the file.
+    """
+    return load_typed(schema_class, read_yaml(Path(path)), str(path))
 
 
 def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) -> Schema:
@@ -28,7 +41,7 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
             arguments before it fills it in; a key that may not be left out is declared as
             ``field(default=..., metadata=REQUIRED)`` with a placeholder that
             ``__post_init__`` accepts.
-        data: As :func:`experiments.scenario_file.load_scenario_data` returns it.
+        data: As :func:`pfsc_drake.yaml_reading.read_yaml` returns it.
         source: Name of the file, for messages.
 
     Returns:
@@ -37,11 +50,11 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
     Raises:
         InputError: One line that names source, key path, value and what is allowed.
     """
-    from pydrake.common.yaml import yaml_dump, yaml_load_typed
+    from pydrake.common.yaml import yaml_load_typed
 
     check_schema(schema_class, data, source)
     try:
-        result = yaml_load_typed(schema=schema_class, data=yaml_dump(data) if data else "{}")
+        result = yaml_load_typed(schema=schema_class, data=dump_yaml(data))
     except NotImplementedError:  # a schema that Drake cannot load is a fault of the program
         raise
     except (RuntimeError, ValueError) as error:

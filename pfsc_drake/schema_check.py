@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml_reading import TAG_KEY
 
 REQUIRED = {"required": True}  # metadata of a field whose key may not be left out
 
@@ -30,7 +31,7 @@ def check_schema(schema: type, data: Any, source: str) -> None:
     Args:
         schema: Dataclass. Its fields are keys; a field without default, or with
             ``metadata=REQUIRED``, must be there.
-        data: From YAML, with tags as ``_tag``.
+        data: As :func:`pfsc_drake.yaml_reading.read_yaml` returns it.
         source: Name of the file, for messages.
 
     Raises:
@@ -78,7 +79,7 @@ class _Checker:
             self._refuse(value, key, f"a mapping with the keys {', '.join(fields)}")
         prefix = f"{key}." if key else ""
         for name, item in value.items():
-            if name == "_tag":
+            if name == TAG_KEY:
                 self._refuse(item, key, "a mapping without a tag")
             if name not in fields:
                 nearest = difflib.get_close_matches(str(name), fields, n=1)
@@ -104,15 +105,16 @@ class _Checker:
                 self._refuse(value, key, " or ".join(_alternatives(members)))
         elif len(choices) == 1:
             self.check(choices[0], value, key)
-        elif isinstance(value, dict) and "_tag" in value:
+        elif isinstance(value, dict) and TAG_KEY in value:
             by_tag = {f"!{getattr(choice, '__name__', choice)}": choice for choice in choices}
-            if value["_tag"] not in by_tag:
+            tag = str(value[TAG_KEY])
+            if tag not in by_tag:
                 allowed = ", ".join(by_tag)
                 raise InputError(
-                    f"{self._source}: key {key!r}: unknown tag {value['_tag']}: allowed: {allowed}"
+                    f"{self._source}: key {key!r}: unknown tag {tag}: allowed: {allowed}"
                 )
-            content = {name: item for name, item in value.items() if name != "_tag"}
-            self.check(by_tag[value["_tag"]], content, key)
+            content = {name: item for name, item in value.items() if name != TAG_KEY}
+            self.check(by_tag[tag], content, key)
         elif isinstance(value, (dict, list)):
             self._check_untagged(choices, value, key)
         elif type(value) not in choices and not _is_scalar(choices[0], value):

@@ -1,15 +1,17 @@
 """Typed loading: what fits is loaded by Drake, what does not is reported in one line."""
 
 import math
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_load_data
 
-from experiments.typed_loading import REQUIRED, load_typed
 from pfsc_drake import InputError
+from pfsc_drake.typed_yaml import REQUIRED, load_file, load_typed
+from pfsc_drake.yaml_reading import parse_yaml
 
 
 @dataclass
@@ -69,7 +71,7 @@ class Scenario:
 
 
 def load(text: str) -> Scenario:
-    return load_typed(Scenario, yaml_load_data(text), "made_up.yaml")
+    return load_typed(Scenario, parse_yaml(text, "made_up.yaml"), "made_up.yaml")
 
 
 def message_of(text: str) -> str:
@@ -159,6 +161,9 @@ def test_defaults_stay_where_keys_are_missing():
             "{name: x, path: !Square {}}",
             "key 'path': unknown tag !Square: allowed: !Lemniscate, !Circle",
         ),
+        ("{name: x, path: {_tag: [1]}}", "key 'path': unknown tag [1]: allowed: !Lemniscate"),
+        ("!Scenario {name: x}", "the root is '!Scenario': expected a mapping without a tag"),
+        ("{name: x, 1: y}", "unknown key '1' = 'y': allowed: name, path"),
         ("{name: x, path: !Circle {size: 1}}", "unknown key 'path.size' = 1: allowed: radius"),
         (
             "{name: x, path: {radius: 1}}",
@@ -214,3 +219,32 @@ def test_required_list():
 
 def test_infinity_is_a_number():
     assert load("{name: x, limit: .inf}").limit == math.inf
+
+
+def test_mappings_keep_the_order_of_the_file():
+    controller = load("{name: x, controller: {spare: {z: {}, a: {}, m: {}}}}").controller
+    assert list(controller.spare) == ["z", "a", "m"]
+
+
+def test_load_file(tmp_path):
+    path = tmp_path / "scenario.yaml"
+    path.write_text("_anchor: &r 0.3\nname: x\npath: !Circle {radius: *r}\n", encoding="utf-8")
+    assert load_file(Scenario, path).path == Circle(0.3)
+    assert load_file(Scenario, str(path)).name == "x"
+    path.write_text("name: x\ncontroller: {law: magic}\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_file(Scenario, path)
+    assert str(caught.value).startswith(f"{path}: key 'controller': law = 'magic'")
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        load_file(Scenario, tmp_path / "none.yaml")
+
+
+def test_import_stays_light():
+    """The library and its loader are imported for ``python -m experiments list``, too."""
+    code = (
+        "import sys, pfsc_drake, pfsc_drake.typed_yaml;"
+        "heavy = {'pydrake', 'casadi', 'matplotlib', 'scipy'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else 0)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr

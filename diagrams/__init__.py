@@ -1,0 +1,1 @@
+"""Builders that wire the systems into stations: plant, controller, visualization."""

@@ -1,0 +1,75 @@
+"""The state in which a run starts."""
+
+import numpy as np
+
+from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.inverse_kinematics import solve_pose
+from pfsc_drake.robot.newton_euler import gravity_function
+from pfsc_drake.robot.serial_chain import SerialChain
+
+
+def start_state(
+    scenario: PathFollowingScenario, path: Path, chain: SerialChain, coordinates: PlantCoordinates
+) -> tuple[np.ndarray, float]:
+    """Return the plant's state at rest beside the path, and the path parameter there.
+
+    Elastic joints carry the links' weight.
+
+    Args:
+        scenario: The scenario.
+        path: Its path.
+        chain: Its robot.
+        coordinates: Where the robot's coordinates stand in the plant's state.
+
+    Raises:
+        InputError: If the start is off the path's ends, outside the feasible
+            neighbourhood, or out of the robot's reach.
+    """
+    start, eta = scenario.start, scenario.reference.points[0]
+    _check_points(scenario.reference.points, path)
+    theta = path.arc_length.parameter(eta)
+    layout = PathPointLayout(2, path.orientation is not None)
+    on_path = path.evaluator(2).evaluate_at(theta)
+    sigma, slope = on_path[layout.position].reshape(-1, 3)[:2]
+    e_perp = on_path[layout.normal]
+    e_cross = np.cross(slope / np.linalg.norm(slope), e_perp)
+    y_t = sigma + start.offset[0] * e_perp + start.offset[1] * e_cross
+    projection = path.projector.project(y_t.tolist(), theta)
+    if not (projection.converged and projection.alpha < scenario.controller.max_alpha):
+        raise InputError(
+            f"start.offset: {start.offset} m at eta = {eta:g} m is outside the feasible "
+            f"neighbourhood, alpha = {projection.alpha:.3g}; alpha must be below "
+            f"{scenario.controller.max_alpha:g}"
+        )
+    R_e = None
+    if path.orientation is not None:
+        deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
+        R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
+    q_J = solve_pose(chain, y_t, R_e, _posture(start.posture_deg, chain), "start")
+    weight = np.array(gravity_function(chain)(q_J)).ravel()
+    rest = np.zeros(chain.dimension)
+    joint_state = np.concatenate([q_J, rest, q_J + weight / chain.K_s, rest])
+    return coordinates.plant_state(joint_state), projection.theta
+
+
+def _check_points(points: list[float], path: Path) -> None:
+    for eta in points:
+        if not path.closed and not 0.0 <= eta <= path.length:
+            raise InputError(
+                f"reference.points: {eta:g} m; the path is open and {path.length:.6g} m long"
+            )
+
+
+def _posture(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
+    if not posture_deg:
+        lower, upper = chain.gather("position_limits").T
+        return np.nan_to_num((lower + upper) / 2.0)
+    if len(posture_deg) != chain.dimension:
+        raise InputError(
+            f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"
+        )
+    is_angle = np.array([link.is_revolute for link in chain.links])
+    return np.where(is_angle, np.deg2rad(posture_deg), posture_deg)

@@ -1,0 +1,42 @@
+"""How long one tick of the controller takes, measured on the states of a run."""
+
+import time
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.path_following import PathFollowingStation
+from experiments.run_log import RunLog
+
+_SAMPLES = 1000
+
+
+def measure_tick(station: PathFollowingStation, root: Context, log: RunLog) -> np.ndarray:
+    """Evaluate the controller chain, from the joint state to the drives, at logged states.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context, which is overwritten.
+        log: Log of the run.
+
+    Returns:
+        Wall clock time of each evaluation [s].
+    """
+    drive = station.controller.GetOutputPort("drive")
+    controller = station.controller.GetMyContextFromRoot(root)
+    projector = station.projector.GetMyMutableContextFromRoot(root)
+    plant = station.plant.GetMyMutableContextFromRoot(root)
+    states = np.hstack([log[name].values for name in ("q_J", "v_J", "q_M", "v_M")])
+    finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
+    usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
+    chosen = usable[:: max(1, len(usable) // _SAMPLES)]
+    plant_states = [station.coordinates.plant_state(x) for x in states[chosen]]
+    elapsed = []
+    for k, x in zip(chosen, plant_states, strict=True):
+        root.SetTime(log.time[k])
+        station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
+        station.plant.SetPositionsAndVelocities(plant, x)
+        begin = time.perf_counter()
+        drive.Eval(controller)
+        elapsed.append(time.perf_counter() - begin)
+    return np.array(elapsed)

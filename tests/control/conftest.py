@@ -1,0 +1,143 @@
+"""Robots as Drake knows them, paths and laws that several tests use."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable
+from scipy.optimize import least_squares
+
+from pfsc_drake.control.decoupling import DecouplingInverse
+from pfsc_drake.control.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
+from pfsc_drake.control.path_law import PathLaw, SafeState
+from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.geometry import FourierCurve, Path, interpolate_orientation, zyx_to_quaternion
+from pfsc_drake.robot.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.model_files import resolve_model
+
+NAMES = ("eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3")
+
+
+class Robot:
+    """A plant of Drake in the coordinates ``[q_J, v_J, q_M, v_M]``, and its extracted chain.
+
+    Nothing in here uses the chain's own kinematics and dynamics.
+    """
+
+    def __init__(self, model, joint_damping=()):
+        self.plant = MultibodyPlant(0.0)
+        Parser(self.plant).AddModels(str(resolve_model(model)))
+        for i, damping in enumerate(joint_damping):
+            self.plant.GetJointByName(f"flex_{i + 1}").set_default_damping(damping)
+        self.plant.Finalize()
+        self.tool = self.plant.GetFrameByName("tool_point")
+        self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
+        self.n = self.chain.dimension
+        self.context = self.plant.CreateDefaultContext()
+        self._rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
+        self._inverse_rows = np.linalg.pinv(self._rows)
+        nq = self.plant.num_positions()
+        self._link_velocity = self.coordinates.link_rows[self.n :, nq:]
+
+    def set_state(self, state):
+        """Set ``[q_J, v_J, q_M, v_M]``; the last two are ignored by a rigid robot."""
+        rows = self._rows if self.chain.is_elastic else self.coordinates.link_rows
+        state = state[: len(rows)]
+        self.plant.SetPositionsAndVelocities(self.context, np.linalg.solve(rows, state))
+
+    def rates(self, state, drive, tau_ext):
+        """Return the time derivative of ``[q_J, v_J, q_M, v_M]`` from Drake's plant."""
+        self.set_state(state)
+        actuation = np.zeros(self.plant.num_actuators())
+        actuation[self.coordinates.actuators] = drive
+        self.plant.get_actuation_input_port().FixValue(self.context, actuation)
+        port = self.plant.get_applied_generalized_force_input_port()
+        port.FixValue(self.context, self._link_velocity.T @ tau_ext)
+        return self._rows @ self.plant.EvalTimeDerivatives(self.context).CopyToVector()
+
+    def tool_pose(self, state):
+        """Return ``y_t`` and ``R_e``."""
+        self.set_state(state)
+        X_WT = self.tool.CalcPoseInWorld(self.context)
+        return X_WT.translation(), X_WT.rotation().matrix()
+
+    def link_dynamics(self, q, v):
+        """Return ``D_E(q)`` and ``n_E(q, v)`` of (2.65a); rigid robots only."""
+        self.set_state(np.concatenate([q, v]))
+        mass = self.plant.CalcMassMatrix(self.context) - np.diag(self.chain.D_M)
+        gravity = self.plant.CalcGravityGeneralizedForces(self.context)
+        return mass, self.plant.CalcBiasTerm(self.context) - gravity
+
+    def jacobian(self, q):
+        """Return the geometric Jacobian, rows angular then linear; rigid robots only."""
+        self.set_state(np.concatenate([q, np.zeros(self.n)]))
+        world = self.plant.world_frame()
+        return self.plant.CalcJacobianSpatialVelocity(
+            self.context, JacobianWrtVariable.kV, self.tool, [0, 0, 0], world, world
+        )
+
+    def reach(self, y_t, R_e=None, guess=(0.2, 1.6, -0.5, 0.1, 1.2, 0.1)):
+        """Return joint coordinates that bring the tool to a pose."""
+
+        def error(q):
+            y, R = self.tool_pose(np.concatenate([q, 0 * q, q, 0 * q]))
+            return y - y_t if R_e is None else np.concatenate([y - y_t, (R - R_e).ravel()])
+
+        solution = least_squares(error, guess[: self.n], xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        assert solution.cost < 1e-20
+        return solution.x
+
+
+@pytest.fixture(scope="session")
+def load_robot():
+    @cache
+    def load(model, joint_damping=()):
+        return Robot(model, joint_damping)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def oriented_path():
+    """Bent lemniscate with an orientation that swings on all three angles."""
+    theta = np.linspace(0.0, 2.0 * np.pi, 13)
+    swing = [0.25 * np.sin(2 * theta), -0.25 * np.cos(theta), -0.25 * np.sin(theta)]
+    angles = np.stack(swing, axis=1) + np.array([np.pi, -0.26, 0.0])
+    orientation = interpolate_orientation(
+        zyx_to_quaternion(angles), theta, smoothness=5, closed=True
+    )
+    return Path(FourierCurve.bent_lemniscate(), orientation)
+
+
+@pytest.fixture(scope="session")
+def position_path():
+    return Path(FourierCurve.bent_lemniscate())
+
+
+@pytest.fixture(scope="session")
+def make_law():
+    """Return a law with different poles on every coordinate and limits out of reach."""
+
+    def make(chain, law, oriented=True, **changes):
+        sampling_time = changes.pop("sampling_time", 0.0)
+        damping = changes.pop("boundary_layer_damping", None)
+        integral = changes.pop("integral", 0.0)
+        options = ActuationOptions(sampling_time, damping)
+        linearization = linearize_path(chain, law, oriented=oriented, options=options)
+        r, m, n = RELATIVE_DEGREE[law], linearization.num_outputs, chain.dimension
+        poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
+        gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]
+        arguments = {
+            "chain": chain,
+            "linearization": linearization,
+            "stabilization": Stabilization(gains, r, NAMES[:m]),
+            "inverse": DecouplingInverse(1e-6),
+            "limits": np.full(n, 1e9),
+            "max_alpha": 0.9,
+            "safe_state": SafeState(np.full(n, 50.0)),
+        }
+        return PathLaw(**(arguments | changes))
+
+    return make
