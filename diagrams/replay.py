@@ -55,6 +55,7 @@ def build_replay(
         meshcat: Where to draw.
         period: Time between frames [s].
     """
+    _aim_camera(path, meshcat)
     builder = DiagramBuilder()
     plant, scene_graph = add_visible_robot(builder, robot, folder)
     signals: Mapping[str, np.ndarray] = {
@@ -77,6 +78,15 @@ def build_replay(
     builder.Connect(sources["tool_pose"], drawing.GetInputPort("tool_pose"))
     builder.Connect(sources["path_point"], drawing.GetInputPort("path_point"))
     return builder.Build()
+
+
+def _aim_camera(path: Path, meshcat: Meshcat) -> None:
+    """Look at robot and path from the side that the path is on."""
+    points = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, :]
+    middle = points.mean(axis=0)
+    reach = float(np.linalg.norm(points, axis=1).max())
+    target = middle * np.array([0.5, 0.5, 0.7])
+    meshcat.SetCameraPose(target + reach * np.array([0.6, -0.9, 0.35]), target)
 
 
 def _add_source(

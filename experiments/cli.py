@@ -6,6 +6,7 @@ run, everything logged so far is kept; 130 interrupted.
 
 import dataclasses
 import json
+import logging
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -124,9 +125,9 @@ def _run(
     """Runs a scenario with progress and prints what came out; returns the exit status."""
     from experiments.run import run_scenario
 
+    logging.getLogger("drake").setLevel(logging.WARNING)
     console = Console()
-    total = duration if duration is not None else _duration_of(scenario)
-    with ProgressDisplay(console, scenario.name, total) as progress:
+    with ProgressDisplay(console, scenario.name, duration) as progress:
         outcome = run_scenario(
             scenario,
             out=out,
@@ -145,12 +146,6 @@ def _run(
         f" everything logged so far is kept in {out}"
     )
     return FAULT
-
-
-def _duration_of(scenario: "ScenarioFile") -> float | None:
-    """Key ``duration`` [s] of the scenario, None if it has no such number."""
-    value = scenario.data.get("duration")
-    return float(value) if isinstance(value, (int, float)) and value > 0 else None
 
 
 def _metrics_table(metrics: "Metrics") -> Table:

@@ -2,7 +2,7 @@
 
 import time
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from rich.console import Console
 from rich.markup import escape
@@ -17,6 +17,16 @@ from rich.progress import (
 
 PLAIN_LINES = 10  # plain lines per run of known length
 ROUNDING = 1e-9  # relative
+
+
+class ProgressListener(Protocol):
+    """Who wants to know how far a run is."""
+
+    def expect(self, duration: float) -> None:
+        """Told the simulated time at the end [s], once it is known."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
 
 
 class ProgressDisplay:
@@ -67,6 +77,12 @@ class ProgressDisplay:
     ) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+    def expect(self, duration: float) -> None:
+        """Takes the simulated time at the end [s], once it is known."""
+        self._duration = duration
+        if self._bar is not None:
+            self._bar.update(self._task, total=duration)
 
     def __call__(self, simulated_time: float, phase: str) -> None:
         """Shows how far the run is.

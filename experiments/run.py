@@ -2,7 +2,7 @@
 
 import gc
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,7 @@ from diagrams.scenario import PathFollowingScenario
 from experiments.figures import write_figures
 from experiments.metrics import Metrics
 from experiments.path_metrics import path_following_metrics
+from experiments.progress import ProgressListener
 from experiments.provenance import standard_attributes
 from experiments.report import write_report
 from experiments.run_log import RunLog
@@ -52,7 +53,7 @@ def run_scenario(
     duration: float | None,
     figures: bool,
     recording: bool,
-    progress: Callable[[float, str], None],
+    progress: ProgressListener,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
 
@@ -62,7 +63,7 @@ def run_scenario(
         duration: Simulated time [s] instead of the scenario's.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
-        progress: Told the simulated time [s] and the phase.
+        progress: Told how far the run is.
 
     Raises:
         InputError: If the scenario is wrong; nothing has moved then.
@@ -74,6 +75,7 @@ def run_scenario(
     (out / "scenario.yaml").write_text(yaml_dump_typed(settings), encoding="utf-8")
 
     span = duration or settings.duration or station.reference_duration
+    progress.expect(span)
     with _steady_clock():
         result = simulate(station, settings.simulation, span, progress)
         end = float(result.root.get_time())

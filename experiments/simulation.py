@@ -1,7 +1,6 @@
 """Running a path following station and collecting what it logged."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from pydrake.systems.framework import Context
 from diagrams.path_following import PathFollowingStation
 from diagrams.replay import RecordedMotion
 from diagrams.scenario import SimulationParameters
+from experiments.progress import ProgressListener
 from experiments.run_log import RunLog
 from pfsc_drake.control.path_law import Fault
 
@@ -37,7 +37,7 @@ def simulate(
     station: PathFollowingStation,
     parameters: SimulationParameters,
     duration: float,
-    progress: Callable[[float, str], None],
+    progress: ProgressListener,
 ) -> SimulationResult:
     """Simulate until the end or until the controller is in its safe state.
 
@@ -45,7 +45,7 @@ def simulate(
         station: What to simulate.
         parameters: How.
         duration: Simulated time [s].
-        progress: Told the simulated time [s] and the phase.
+        progress: Told how far the run is.
     """
     simulator = Simulator(station.diagram)
     ApplySimulatorConfig(_configuration(parameters), simulator)

@@ -37,7 +37,6 @@ class Robot:
         self.n = self.chain.dimension
         self.context = self.plant.CreateDefaultContext()
         self._rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
-        self._inverse_rows = np.linalg.pinv(self._rows)
         nq = self.plant.num_positions()
         self._link_velocity = self.coordinates.link_rows[self.n :, nq:]
 
@@ -49,6 +48,8 @@ class Robot:
 
     def rates(self, state, drive, tau_ext):
         """Return the time derivative of ``[q_J, v_J, q_M, v_M]`` from Drake's plant."""
+        # the plant itself would clip silently
+        assert np.all(np.abs(drive) <= self.chain.gather("effort_limit"))
         self.set_state(state)
         actuation = np.zeros(self.plant.num_actuators())
         actuation[self.coordinates.actuators] = drive

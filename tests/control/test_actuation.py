@@ -30,12 +30,11 @@ def compile_law(chain, law, num_external, *arguments):
 
 
 def random_state(robot, rng):
-    """Return ``[q_J, v_J, q_M, v_M]`` with joint torques of the size of the weight."""
+    """Return ``[q_J, v_J, q_M, v_M]`` with joint torques well within the drives' limits."""
     n = robot.n
     q = np.array([0.2, 1.4, -0.4, 0.3, 1.1, -0.2])[:n] + rng.uniform(-0.2, 0.2, n)
     v = rng.uniform(-1.0, 1.0, n)
-    stretch = np.where(np.isfinite(robot.chain.K_s), 500.0 / robot.chain.K_s, 0.0)
-    stretch = np.minimum(stretch, 2e-3)
+    stretch = 0.03 * robot.chain.gather("effort_limit") / robot.chain.K_s
     q_M = q + stretch * rng.uniform(-1.0, 1.0, n)
     return np.concatenate([q, v, q_M, v + 20.0 * stretch * rng.uniform(-1.0, 1.0, n)])
 
@@ -104,7 +103,7 @@ def test_elastic_joint_motion_is_the_plants(load_robot, model):
         assert np.allclose(q[0], state[:n], rtol=0, atol=0)
         assert np.allclose(q[2], a_J, rtol=1e-9, atol=1e-9)
 
-        h = 4e-4
+        h = 2e-4
         around = [a_J]
         for k in range(1, 5):
             for side in (1.0, -1.0):
@@ -218,11 +217,11 @@ def test_elastic_law_averages_over_the_hold(load_robot):
         mean = quad_vec(bracket, 0.0, T_s, epsabs=1e-9)[0] / T_s
         errors.append(np.abs(drive - now - mean).max())
         naive.append(np.abs(without_hold - mean).max())
-    print(errors, naive)
-    assert errors[1] < 0.05 * naive[1]
-    assert 3.5 < errors[0] / errors[1] < 9.0
-    assert 3.5 < errors[1] / errors[2] < 9.0
-    assert 1.5 < naive[1] / naive[2] < 2.5
+    # third order with the hold, first order without
+    assert errors[1] < 1e-2 * naive[1]
+    assert 6.0 < errors[0] / errors[1] < 10.0
+    assert 6.0 < errors[1] / errors[2] < 10.0
+    assert 1.8 < naive[1] / naive[2] < 2.2
 
 
 @pytest.mark.parametrize(

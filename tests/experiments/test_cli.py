@@ -36,6 +36,7 @@ class FakeRun:
     def run_scenario(self, scenario, out, duration, figures, recording, progress):
         self.calls.append((scenario, out, duration, figures, recording))
         progress(0.0, "building")
+        progress.expect(1.0)
         for step in range(11):
             progress(0.1 * step, "simulating")
         if self.raises is not None:
@@ -55,7 +56,7 @@ def fake_run(monkeypatch):
 @pytest.fixture
 def scenario(tmp_path):
     path = tmp_path / "my_run.yaml"
-    path.write_text("name: my_run\nsection: 3.8.3\ndescription: Test\nduration: 1.0\n")
+    path.write_text("name: my_run\nsection: 3.8.3\ndescription: Test\n")
     return path
 
 
