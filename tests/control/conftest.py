@@ -8,12 +8,19 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.decoupling import DecouplingInverse
 from pfsc_drake.control.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
 from pfsc_drake.control.path_law import PathLaw, SafeState
 from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
-from pfsc_drake.geometry import FourierCurve, Path, interpolate_orientation, zyx_to_quaternion
+from pfsc_drake.geometry import (
+    FourierCurve,
+    Path,
+    interpolate_orientation,
+    quaternion_to_matrix,
+    zyx_to_quaternion,
+)
 from pfsc_drake.robot.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.model_files import resolve_model
 
@@ -115,6 +122,24 @@ def oriented_path():
 @pytest.fixture(scope="session")
 def position_path():
     return Path(FourierCurve.bent_lemniscate())
+
+
+@pytest.fixture(scope="session")
+def virtual_output():
+    """Return the outputs of a tool pose from the path alone, ``(eta, xi_1, xi_2[, phi])``."""
+
+    def calc(path, y_t, R_e):
+        theta = path.project_globally(y_t).theta
+        sigma, slope = path.position.derivatives(theta, 1)
+        e_par, e_perp = slope / np.linalg.norm(slope), path.frame.normals(theta)[0]
+        offset = y_t - sigma
+        y = [path.arc_length.at(theta), e_perp @ offset, np.cross(e_par, e_perp) @ offset]
+        if path.orientation is None:
+            return np.array(y)
+        R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])
+        return np.array([*y, *Rotation.from_matrix(R_d.T @ R_e).as_euler("ZYX")])
+
+    return calc
 
 
 @pytest.fixture(scope="session")
