@@ -23,12 +23,16 @@ from pfsc_drake.control.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates, chain_from_plant
+from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.path_following_controller import PathFollowingController
 from pfsc_drake.systems.path_projector import PathProjector
 from pfsc_drake.systems.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.sensor_failure import SensorFailure
 from pfsc_drake.systems.tool_kinematics import ToolKinematics
+
+# rad per sampling interval, up to which the exact elastic law keeps its accuracy
+_FASTEST_RESONANCE = 1.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,7 @@ class PathFollowingStation:
         reference_duration: Length of the reference motion [s].
         initial_state: State of the plant at the start.
         initial_theta: Path parameter at the start.
+        warnings: What may not go as well as hoped, one sentence each.
     """
 
     diagram: Diagram
@@ -85,6 +90,7 @@ class PathFollowingStation:
     reference_duration: float
     initial_state: np.ndarray
     initial_theta: float
+    warnings: list[str]
 
     def set_start(self, root: Context) -> None:
         """Put the robot at the start of the scenario.
@@ -116,8 +122,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     builder = DiagramBuilder()
     plant = add_robot(builder, scenario.robot, folder)
     chain, coordinates = chain_from_plant(plant, tool_frame(plant, scenario.robot))
-    period = scenario.controller.sampling_time
-    path = make_path(scenario.path, scenario.controller.law, folder)
+    period, law_name = scenario.controller.sampling_time, scenario.controller.law
+    path = make_path(scenario.path, law_name, folder)
     law = make_law(scenario.controller, chain, path.orientation is not None)
     initial_state, initial_theta = start_state(scenario, path, chain, coordinates)
     linearization = law.linearization
@@ -178,6 +184,7 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         eta_p.domain[1],
         initial_state,
         initial_theta,
+        _warnings(law_name, chain, coordinates.link_rows @ initial_state, period),
     )
 
 
@@ -217,6 +224,23 @@ def _add_log(builder: DiagramBuilder, signals: dict[str, OutputPort], period: fl
     ends = np.cumsum(sizes).tolist()
     rows = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
     return SignalLog(sink, dict(zip(signals, rows, strict=True)))
+
+
+def _warnings(
+    law_name: str, chain: SerialChain, link_state: np.ndarray, period: float
+) -> list[str]:
+    """Return what a sampled controller will not do well on this robot."""
+    if law_name != "elastic":
+        return []
+    resonance = joint_resonances(chain, link_state[: chain.dimension])[-1]
+    if resonance * period <= _FASTEST_RESONANCE:
+        return []
+    return [
+        f"the joints resonate at up to {resonance / (2.0 * np.pi):.0f} Hz, "
+        f"{resonance * period:.2f} rad per sampling interval; above {_FASTEST_RESONANCE:g} rad the "
+        "law 'elastic' loses accuracy and then oscillates: sample faster or take the law "
+        "'singular_perturbation'"
+    ]
 
 
 def _drive_order(plant: MultibodyPlant, coordinates: PlantCoordinates) -> np.ndarray:

@@ -137,6 +137,8 @@ def _run(
             progress=progress,
         )
     console.print(_metrics_table(outcome.metrics))
+    for warning in outcome.warnings:
+        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     # Soft wrap: a path broken into two lines cannot be clicked.
     console.print(f"\nOpen the report: [bold cyan]{escape(str(outcome.report))}[/]", soft_wrap=True)
     if outcome.fault is None:

@@ -28,6 +28,7 @@ def write_report(
     log_attributes: Mapping[str, str],
     recording: Path | None = None,
     fault: str | None = None,
+    warnings: Sequence[str] = (),
     diagram_svg: str | None = None,
 ) -> Path:
     """Writes ``report.html``; figures and diagram are inside, only the recording is beside it.
@@ -42,6 +43,7 @@ def write_report(
         log_attributes: What identifies the run, see :mod:`experiments.provenance`.
         recording: Meshcat page, linked by its path relative to ``directory``.
         fault: Why the run was stopped; None if it completed.
+        warnings: What may not have gone as well as hoped, one sentence each.
         diagram_svg: The block diagram as SVG text.
 
     Returns:
@@ -53,6 +55,7 @@ def write_report(
         description=escape(description.strip()),
         badges=_badges(metrics, fault),
         fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
+        warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
         cards=_cards(metrics),
         recording=_recording(recording, directory),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),

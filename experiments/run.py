@@ -39,11 +39,13 @@ class RunOutcome:
         fault: Why the run was stopped, or None if it completed.
         report: The page to open.
         metrics: Its metrics.
+        warnings: What may not have gone as well as hoped, one sentence each.
     """
 
     fault: str | None
     report: Path
     metrics: Metrics
+    warnings: list[str]
 
 
 def run_scenario(
@@ -106,6 +108,7 @@ def run_scenario(
         out,
         title=scenario.name,
         description=settings.description,
+        warnings=station.warnings,
         scenario_yaml_text=(out / "scenario.yaml").read_text(encoding="utf-8"),
         metrics=metrics,
         figures=pictures,
@@ -115,7 +118,7 @@ def run_scenario(
         diagram_svg=block_diagram_svg(station.diagram) if figures else None,
     )
     progress(end, "done")
-    return RunOutcome(result.fault, report, metrics)
+    return RunOutcome(result.fault, report, metrics, station.warnings)
 
 
 def _metrics(log: RunLog, settings: PathFollowingScenario) -> Metrics:

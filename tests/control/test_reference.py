@@ -90,9 +90,7 @@ def test_position_is_the_integral_of_the_velocity(tour):
 
     for end in (0.6, 1.7, 2.9, curve.domain[1]):
         pieces = [0.0, *(b for b in curve.breakpoints if 0.0 < b < end), end]
-        travelled = sum(
-            quad(speed, a, b, epsabs=1e-12)[0] for a, b in zip(pieces[:-1], pieces[1:], strict=True)
-        )
+        travelled = sum(quad(speed, a, b, epsabs=1e-12)[0] for a, b in pairwise(pieces))
         assert points[0] + travelled == pytest.approx(curve.derivatives(end, 0)[0, 0], abs=1e-11)
 
 

@@ -23,6 +23,7 @@ class Outcome:
     fault: str | None = None
     report: Path = Path("somewhere/report.html")
     metrics: Metrics = field(default_factory=Metrics)
+    warnings: list[str] = field(default_factory=list)
 
 
 class FakeRun:
@@ -195,3 +196,9 @@ def test_listing_stays_light():
     )
     result = run_process(code=code)
     assert result.returncode == 0, result.stderr
+
+
+def test_a_warning_is_printed_and_does_not_fail_the_run(fake_run, scenario, capsys):
+    fake_run.outcome.warnings = ["the joints resonate too fast"]
+    assert main(["run", str(scenario)]) == 0
+    assert "warning: the joints resonate too fast" in capsys.readouterr().out

@@ -1,0 +1,165 @@
+"""Time of one controller tick, from the plant's state to the drive torques.
+
+Run with ``pytest tests/benchmarks --benchmark-enable``; otherwise every benchmark runs once.
+"""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import MatrixGain
+from scipy.optimize import least_squares
+
+from pfsc_drake.control.decoupling import DecouplingInverse
+from pfsc_drake.control.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.path_law import Fault, PathLaw, SafeState
+from pfsc_drake.control.reference import rest_to_rest
+from pfsc_drake.control.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.geometry import (
+    FourierCurve,
+    Path,
+    interpolate_orientation,
+    quaternion_to_matrix,
+    zyx_to_quaternion,
+)
+from pfsc_drake.robot.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.model_files import resolve_model
+from pfsc_drake.systems.path_following_controller import PathFollowingController
+from pfsc_drake.systems.path_projector import PathProjector
+from pfsc_drake.systems.reference_generator import ReferenceGenerator
+from pfsc_drake.systems.tool_kinematics import ToolKinematics
+
+PERIOD = 1e-3
+THETA = 0.7
+COUNT = 64
+NAMES = ["eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3"]
+CASES = {
+    "6R elastic oriented": ("comau_racer_1_4_elastic", "elastic", True),
+    "3R elastic": ("comau_racer_1_4_elastic_3r", "elastic", False),
+    "6R rigid oriented": ("comau_racer_1_4", "rigid", True),
+}
+
+
+class Chain:
+    """The controller's chain of systems, and the plant's states of successive ticks."""
+
+    def __init__(self, model, law, oriented):
+        plant = MultibodyPlant(0.0)
+        Parser(plant).AddModels(str(resolve_model(model)))
+        plant.Finalize()
+        tool = plant.GetFrameByName("tool_point")
+        self.robot, self.coordinates = chain_from_plant(plant, tool)
+        self.path = make_path(oriented)
+        self.law = make_law(self.robot, law, oriented)
+        self.states = self._states(plant, tool)
+        self._build()
+
+    def _states(self, plant, tool):
+        """States along the path at 1.5 m/s, each a tick after the one before."""
+        context, n = plant.CreateDefaultContext(), self.robot.dimension
+
+        def plant_state(q, v):
+            return self.coordinates.plant_state(np.concatenate([q, v, q, v]))
+
+        def error(q, theta):
+            plant.SetPositionsAndVelocities(context, plant_state(q, np.zeros(n)))
+            X_WT = tool.CalcPoseInWorld(context)
+            y = X_WT.translation() - self.path.position.derivatives(theta, 0)[0] - 0.002
+            if self.path.orientation is None:
+                return y
+            R_d = quaternion_to_matrix(self.path.orientation.derivatives(theta, 0)[0])
+            return np.concatenate([y, (X_WT.rotation().matrix() - R_d).ravel()])
+
+        q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])[:n]
+        speed = np.linalg.norm(self.path.position.derivatives(THETA, 1)[1])
+        motion = []
+        for theta in THETA + 1.5 * PERIOD / speed * np.arange(COUNT):
+            q = least_squares(error, q, args=(theta,)).x
+            motion.append(q)
+        velocities = np.gradient(motion, PERIOD, axis=0)
+        return [plant_state(q, v) for q, v in zip(motion, velocities, strict=True)]
+
+    def _build(self):
+        r, m = self.law.linearization.relative_degree, self.law.linearization.num_outputs
+        builder = DiagramBuilder()
+        rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
+        measured = builder.AddSystem(MatrixGain(rows))
+        kinematics = builder.AddSystem(ToolKinematics(self.robot))
+        projector = builder.AddSystem(PathProjector(self.path, r, PERIOD))
+        controller = builder.AddSystem(PathFollowingController(self.law, PERIOD))
+        motion = rest_to_rest([0.0, 5.0], velocity=1.5, acceleration=5.0)
+        reference = builder.AddSystem(ReferenceGenerator(motion, r, m))
+        builder.ExportInput(measured.get_input_port(), "plant_state")
+        builder.Connect(measured.get_output_port(), kinematics.GetInputPort("joint_state"))
+        builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))
+        builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
+        builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
+        builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))
+        builder.ExportOutput(controller.GetOutputPort("drive"), "drive")
+        self.diagram = builder.Build()
+        self.context = self.diagram.CreateDefaultContext()
+        self.controller = controller
+        projector.set_parameter(projector.GetMyMutableContextFromRoot(self.context), THETA)
+        self._value = self.diagram.get_input_port().FixValue(self.context, self.states[0])
+        self._drive = self.diagram.get_output_port()
+        self._tick = 0
+
+    def tick(self):
+        """Take the next measurement and return the drive torques."""
+        self._tick = (self._tick + 1) % COUNT
+        self.context.SetTime(PERIOD * self._tick)
+        self._value.GetMutableData().get_mutable_value().SetFromVector(self.states[self._tick])
+        return self._drive.Eval(self.context)
+
+
+def make_path(oriented):
+    lemniscate = FourierCurve.bent_lemniscate()
+    if not oriented:
+        return Path(lemniscate)
+    theta = np.linspace(0.0, 2.0 * np.pi, 13)
+    swing = [0.25 * np.sin(2 * theta), -0.25 * np.cos(theta), -0.25 * np.sin(theta)]
+    angles = np.stack(swing, axis=1) + np.array([np.pi, -0.26, 0.0])
+    quaternions = zyx_to_quaternion(angles)
+    return Path(lemniscate, interpolate_orientation(quaternions, theta, smoothness=5, closed=True))
+
+
+def make_law(robot, law, oriented):
+    linearization = linearize_path(robot, law, oriented=oriented, options=ActuationOptions(PERIOD))
+    r, m, n = linearization.relative_degree, linearization.num_outputs, robot.dimension
+    stabilization = Stabilization([gains_from_poles([-50.0] * r)] * m, r, NAMES[:m])
+    inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(n, 30.0))
+    return PathLaw(robot, linearization, stabilization, inverse, np.full(n, 1e6), 0.9, safe)
+
+
+@pytest.fixture(scope="module", params=CASES, name="chain")
+def fixture_chain(request):
+    return Chain(*CASES[request.param])
+
+
+def test_whole_tick(chain, benchmark):
+    benchmark(chain.tick)
+    assert chain.controller.fault(chain.controller.GetMyContextFromRoot(chain.context)) == (
+        Fault.NONE
+    )
+    assert np.all(np.isfinite(chain.tick()))
+    assert not np.array_equal(chain.tick(), chain.tick())
+
+
+def test_projection_and_path_point(chain, benchmark):
+    evaluator = chain.path.evaluator(chain.law.linearization.relative_degree)
+    y_t = (chain.path.position.derivatives(THETA, 0)[0] - 0.002).tolist()
+    point = benchmark(evaluator, y_t, THETA - 0.006)
+    assert point[0] == pytest.approx(THETA, abs=0.05)
+
+
+def test_law(chain, benchmark):
+    linearization = chain.law.linearization
+    r, m = linearization.relative_degree, linearization.num_outputs
+    rows = np.vstack([chain.coordinates.link_rows, chain.coordinates.motor_rows])
+    state = rows @ chain.states[0]
+    point = chain.path.evaluator(r).evaluate_at(THETA)
+    reference, integral = np.zeros((r + 1) * m), np.zeros(m)
+    last_held = np.zeros(linearization.num_joints)
+    result = benchmark(chain.law.evaluate, state, point, reference, integral, last_held)
+    assert np.all(np.isfinite(result))
