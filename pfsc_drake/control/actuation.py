@@ -99,8 +99,8 @@ def singular_perturbation(
 def visco_elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> DrivenMotion:
     """Visco-elastic joints (2.65), (2.66), r = 3, in the form that respects the hold.
 
-    The joint torque must change by ``T_s tau_J'`` over one sampling interval in
-    which the motor acceleration is constant::
+    The motor acceleration is constant over a sampling interval; it is chosen so that the
+    joint torque's rate has reached tau_J' at the interval's end (implicit)::
 
         a_M = (tau_J' - K_s (v_M - v_J) + (K_d + K_s T_s) a_J) / (K_d + K_s T_s)
 

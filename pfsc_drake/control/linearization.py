@@ -124,13 +124,22 @@ def linearize_path(
 def _driven_motion(
     chain: SerialChain, law: str, state: DriveState, options: ActuationOptions
 ) -> DrivenMotion:
+    if law in ("visco_elastic", "elastic") and not 0.0 <= options.sampling_time < np.inf:
+        raise InputError(
+            f"sampling_time: {options.sampling_time}; must be zero or a positive number of seconds"
+        )
     if law == "visco_elastic":
+        if options.sampling_time == 0.0 and not np.all(chain.K_d > 0.0):
+            raise InputError(
+                f"joint damping: {chain.K_d}; the law 'visco_elastic' needs positive values "
+                "when sampling_time is 0"
+            )
         return actuation.visco_elastic(chain, state, options.sampling_time)
     if law == "elastic":
         return actuation.elastic(chain, state, options.sampling_time)
     if law == "singular_perturbation":
         damping = options.boundary_layer_damping
-        if damping is None or np.shape(damping) != (chain.dimension,) or np.min(damping) <= 0:
+        if damping is None or np.shape(damping) != (chain.dimension,) or not np.min(damping) > 0:
             raise InputError(
                 f"boundary_layer_damping: {damping}; the law 'singular_perturbation' needs "
                 f"{chain.dimension} positive values [s]"

@@ -20,7 +20,7 @@ class Fault(enum.IntEnum):
     """Why a law went to its safe state."""
 
     NONE = 0
-    STATE_NOT_FINITE = 1
+    INPUT_NOT_FINITE = 1
     PROJECTION_FAILED = 2
     OUTSIDE_FEASIBLE_NEIGHBOURHOOD = 3
     SINGULAR = 4
@@ -33,7 +33,7 @@ class Fault(enum.IntEnum):
 
 _EXPLANATIONS = {
     Fault.NONE: "no fault",
-    Fault.STATE_NOT_FINITE: "a measured value is not a finite number",
+    Fault.INPUT_NOT_FINITE: "a measured value or a reference is not a finite number",
     Fault.PROJECTION_FAILED: "the projection onto the path did not converge",
     Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: "the tool left the feasible neighbourhood of the path",
     Fault.SINGULAR: "the decoupling matrix is close to singular",
@@ -115,6 +115,18 @@ class PathLaw:
             raise InputError(
                 f"gains of relative degree {stabilization.relative_degree} for a law of "
                 f"relative degree {linearization.relative_degree}"
+            )
+        coordinates = stabilization.proportional.shape[1]
+        if coordinates != linearization.num_outputs:
+            raise InputError(
+                f"gains of {coordinates} coordinates; "
+                f"the law has {linearization.num_outputs} outputs"
+            )
+        damping = np.asarray(safe_state.damping)
+        if damping.shape != (n,) or not np.all((damping >= 0.0) & np.isfinite(damping)):
+            raise InputError(
+                f"safe state damping: {safe_state.damping}; must be {n} finite numbers, "
+                "none negative"
             )
         self.linearization = linearization
         self.stabilization = stabilization
@@ -214,8 +226,9 @@ class PathLaw:
             and math.isfinite(result.sum())
         ):
             return Fault.NONE
-        if not np.isfinite(self._state).all():
-            return Fault.STATE_NOT_FINITE
+        inputs = (self._state, self._reference, self._integral, self._tau_ext)
+        if not all(np.isfinite(values).all() for values in inputs):
+            return Fault.INPUT_NOT_FINITE
         if status == PathStatus.NOT_CONVERGED:
             return Fault.PROJECTION_FAILED
         return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD

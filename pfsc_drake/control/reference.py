@@ -70,7 +70,10 @@ def _move(
     # a ramp of duration T covers velocity T / 2 and peaks at _RAMP_PEAK_SLOPE velocity / T
     peak = min(velocity, float(np.sqrt(abs(distance) * acceleration / _RAMP_PEAK_SLOPE)))
     ramp_time = _RAMP_PEAK_SLOPE * peak / acceleration
-    cruise_time = max(abs(distance) / peak - ramp_time, 0.0)
+    cruise_time = abs(distance) / peak - ramp_time
+    if cruise_time < 1e-9 * ramp_time:
+        # two ramps; rounding must not leave a sliver of a cruise between them
+        peak, cruise_time = abs(distance) / ramp_time, 0.0
     speed = float(np.copysign(peak, distance))
     identity = np.polynomial.Polynomial([0.0, 1.0 / ramp_time])
     rise = (_RAMP(identity) * speed).integ()

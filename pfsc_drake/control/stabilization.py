@@ -41,8 +41,10 @@ def gains_from_poles(poles: Sequence[float | complex]) -> CoordinateGains:
     """Return the gains that place r poles, without integral part.
 
     Raises:
-        InputError: If complex poles do not come in conjugate pairs.
+        InputError: If there are no poles, or complex ones do not come in conjugate pairs.
     """
+    if len(poles) == 0:
+        raise InputError("poles: none given; a law of relative degree r needs r")
     polynomial = np.poly(np.array(poles, dtype=complex))
     if np.max(np.abs(polynomial.imag)) > 1e-9 * np.max(np.abs(polynomial)):
         raise InputError(f"poles {list(poles)}: complex poles must come in conjugate pairs")

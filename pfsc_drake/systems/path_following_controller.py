@@ -1,10 +1,12 @@
 """The path following law as a Drake system."""
 
+import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
     Context,
     DependencyTicket,
     DiscreteValues,
+    EventStatus,
     InputPort,
     LeafSystem,
     OutputPort,
@@ -19,8 +21,9 @@ class PathFollowingController(LeafSystem):
     With ``yhat = (eta, xi_1, xi_2[, phi])`` and relative degree r the closed loop is
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
-    After a fault (:class:`Fault`) the drives hold the links against gravity and
-    brake; only a new initialization leaves that state.
+    The integral is held while a drive is at its limit. After a fault (:class:`Fault`)
+    the drives hold the links against gravity and brake; only a new initialization
+    leaves that state.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -69,6 +72,7 @@ class PathFollowingController(LeafSystem):
         )
         for name in ("drive", "manifold_state", "virtual_input", "status"):
             self._declare_part(name, getattr(self.layout, name), sources)
+        self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
     def _declare_part(self, name: str, part: slice, sources: set[DependencyTicket]) -> None:
@@ -103,6 +107,13 @@ class PathFollowingController(LeafSystem):
             result[self.layout.drive] = self._law.safe_drive(state, memory[self._last_good])
         output.SetFromVector(result)
 
+    def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
+        memory = state.get_mutable_value()
+        memory[:] = 0.0
+        joint_state = self._joint_state.Eval(context)
+        memory[self._last_good] = np.where(np.isfinite(joint_state), joint_state, 0.0)
+        return EventStatus.Succeeded()
+
     def _update(self, context: Context, state: DiscreteValues) -> None:
         result = self._output.Eval(context)
         memory = state.get_mutable_value()
@@ -113,7 +124,8 @@ class PathFollowingController(LeafSystem):
         memory[self._known] = 1.0
         memory[self._held] = result[self.layout.held]
         memory[self._last_good] = self._joint_state.Eval(context)
-        if self._law.stabilization.has_integral_part:
+        saturated = result[self.layout.status.stop - 1]
+        if self._law.stabilization.has_integral_part and not saturated:
             m = self._fault
             y = result[self.layout.manifold_state][:m]
             memory[self._integral] += self.period * (y - self._reference.Eval(context)[:m])

@@ -66,4 +66,6 @@ class PathProjector(LeafSystem):
 
     def _remember(self, context: Context, state: DiscreteValues) -> None:
         theta = self._path_point.Eval(context)[self.layout.theta]
-        state.set_value(theta)
+        # a tool that is nowhere must not make the path's parameter forgotten
+        if np.isfinite(theta[0]):
+            state.set_value(theta)

@@ -224,6 +224,30 @@ def test_elastic_law_averages_over_the_hold(load_robot):
     assert 1.8 < naive[1] / naive[2] < 2.2
 
 
+def test_extrapolation_makes_the_held_law_second_order(load_robot):
+    """Mean of q^(4) over the second of two intervals, the same value wanted in both."""
+    robot = load_robot("comau_racer_1_4_elastic_3r")
+    start = random_state(robot, np.random.default_rng(9))
+    wanted, none = np.array([2e3, -1e3, 3e3]), np.zeros(9)
+    errors = {True: [], False: []}
+    for T_s in (1e-3, 5e-4, 2.5e-4):
+        evaluate = compile_law(robot.chain, actuation.elastic, 3, T_s)
+        for extrapolated, error in errors.items():
+            state, last_held = start, None
+            for _ in range(2):
+                q, gain, drift, offset = evaluate(state, none)
+                held = gain @ wanted + drift
+                lead = 0.5 * (held - last_held) if extrapolated and last_held is not None else 0.0
+                drive, last_held = held + lead + offset, held
+                state = simulate(robot, state, drive, lambda t: np.zeros(3), T_s).y[:, -1]
+            jerk_after = evaluate(state, none)[0][3]
+            error.append(np.abs((jerk_after - q[3]) / T_s - wanted).max())
+    ratios = {key: np.divide(error[:-1], error[1:]) for key, error in errors.items()}
+    # four or more at every halving, where without it is two
+    assert np.all(ratios[True] > 3.5)
+    assert np.all(np.abs(ratios[False] - 2.0) < 0.4)
+
+
 @pytest.mark.parametrize(
     ("law", "arguments"),
     [

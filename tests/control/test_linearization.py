@@ -126,9 +126,27 @@ def test_six_joints_for_three_outputs_are_refused(load_robot):
         linearize_path(load_robot("comau_racer_1_4").chain, "rigid", oriented=False)
 
 
-@pytest.mark.parametrize("damping", [None, np.ones(2), np.array([0.1, 0.0, 0.1])])
+@pytest.mark.parametrize(
+    "damping", [None, np.ones(2), np.array([0.1, 0.0, 0.1]), np.array([0.1, np.nan, 0.1])]
+)
 def test_boundary_layer_damping_is_checked(damping, load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r").chain
     options = ActuationOptions(boundary_layer_damping=damping)
     with pytest.raises(InputError, match=r"boundary_layer_damping.*3 positive values"):
         linearize_path(chain, "singular_perturbation", oriented=False, options=options)
+
+
+@pytest.mark.parametrize("law", ["elastic", "visco_elastic"])
+@pytest.mark.parametrize("sampling_time", [-1e-3, np.nan, np.inf])
+def test_sampling_time_is_checked(law, sampling_time, load_robot):
+    chain = load_robot("comau_racer_1_4_elastic_3r", (10.0,) * 3).chain
+    with pytest.raises(InputError, match="sampling_time"):
+        linearize_path(chain, law, oriented=False, options=ActuationOptions(sampling_time))
+
+
+def test_a_continuous_visco_elastic_law_needs_damping(load_robot):
+    """(3.58) divides by K_d; with a hold it does not."""
+    chain = load_robot("comau_racer_1_4_elastic_3r").chain
+    linearize_path(chain, "visco_elastic", oriented=False, options=ActuationOptions(1e-3))
+    with pytest.raises(InputError, match="damping"):
+        linearize_path(chain, "visco_elastic", oriented=False, options=ActuationOptions(0.0))

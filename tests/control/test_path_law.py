@@ -71,7 +71,7 @@ def test_good_input_has_no_fault(tick):
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_state_that_is_not_finite_is_a_fault(tick, bad):
     for index in range(6):
-        assert tick.fault(**tick.changed("state", index, bad)) == Fault.STATE_NOT_FINITE
+        assert tick.fault(**tick.changed("state", index, bad)) == Fault.INPUT_NOT_FINITE
 
 
 def test_motor_state_that_is_not_finite_is_a_fault_where_it_is_used(load_robot, make_law, q, tick):
@@ -82,7 +82,7 @@ def test_motor_state_that_is_not_finite_is_a_fault_where_it_is_used(load_robot, 
     for index in range(6, 12):
         state = tick.changed("state", index, np.nan)["state"]
         result = law.evaluate(state, point, np.zeros(15), np.zeros(3))
-        assert result[law.layout.status][0] == Fault.STATE_NOT_FINITE
+        assert result[law.layout.status][0] == Fault.INPUT_NOT_FINITE
 
 
 @pytest.mark.parametrize("name", ["reference", "integral", "point"])
@@ -104,7 +104,7 @@ def test_the_projections_faults(tick):
         assert tick.fault(**tick.changed("point", layout.alpha.start, alpha)) == fault
     # a projection of a tool that is nowhere: the state is the root cause
     nowhere = not_converged | tick.changed("state", 0, np.nan)
-    assert tick.fault(**nowhere) == Fault.STATE_NOT_FINITE
+    assert tick.fault(**nowhere) == Fault.INPUT_NOT_FINITE
 
 
 def test_a_stretched_arm_is_singular(rigid_3r, position_path, make_law, tick):

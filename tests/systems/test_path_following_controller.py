@@ -8,7 +8,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
 
-from pfsc_drake.control.path_law import Fault
+from pfsc_drake.control.decoupling import DecouplingInverse
+from pfsc_drake.control.linearization import linearize_path
+from pfsc_drake.control.path_law import Fault, PathLaw, SafeState
+from pfsc_drake.control.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.robot.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.model_files import resolve_model
 from pfsc_drake.systems.path_following_controller import PathFollowingController
@@ -96,12 +99,12 @@ def test_a_fault_shows_at_once_and_holds(bench, arm):
     bench.start()
     bench.tick(2)
     bench.fix(state=bench.with_nan())
-    assert bench.system.fault(bench.context) == Fault.STATE_NOT_FINITE
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
     bench.tick()
     bench.fix()
-    assert bench.system.fault(bench.context) == Fault.STATE_NOT_FINITE
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
     bench.tick(3)
-    assert bench.output("status")[0] == Fault.STATE_NOT_FINITE
+    assert bench.output("status")[0] == Fault.INPUT_NOT_FINITE
     # the measurement is back: the links are held where they are, and braked
     weight = arm.weight(bench.state[:3])
     expected = weight - 30.0 * bench.state[9:]
@@ -145,6 +148,35 @@ def test_a_new_context_knows_no_fault(bench):
     bench.context = other
     bench.fix()
     assert bench.system.fault(other) == Fault.NONE
+
+
+def test_the_last_ticks_drive_is_extrapolated(path):
+    """The first tick of the elastic law has nothing to extrapolate, the next ones have."""
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_elastic_3r")))
+    plant.Finalize()
+    chain, _ = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
+    linearization = linearize_path(chain, "elastic", oriented=False)
+    gains = Stabilization([gains_from_poles([-20.0] * 4)] * 3, 4, ["eta", "xi_1", "xi_2"])
+    inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(3, 30.0))
+    law = PathLaw(chain, linearization, gains, inverse, np.full(3, 1e9), 0.9, safe)
+    system = PathFollowingController(law, PERIOD)
+    context = system.CreateDefaultContext()
+    q = np.array([0.2, 1.4, -0.4])
+    states = [np.concatenate([q, [v, -v, v], q + 1e-3, np.zeros(3)]) for v in (0.1, 0.15)]
+    point, reference = path.evaluator(4).evaluate_at(THETA), np.zeros(15)
+    system.GetInputPort("path_point").FixValue(context, point)
+    system.GetInputPort("reference").FixValue(context, reference)
+    simulator = Simulator(system, context)
+    last_held = None
+    for i, state in enumerate(states):
+        system.GetInputPort("joint_state").FixValue(context, state)
+        expected = law.evaluate(state, point, reference, np.zeros(3), last_held)
+        assert expected[law.layout.status][0] == Fault.NONE
+        assert np.array_equal(system.GetOutputPort("law").Eval(context), expected)
+        simulator.AdvanceTo((i + 1) * PERIOD)
+        last_held = expected[law.layout.held]
+    assert np.abs(law.evaluate(state, point, reference, np.zeros(3)) - expected).max() > 1.0
 
 
 def test_every_output_depends_on_every_input_at_once(bench):
