@@ -119,6 +119,11 @@ def make_law(parameters: ControllerParameters, chain: SerialChain, oriented: boo
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
     """
     law = parameters.law
+    if law == "velocity_servo":
+        raise InputError(
+            "controller.law: 'velocity_servo' gives joint velocities; "
+            "the robot's drives take torques, and no servo is between them"
+        )
     damping = parameters.boundary_layer_damping
     linearization = linearize_path(
         chain,

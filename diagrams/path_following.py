@@ -122,6 +122,11 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     builder = DiagramBuilder()
     plant = add_robot(builder, scenario.robot, folder)
     chain, coordinates = chain_from_plant(plant, tool_frame(plant, scenario.robot))
+    undriven = [n for n, a in zip(chain.names, coordinates.actuators, strict=True) if a < 0]
+    if undriven:
+        raise InputError(
+            f"robot.model: {', '.join(undriven)} without actuator; every joint needs one"
+        )
     period, law_name = scenario.controller.sampling_time, scenario.controller.law
     path = make_path(scenario.path, law_name, folder)
     law = make_law(scenario.controller, chain, path.orientation is not None)
@@ -245,8 +250,6 @@ def _warnings(
 
 def _drive_order(plant: MultibodyPlant, coordinates: PlantCoordinates) -> np.ndarray:
     """Return the matrix from the chain's drives to the plant's actuation."""
-    if np.any(coordinates.actuators < 0):
-        raise InputError("robot.model: a joint of the tool's chain has no actuator")
     order = np.zeros((plant.num_actuators(), len(coordinates.actuators)))
     order[coordinates.actuators, np.arange(len(coordinates.actuators))] = 1.0
     return order

@@ -4,17 +4,42 @@ Lengths in m, angles in rad unless a name ends in ``_deg``, times in s.
 """
 
 import dataclasses as dc
-from typing import Union
 
 import numpy as np
+from pydrake.systems.analysis import GetIntegrationSchemes
 
+from diagrams.checks import require, require_not_negative, require_numbers, require_positive
+from diagrams.scenario_controller import ControllerParameters, GainParameters, LawGains
+from diagrams.scenario_path import (
+    BentLemniscate,
+    Circle,
+    Keyframe,
+    Line,
+    OrientationParameters,
+    PathParameters,
+    Waypoints,
+)
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
-from pfsc_drake.errors import InputError
 
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}; allowed: {allowed}")
+__all__ = [
+    "BentLemniscate",
+    "Circle",
+    "ControllerParameters",
+    "GainParameters",
+    "Keyframe",
+    "LawGains",
+    "Line",
+    "OrientationParameters",
+    "PathFollowingScenario",
+    "PathParameters",
+    "ReferenceParameters",
+    "RobotParameters",
+    "SensorFailureParameters",
+    "SimulationParameters",
+    "StartParameters",
+    "Target",
+    "Waypoints",
+]
 
 
 @dc.dataclass
@@ -28,190 +53,6 @@ class RobotParameters:
 
     model: str = "comau_racer_1_4"
     tool_frame: str = "tool_point"
-
-
-@dc.dataclass
-class Line:
-    """A straight path.
-
-    Attributes:
-        start: First point [m].
-        end: Last point [m].
-    """
-
-    start: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
-    end: list[float] = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
-
-
-@dc.dataclass
-class Circle:
-    """A circular path ``center + radius (u cos theta + v sin theta)``.
-
-    Attributes:
-        center: Center [m].
-        radius: Radius [m].
-        axis_u: Direction of ``u``.
-        axis_v: Direction of ``v``.
-    """
-
-    center: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
-    radius: float = 0.15
-    axis_u: list[float] = dc.field(default_factory=lambda: [0.0, 1.0, 0.0])
-    axis_v: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-
-
-@dc.dataclass
-class BentLemniscate:
-    """The vertically bent lemniscate (3.87)."""
-
-
-@dc.dataclass
-class Waypoints:
-    """A spline through the waypoints of a CSV file, orientation included if it has one.
-
-    Attributes:
-        file: CSV file, relative to the scenario's folder.
-        closed: Whether the path is closed.
-        parametrization: ``chord`` or ``centripetal``.
-        smoothness: Class C^k of the spline; 0 chooses what the law needs.
-    """
-
-    file: str = ""
-    closed: bool = False
-    parametrization: str = "chord"
-    smoothness: int = 0
-
-    def __post_init__(self) -> None:
-        allowed = ("chord", "centripetal")
-        _require(
-            self.parametrization in allowed,
-            "parametrization",
-            self.parametrization,
-            ", ".join(allowed),
-        )
-        _require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
-
-
-PathShape = Union[BentLemniscate, Circle, Line, Waypoints]  # noqa: UP007 (Drake's YAML needs it)
-
-
-@dc.dataclass
-class Keyframe:
-    """Orientation of the tool at one point of the path.
-
-    Attributes:
-        theta: Path parameter, as a fraction of the path's domain (0..1).
-        angles_deg: Euler angles [deg], in the order of the convention's name.
-    """
-
-    theta: float = 0.0
-    angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
-
-
-@dc.dataclass
-class OrientationParameters:
-    """Orientation along the path.
-
-    Attributes:
-        convention: ``zyx`` (2.7) or ``zyz`` (2.6).
-        keyframes: Orientations to interpolate; one alone is kept everywhere; on a
-            closed path the first is repeated at the end.
-    """
-
-    convention: str = "zyx"
-    keyframes: list[Keyframe] = dc.field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        _require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
-        for i, keyframe in enumerate(self.keyframes):
-            angles = keyframe.angles_deg
-            _require(len(angles) == 3, f"keyframes[{i}].angles_deg", angles, "3 angles")
-
-
-@dc.dataclass
-class PathParameters:
-    """The path.
-
-    Attributes:
-        shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``.
-        orientation: Orientation; without keyframes the waypoint file's, or none.
-    """
-
-    shape: PathShape = dc.field(default_factory=BentLemniscate)
-    orientation: OrientationParameters = dc.field(default_factory=OrientationParameters)
-
-
-@dc.dataclass
-class GainParameters:
-    """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
-
-    Attributes:
-        poles: Real poles [1/s], r of them.
-        coefficients: ``a_1 .. a_r``, alternatively.
-        integral: ``a_0``; needs coefficients.
-    """
-
-    poles: list[float] = dc.field(default_factory=list)
-    coefficients: list[float] = dc.field(default_factory=list)
-    integral: float = 0.0
-
-    def __post_init__(self) -> None:
-        _require(
-            not (self.poles and (self.coefficients or self.integral)),
-            "poles",
-            self.poles,
-            "either poles, or coefficients with or without integral",
-        )
-
-
-@dc.dataclass
-class LawGains:
-    """Gains of all coordinates for one law.
-
-    Attributes:
-        eta: Tangential.
-        xi: Both transversal.
-        phi: Rotational; unused by arms that only position.
-    """
-
-    eta: GainParameters = dc.field(default_factory=GainParameters)
-    xi: GainParameters = dc.field(default_factory=GainParameters)
-    phi: GainParameters = dc.field(default_factory=GainParameters)
-
-
-@dc.dataclass
-class ControllerParameters:
-    """The path following controller.
-
-    Attributes:
-        law: Actuation model that the law is made for.
-        gains: Gains by law.
-        sampling_time: Sampling time ``T_s`` [s].
-        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], for ``singular_perturbation``.
-        min_rcond: Smallest reciprocal condition number of the decoupling matrix.
-        max_alpha: End of the feasible neighbourhood for the controller, below 1.
-        brake_damping: Damping of the safe state on every drive, as a fraction of its
-            effort limit per rad/s.
-        effort_scale: Fraction of the model's effort limits that the law may use.
-    """
-
-    law: str = "elastic"
-    gains: dict[str, LawGains] = dc.field(default_factory=dict)
-    sampling_time: float = 1e-3
-    boundary_layer_damping: list[float] = dc.field(default_factory=list)
-    min_rcond: float = 1e-3
-    max_alpha: float = 0.95
-    brake_damping: float = 0.1
-    effort_scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        _require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
-        for law in self.gains:
-            _require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
-        for key in ("sampling_time", "effort_scale"):
-            value = getattr(self, key)
-            _require(np.isfinite(value) and value > 0.0, key, value, "a positive number")
-        _require(self.brake_damping >= 0.0, "brake_damping", self.brake_damping, "zero or more")
 
 
 @dc.dataclass
@@ -230,6 +71,13 @@ class ReferenceParameters:
     acceleration: float = 1.0
     dwell: float = 0.3
 
+    def __post_init__(self) -> None:
+        enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
+        require(enough, "points", self.points, "two or more finite numbers")
+        require_positive("velocity", self.velocity)
+        require_positive("acceleration", self.acceleration)
+        require_not_negative("dwell", self.dwell)
+
 
 @dc.dataclass
 class StartParameters:
@@ -247,8 +95,8 @@ class StartParameters:
     posture_deg: list[float] = dc.field(default_factory=list)
 
     def __post_init__(self) -> None:
-        _require(len(self.offset) == 2, "offset", self.offset, "2 numbers, xi_1 and xi_2")
-        _require(len(self.rotation_deg) == 3, "rotation_deg", self.rotation_deg, "3 angles")
+        require_numbers("offset", self.offset, 2)
+        require_numbers("rotation_deg", self.rotation_deg, 3)
 
 
 @dc.dataclass
@@ -281,6 +129,21 @@ class SimulationParameters:
     accuracy: float = 0.0
     frame_period: float = 0.032
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
+
+    def __post_init__(self) -> None:
+        schemes = GetIntegrationSchemes()
+        require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
+        require_positive("max_step", self.max_step)
+        require_positive("frame_period", self.frame_period)
+        require_not_negative("accuracy", self.accuracy)
+        # their error control works on stale values after a rejected step
+        stale = ("runge_kutta5", "bogacki_shampine3")
+        require(
+            self.accuracy == 0.0 or self.integrator not in stale,
+            "accuracy",
+            self.accuracy,
+            f"0 (fixed steps) with {' and '.join(stale)}; runge_kutta3 has error control",
+        )
 
 
 @dc.dataclass
@@ -327,3 +190,9 @@ class PathFollowingScenario:
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_not_negative("duration", self.duration)
+        require_positive("settling_tolerance", self.settling_tolerance)
+        for law in self.targets:
+            require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))

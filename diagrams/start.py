@@ -7,7 +7,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.inverse_kinematics import solve_pose
-from pfsc_drake.robot.newton_euler import gravity_function
+from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial_chain import SerialChain
 
 

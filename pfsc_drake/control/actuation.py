@@ -13,8 +13,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.newton_euler import inverse_dynamics, mass_matrix
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 
 
 @dataclass(frozen=True)
@@ -55,48 +54,48 @@ class DrivenMotion:
     offset: ca.SX
 
 
-def velocity_servo(chain: SerialChain, state: DriveState) -> DrivenMotion:
+def velocity_servo(robot: RobotModel, state: DriveState) -> DrivenMotion:
     """Joint velocity servos (3.48), r = 1: the input is ``q'``."""
-    n = chain.dimension
+    n = robot.dimension
     return DrivenMotion([state.q_J], ca.SX.eye(n), ca.SX(n, 1), ca.SX(n, 1))
 
 
-def rigid(chain: SerialChain, state: DriveState) -> DrivenMotion:
+def rigid(robot: RobotModel, state: DriveState) -> DrivenMotion:
     """Rigid joints (2.42), r = 2: the inverse dynamics of (3.29).
 
     On a robot with elastic joints the law acts on the motor coordinates, because
     with link coordinates the loop is unstable (Sec. 3.8.3).
     """
-    q, v = (state.q_M, state.v_M) if chain.is_elastic else (state.q_J, state.v_J)
-    D_E = mass_matrix(chain, q)
-    n_E = _link_torque(chain, [q, v, ca.SX(chain.dimension, 1)], 0)
-    return DrivenMotion([q, v], D_E + ca.diag(chain.D_M), ca.SX(*n_E.shape), n_E - state.tau_ext[0])
+    q, v = (state.q_M, state.v_M) if robot.is_elastic else (state.q_J, state.v_J)
+    D_E = robot.mass_matrix(q)
+    n_E = _link_torque(robot, [q, v, ca.SX(robot.dimension, 1)], 0)
+    return DrivenMotion([q, v], D_E + ca.diag(robot.D_M), ca.SX(*n_E.shape), n_E - state.tau_ext[0])
 
 
 def singular_perturbation(
-    chain: SerialChain, state: DriveState, boundary_layer_damping: np.ndarray
+    robot: RobotModel, state: DriveState, boundary_layer_damping: np.ndarray
 ) -> DrivenMotion:
     """Composite law for stiff elastic joints, r = 2: slow (3.70) plus fast (3.71).
 
     Args:
-        chain: The robot.
+        robot: The robot.
         state: Its state.
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,).
     """
-    _require_elastic(chain, "singular_perturbation")
-    D_E = mass_matrix(chain, state.q_J)
-    n_E = _link_torque(chain, [state.q_J, state.v_J, ca.SX(chain.dimension, 1)], 0)
-    tau_J_rate = chain.K_s * (state.v_M - state.v_J)
+    _require_elastic(robot, "singular_perturbation")
+    D_E = robot.mass_matrix(state.q_J)
+    n_E = _link_torque(robot, [state.q_J, state.v_J, ca.SX(robot.dimension, 1)], 0)
+    tau_J_rate = robot.K_s * (state.v_M - state.v_J)
     fast = -ca.DM(boundary_layer_damping) * tau_J_rate
     return DrivenMotion(
         [state.q_J, state.v_J],
-        D_E + ca.diag(chain.D_M),
+        D_E + ca.diag(robot.D_M),
         ca.SX(*n_E.shape),
         n_E - state.tau_ext[0] + fast,
     )
 
 
-def visco_elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> DrivenMotion:
+def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> DrivenMotion:
     """Visco-elastic joints (2.65), (2.66), r = 3, in the form that respects the hold.
 
     The motor acceleration is constant over a sampling interval; it is chosen so that the
@@ -108,17 +107,17 @@ def visco_elastic(chain: SerialChain, state: DriveState, sampling_time: float) -
     K_s / K_d, often too fast for a sampled controller.
 
     Args:
-        chain: The robot.
+        robot: The robot.
         state: Its state.
         sampling_time: Sampling time ``T_s`` of the controller [s].
     """
-    _require_elastic(chain, "visco_elastic")
-    K_s, K_d, D_M = ca.DM(chain.K_s), ca.DM(chain.K_d), ca.DM(chain.D_M)
+    _require_elastic(robot, "visco_elastic")
+    K_s, K_d, D_M = ca.DM(robot.K_s), ca.DM(robot.K_d), ca.DM(robot.D_M)
     tau_J = K_s * (state.q_M - state.q_J) + K_d * (state.v_M - state.v_J)
-    D_E = mass_matrix(chain, state.q_J)
-    a_J = _link_acceleration(chain, state, D_E, tau_J)
+    D_E = robot.mass_matrix(state.q_J)
+    a_J = _link_acceleration(robot, state, D_E, tau_J)
     # tau_J' = D_E q''' + known
-    known = _link_torque(chain, [state.q_J, state.v_J, a_J, ca.SX(*a_J.shape)], 1)
+    known = _link_torque(robot, [state.q_J, state.v_J, a_J, ca.SX(*a_J.shape)], 1)
     known = known - state.tau_ext[1]
     K = K_d + K_s * sampling_time
     drift = D_M / K * (known - K_s * (state.v_M - state.v_J))
@@ -127,7 +126,7 @@ def visco_elastic(chain: SerialChain, state: DriveState, sampling_time: float) -
     )
 
 
-def elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> DrivenMotion:
+def elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> DrivenMotion:
     """Purely elastic joints (2.65), (2.67), r = 4: the exact law (3.65) for any number of axes.
 
     ``a_M = a_J + K_s^-1 tau_J''``, ``tau_d = D_M a_M + tau_J``. While the torque is held,
@@ -137,21 +136,21 @@ def elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> Driv
     that the controller extrapolates it from its last two values.
 
     Args:
-        chain: The robot.
+        robot: The robot.
         state: Its state.
         sampling_time: Sampling time ``T_s`` of the controller [s]; 0 gives (3.65) as printed.
     """
-    _require_elastic(chain, "elastic")
-    K_s, D_M = ca.DM(chain.K_s), ca.DM(chain.D_M)
+    _require_elastic(robot, "elastic")
+    K_s, D_M = ca.DM(robot.K_s), ca.DM(robot.D_M)
     tau_J = K_s * (state.q_M - state.q_J)
     tau_J_rate = K_s * (state.v_M - state.v_J)
-    D_E = mass_matrix(chain, state.q_J)
-    a_J = _link_acceleration(chain, state, D_E, tau_J)
+    D_E = robot.mass_matrix(state.q_J)
+    a_J = _link_acceleration(robot, state, D_E, tau_J)
     unknown = ca.SX(*a_J.shape)
-    residual = _link_torque(chain, [state.q_J, state.v_J, a_J, unknown], 1) - state.tau_ext[1]
+    residual = _link_torque(robot, [state.q_J, state.v_J, a_J, unknown], 1) - state.tau_ext[1]
     jerk = ca.ldl_solve(tau_J_rate - residual, *ca.ldl(D_E))
     # the joint torque's second derivative is D_E q^(4) + known
-    known = _link_torque(chain, [state.q_J, state.v_J, a_J, jerk, unknown], 2)
+    known = _link_torque(robot, [state.q_J, state.v_J, a_J, jerk, unknown], 2)
     known = known - state.tau_ext[2]
     first, second = sampling_time / 2, sampling_time**2 / 6
     return DrivenMotion(
@@ -162,16 +161,16 @@ def elastic(chain: SerialChain, state: DriveState, sampling_time: float) -> Driv
     )
 
 
-def _link_acceleration(chain: SerialChain, state: DriveState, D_E: ca.SX, tau_J: ca.SX) -> ca.SX:
+def _link_acceleration(robot: RobotModel, state: DriveState, D_E: ca.SX, tau_J: ca.SX) -> ca.SX:
     """Solve (2.65a) for ``q_J''``."""
-    n_E = _link_torque(chain, [state.q_J, state.v_J, ca.SX(chain.dimension, 1)], 0)
+    n_E = _link_torque(robot, [state.q_J, state.v_J, ca.SX(robot.dimension, 1)], 0)
     return ca.ldl_solve(tau_J + state.tau_ext[0] - n_E, *ca.ldl(D_E))
 
 
-def _link_torque(chain: SerialChain, derivatives: Sequence[ca.SX], order: int) -> ca.SX:
+def _link_torque(robot: RobotModel, derivatives: Sequence[ca.SX], order: int) -> ca.SX:
     """Return the time derivative of some order of the link-side inverse dynamics."""
     q = joint_jets(derivatives)
-    return ca.vertcat(*[tau.derivative(order) for tau in inverse_dynamics(chain, q)])
+    return ca.vertcat(*[tau.derivative(order) for tau in robot.inverse_dynamics(q)])
 
 
 def joint_jets(derivatives: Sequence[ca.SX]) -> list[Jet]:
@@ -181,9 +180,9 @@ def joint_jets(derivatives: Sequence[ca.SX]) -> list[Jet]:
     ]
 
 
-def _require_elastic(chain: SerialChain, law: str) -> None:
-    if not chain.is_elastic:
-        stiff = [link.name for link in chain.links if not np.isfinite(link.stiffness)]
+def _require_elastic(robot: RobotModel, law: str) -> None:
+    if not robot.is_elastic:
+        stiff = [name for name, k in zip(robot.names, robot.K_s, strict=True) if not np.isfinite(k)]
         raise InputError(
             f"law '{law}': needs a robot with elastic joints; rigid are {', '.join(stiff)}"
         )

@@ -11,8 +11,7 @@ from pfsc_drake.control.path_coordinates import PathGeometry, path_coordinates
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.newton_euler import link_motions, tool_pose
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 
 RELATIVE_DEGREE = {
     "velocity_servo": 1,
@@ -68,7 +67,7 @@ class Linearization:
 
 
 def linearize_path(
-    chain: SerialChain,
+    robot: RobotModel,
     law: str,
     *,
     oriented: bool,
@@ -77,7 +76,7 @@ def linearize_path(
     """Derive the path following law of a robot, see (3.28), (3.50), (3.57), (3.64).
 
     Args:
-        chain: The robot.
+        robot: The robot.
         law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
         oriented: Whether the tool's orientation follows the path too.
         options: What the actuation model needs besides.
@@ -87,7 +86,7 @@ def linearize_path(
     """
     if law not in RELATIVE_DEGREE:
         raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
-    r, n, m = RELATIVE_DEGREE[law], chain.dimension, 6 if oriented else 3
+    r, n, m = RELATIVE_DEGREE[law], robot.dimension, 6 if oriented else 3
     if n != m:
         raise InputError(
             f"law '{law}': {n} joints for {m} outputs "
@@ -101,15 +100,15 @@ def linearize_path(
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
     measured = DriveState(q_J, v_J, q_M, v_M, external)
     options = options or ActuationOptions()
-    motion = _driven_motion(chain, law, measured, options)
+    motion = _driven_motion(robot, law, measured, options)
     path = _path_geometry(layout, point)
 
     q = joint_jets([*motion.q, ca.SX(n, 1)])
-    output = _virtual_output(chain, q, path)
+    output = _virtual_output(robot, q, path)
     Y = ca.horzcat(*[ca.vertcat(*[y.derivative(k) for y in output]) for k in range(r)])
     b = ca.vertcat(*[y.derivative(r) for y in output])
     drives = [motion.gain, motion.drift, motion.offset]
-    results = [Y, _decoupling_matrix(chain, motion, path), b, *drives]
+    results = [Y, _decoupling_matrix(robot, motion, path), b, *drives]
     function = ca.Function(
         f"path_{law}",
         [state, tau_ext, point],
@@ -122,34 +121,34 @@ def linearize_path(
 
 
 def _driven_motion(
-    chain: SerialChain, law: str, state: DriveState, options: ActuationOptions
+    robot: RobotModel, law: str, state: DriveState, options: ActuationOptions
 ) -> DrivenMotion:
     if law in ("visco_elastic", "elastic") and not 0.0 <= options.sampling_time < np.inf:
         raise InputError(
             f"sampling_time: {options.sampling_time}; must be zero or a positive number of seconds"
         )
     if law == "visco_elastic":
-        if options.sampling_time == 0.0 and not np.all(chain.K_d > 0.0):
+        if options.sampling_time == 0.0 and not np.all(robot.K_d > 0.0):
             raise InputError(
-                f"joint damping: {chain.K_d}; the law 'visco_elastic' needs positive values "
+                f"joint damping: {robot.K_d}; the law 'visco_elastic' needs positive values "
                 "when sampling_time is 0"
             )
-        return actuation.visco_elastic(chain, state, options.sampling_time)
+        return actuation.visco_elastic(robot, state, options.sampling_time)
     if law == "elastic":
-        return actuation.elastic(chain, state, options.sampling_time)
+        return actuation.elastic(robot, state, options.sampling_time)
     if law == "singular_perturbation":
         damping = options.boundary_layer_damping
-        if damping is None or np.shape(damping) != (chain.dimension,) or not np.min(damping) > 0:
+        if damping is None or np.shape(damping) != (robot.dimension,) or not np.min(damping) > 0:
             raise InputError(
                 f"boundary_layer_damping: {damping}; the law 'singular_perturbation' needs "
-                f"{chain.dimension} positive values [s]"
+                f"{robot.dimension} positive values [s]"
             )
-        return actuation.singular_perturbation(chain, state, damping)
+        return actuation.singular_perturbation(robot, state, damping)
     models = {
         "velocity_servo": actuation.velocity_servo,
         "rigid": actuation.rigid,
     }
-    return models[law](chain, state)
+    return models[law](robot, state)
 
 
 def _path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
@@ -162,12 +161,12 @@ def _path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
     )
 
 
-def _virtual_output(chain: SerialChain, q: list[Jet], path: PathGeometry) -> list[Jet]:
-    return path_coordinates(*tool_pose(chain, link_motions(chain, q)), path)
+def _virtual_output(robot: RobotModel, q: list[Jet], path: PathGeometry) -> list[Jet]:
+    return path_coordinates(*robot.tool_pose(q), path)
 
 
-def _decoupling_matrix(chain: SerialChain, motion: DrivenMotion, path: PathGeometry) -> ca.SX:
+def _decoupling_matrix(robot: RobotModel, motion: DrivenMotion, path: PathGeometry) -> ca.SX:
     """Return ``A = d yhat / dq`` (3.22): the virtual output's rate is ``A q'``."""
-    rate = ca.SX.sym("rate", chain.dimension)
-    output = _virtual_output(chain, joint_jets([motion.q[0], rate]), path)
+    rate = ca.SX.sym("rate", robot.dimension)
+    output = _virtual_output(robot, joint_jets([motion.q[0], rate]), path)
     return ca.jacobian(ca.vertcat(*[y.coefficients[1] for y in output]), rate)

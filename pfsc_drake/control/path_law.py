@@ -12,8 +12,7 @@ from pfsc_drake.control.linearization import Linearization
 from pfsc_drake.control.stabilization import Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathStatus
-from pfsc_drake.robot.newton_euler import gravity_function
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 
 
 class Fault(enum.IntEnum):
@@ -81,7 +80,7 @@ class PathLaw:
     of the controlled system.
 
     Args:
-        chain: The robot.
+        robot: The robot.
         linearization: The compiled relation between drives and virtual output.
         stabilization: Gains of the virtual output's error dynamics.
         inverse: Inverts the decoupling matrix.
@@ -98,7 +97,7 @@ class PathLaw:
 
     def __init__(
         self,
-        chain: SerialChain,
+        robot: RobotModel,
         linearization: Linearization,
         stabilization: Stabilization,
         inverse: DecouplingInverse,
@@ -134,7 +133,7 @@ class PathLaw:
         self._inverse = inverse
         self._max_alpha = max_alpha
         self._safe_state = safe_state
-        self._gravity = gravity_function(chain)
+        self._gravity = gravity_function(robot)
         self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
         self.function = _law_function(linearization, stabilization)
         self._completion = _completion_function(linearization, self.limits)

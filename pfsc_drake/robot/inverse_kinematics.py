@@ -1,28 +1,17 @@
-"""Inverse kinematics of any serial chain, for start poses."""
+"""Inverse kinematics of any robot, for start poses."""
 
-import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from pfsc_drake import jets
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.newton_euler import link_motions, tool_pose
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 _TOLERANCE = 1e-9
 _RESTARTS = 30
 
 
-def pose_function(chain: SerialChain) -> ca.Function:
-    """Return the direct kinematics ``q -> [y_t, R_e by rows]``, shapes (N,) and (12,)."""
-    q = ca.SX.sym("q", chain.dimension)
-    still = [jets.constant(q[i], 1) for i in range(chain.dimension)]
-    y, R = (jet.coefficients[0] for jet in tool_pose(chain, link_motions(chain, still)))
-    return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))], ["q"], ["pose"])
-
-
 def solve_pose(
-    chain: SerialChain, y_t: np.ndarray, R_e: np.ndarray | None, guess: np.ndarray, name: str
+    robot: RobotModel, y_t: np.ndarray, R_e: np.ndarray | None, guess: np.ndarray, name: str
 ) -> np.ndarray:
     """Return joint coordinates within their limits that put the tool at a pose.
 
@@ -30,7 +19,7 @@ def solve_pose(
     starts are tried only if that one fails.
 
     Args:
-        chain: The robot.
+        robot: The robot.
         y_t: Tool point in the world [m], shape (3,).
         R_e: Tool orientation, shape (3, 3), or None if any will do.
         guess: Joint coordinates near the solution, shape (N,).
@@ -39,11 +28,11 @@ def solve_pose(
     Raises:
         InputError: If the pose is out of reach within the joint limits.
     """
-    pose = pose_function(chain)
+    pose = pose_function(robot)
     jacobian = pose.factory("jacobian", ["q"], ["jac:pose:q"])
     target = np.concatenate([y_t, np.zeros(9) if R_e is None else np.ravel(R_e)])
     used = slice(0, 3 if R_e is None else 12)
-    lower, upper = chain.gather("position_limits").T
+    lower, upper = robot.gather("position_limits").T
 
     def residual(q: np.ndarray) -> np.ndarray:
         return np.array(pose(q)).ravel()[used] - target[used]

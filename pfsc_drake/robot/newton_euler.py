@@ -7,13 +7,16 @@ accelerations of their own, and their derivatives of any order come along.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.serial_chain import ChainLink, SerialChain
+
+if TYPE_CHECKING:
+    from pfsc_drake.robot.serial_chain import ChainLink, SerialChain
 
 
 def _symbolic(array: np.ndarray | float) -> ca.SX:
@@ -38,7 +41,7 @@ class LinkMotion:
     v: Jet
 
 
-def _joint_pose(link: ChainLink, q: Jet) -> tuple[Jet, Jet]:
+def _joint_pose(link: "ChainLink", q: Jet) -> tuple[Jet, Jet]:
     """Pose of the link in the previous link's frame."""
     R_PF, p_PF = _symbolic(link.R_PF), _symbolic(link.p_PF)
     axis = _symbolic(link.axis)
@@ -50,7 +53,7 @@ def _joint_pose(link: ChainLink, q: Jet) -> tuple[Jet, Jet]:
     return jets.constant(R_PF, q.order), (R_PF @ axis) * q + p_PF
 
 
-def link_motions(chain: SerialChain, q: Sequence[Jet]) -> list[LinkMotion]:
+def link_motions(chain: "SerialChain", q: Sequence[Jet]) -> list[LinkMotion]:
     """Return the motion of all links, base first.
 
     Args:
@@ -75,7 +78,7 @@ def link_motions(chain: SerialChain, q: Sequence[Jet]) -> list[LinkMotion]:
 
 
 def inverse_dynamics(
-    chain: SerialChain, q: Sequence[Jet], motions: Sequence[LinkMotion] | None = None
+    chain: "SerialChain", q: Sequence[Jet], motions: Sequence[LinkMotion] | None = None
 ) -> list[Jet]:
     """Return the joint torques of link-side inverse dynamics (Newton-Euler on jets).
 
@@ -114,7 +117,7 @@ def inverse_dynamics(
     return tau[::-1]
 
 
-def tool_pose(chain: SerialChain, motions: Sequence[LinkMotion]) -> tuple[Jet, Jet]:
+def tool_pose(chain: "SerialChain", motions: Sequence[LinkMotion]) -> tuple[Jet, Jet]:
     """Return the tool point and the tool's orientation in the world.
 
     The pose of order 0 is the product of the links' poses; its derivatives
@@ -149,7 +152,7 @@ def _integrate_rotation(R: ca.SX, w: Jet) -> Jet:
     return jets.solve_ode(rate, R, w.order + 1)
 
 
-def mass_matrix(chain: SerialChain, q: ca.SX) -> ca.SX:
+def mass_matrix(chain: "SerialChain", q: ca.SX) -> ca.SX:
     """Return the link-side mass matrix ``D_E(q)`` (2.65a), shape (N, N), by composite bodies.
 
     Args:
@@ -185,23 +188,3 @@ def mass_matrix(chain: SerialChain, q: ca.SX) -> ca.SX:
             moment[j - 1] += rotated + mass[j] * p
             mass[j - 1] += mass[j]
     return D
-
-
-def gravity_torque(chain: SerialChain, q: ca.SX) -> ca.SX:
-    """Return the torques that hold the links against gravity, ``g_L(q)`` of (2.65a).
-
-    Args:
-        chain: The robot.
-        q: Joint coordinates, shape (N, 1).
-
-    Returns:
-        Shape (N, 1) [Nm or N].
-    """
-    at_rest = [jets.constant(q[i], 2) for i in range(chain.dimension)]
-    return ca.vertcat(*[tau.coefficients[0] for tau in inverse_dynamics(chain, at_rest)])
-
-
-def gravity_function(chain: SerialChain) -> ca.Function:
-    """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
-    q = ca.SX.sym("q", chain.dimension)
-    return ca.Function("gravity", [q], [gravity_torque(chain, q)])

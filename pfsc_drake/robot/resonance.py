@@ -3,25 +3,24 @@
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.robot.newton_euler import mass_matrix
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 
 
-def joint_resonances(chain: SerialChain, q_J: np.ndarray) -> np.ndarray:
+def joint_resonances(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
     """Return the undamped resonances of motors against links, see (3.69).
 
     Their squares are the eigenvalues of ``K_s (D_E^-1(q_J) + D_M^-1)``.
 
     Args:
-        chain: A robot with elastic joints.
+        robot: A robot with elastic joints.
         q_J: Joint coordinates, shape (N,).
 
     Returns:
         Angular frequencies in increasing order [rad/s], shape (N,).
     """
-    q = ca.SX.sym("q", chain.dimension)
-    D_E = np.array(ca.Function("D_E", [q], [mass_matrix(chain, q)])(q_J))
-    compliance = np.linalg.inv(D_E) + np.diag(1.0 / chain.D_M)
+    q = ca.SX.sym("q", robot.dimension)
+    D_E = np.array(ca.Function("D_E", [q], [robot.mass_matrix(q)])(q_J))
+    compliance = np.linalg.inv(D_E) + np.diag(1.0 / robot.D_M)
     # K^1/2 C K^1/2 has the eigenvalues of K C and is symmetric
-    root = np.sqrt(chain.K_s)
+    root = np.sqrt(robot.K_s)
     return np.sqrt(np.linalg.eigvalsh(root[:, None] * compliance * root))

@@ -1,10 +1,14 @@
-"""A serial chain of revolute and prismatic joints: plain data, no Drake."""
+"""A serial chain of revolute and prismatic joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import casadi as ca
 import numpy as np
+
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot import newton_euler
 
 
 @dataclass(frozen=True)
@@ -107,3 +111,15 @@ class SerialChain:
     def names(self) -> Sequence[str]:
         """Names of the joints."""
         return [link.name for link in self.links]
+
+    def tool_pose(self, q: Sequence[Jet]) -> tuple[Jet, Jet]:
+        """Return tool point [m] and orientation, see :func:`newton_euler.tool_pose`."""
+        return newton_euler.tool_pose(self, newton_euler.link_motions(self, q))
+
+    def inverse_dynamics(self, q: Sequence[Jet]) -> list[Jet]:
+        """Return the link-side torques, see :func:`newton_euler.inverse_dynamics`."""
+        return newton_euler.inverse_dynamics(self, q)
+
+    def mass_matrix(self, q: ca.SX) -> ca.SX:
+        """Return the link-side mass matrix, see :func:`newton_euler.mass_matrix`."""
+        return newton_euler.mass_matrix(self, q)

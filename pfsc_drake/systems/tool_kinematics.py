@@ -3,12 +3,11 @@
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from pfsc_drake.robot.inverse_kinematics import pose_function
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 
 class ToolKinematics(LeafSystem):
-    """Direct kinematics (2.5) of a serial chain.
+    """Direct kinematics (2.5) of a robot.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
@@ -16,9 +15,9 @@ class ToolKinematics(LeafSystem):
             world axes, shape (12,).
     """
 
-    def __init__(self, chain: SerialChain) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         super().__init__()
-        n = chain.dimension
+        n = robot.dimension
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         self.DeclareVectorOutputPort(
             "tool_pose",
@@ -27,7 +26,7 @@ class ToolKinematics(LeafSystem):
             prerequisites_of_calc={self._joint_state.ticket()},
         )
         self._q, self._pose = np.zeros(n), np.zeros(12)
-        self._buffer, self._evaluate = pose_function(chain).buffer()
+        self._buffer, self._evaluate = pose_function(robot).buffer()
         self._buffer.set_arg(0, self._q.data)
         self._buffer.set_res(0, self._pose.data)
 

@@ -156,7 +156,7 @@ def make_law():
         poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
         gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]
         arguments = {
-            "chain": chain,
+            "robot": chain,
             "linearization": linearization,
             "stabilization": Stabilization(gains, r, NAMES[:m]),
             "inverse": DecouplingInverse(1e-6),

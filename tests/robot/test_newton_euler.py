@@ -19,12 +19,12 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.newton_euler import (
-    gravity_torque,
     inverse_dynamics,
     link_motions,
     mass_matrix,
     tool_pose,
 )
+from pfsc_drake.robot.robot_model import gravity_torque
 
 
 def random_pose(rng):

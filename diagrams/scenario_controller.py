@@ -1,0 +1,78 @@
+"""The controller of a scenario."""
+
+import dataclasses as dc
+
+from diagrams.checks import require, require_not_negative, require_positive
+from pfsc_drake.control.linearization import RELATIVE_DEGREE
+
+
+@dc.dataclass
+class GainParameters:
+    """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
+
+    Attributes:
+        poles: Real poles [1/s], r of them.
+        coefficients: ``a_1 .. a_r``, alternatively.
+        integral: ``a_0``; needs coefficients.
+    """
+
+    poles: list[float] = dc.field(default_factory=list)
+    coefficients: list[float] = dc.field(default_factory=list)
+    integral: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(
+            not (self.poles and (self.coefficients or self.integral)),
+            "poles",
+            self.poles,
+            "either poles, or coefficients with or without integral",
+        )
+
+
+@dc.dataclass
+class LawGains:
+    """Gains of all coordinates for one law.
+
+    Attributes:
+        eta: Tangential.
+        xi: Both transversal.
+        phi: Rotational; unused by arms that only position.
+    """
+
+    eta: GainParameters = dc.field(default_factory=GainParameters)
+    xi: GainParameters = dc.field(default_factory=GainParameters)
+    phi: GainParameters = dc.field(default_factory=GainParameters)
+
+
+@dc.dataclass
+class ControllerParameters:
+    """The path following controller.
+
+    Attributes:
+        law: Actuation model that the law is made for.
+        gains: Gains by law.
+        sampling_time: Sampling time ``T_s`` [s].
+        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], for ``singular_perturbation``.
+        min_rcond: Smallest reciprocal condition number of the decoupling matrix.
+        max_alpha: End of the feasible neighbourhood for the controller, below 1.
+        brake_damping: Damping of the safe state on every drive, as a fraction of its
+            effort limit per rad/s.
+        effort_scale: Fraction of the model's effort limits that the law may use.
+    """
+
+    law: str = "elastic"
+    gains: dict[str, LawGains] = dc.field(default_factory=dict)
+    sampling_time: float = 1e-3
+    boundary_layer_damping: list[float] = dc.field(default_factory=list)
+    min_rcond: float = 1e-3
+    max_alpha: float = 0.95
+    brake_damping: float = 0.1
+    effort_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
+        for law in self.gains:
+            require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
+        require_positive("sampling_time", self.sampling_time)
+        require_positive("effort_scale", self.effort_scale)
+        require_not_negative("brake_damping", self.brake_damping)

@@ -1,0 +1,82 @@
+"""What the laws need to know of a robot, whatever its kinematics."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake import jets
+from pfsc_drake.jets import Jet
+
+
+class RobotModel(Protocol):
+    """Kinematics and dynamics of a fully actuated robot on jets.
+
+    Serial chains and the DELTA robot are such models; a robot of another kind needs
+    no more than this to be path controlled.
+    """
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether every joint has a finite stiffness."""
+
+    @property
+    def D_M(self) -> np.ndarray:
+        """Rotor inertias reflected to the joint side, shape (N,)."""
+
+    @property
+    def K_s(self) -> np.ndarray:
+        """Joint stiffnesses, shape (N,); infinite when rigid."""
+
+    @property
+    def K_d(self) -> np.ndarray:
+        """Joint dampings, shape (N,)."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the joints."""
+
+    def gather(self, attribute: str) -> np.ndarray:
+        """Return ``effort_limit``, ``velocity_limit`` (N,), ``position_limits`` (N, 2), ..."""
+
+    def tool_pose(self, q: Sequence[Jet]) -> tuple[Jet, Jet]:
+        """Return tool point [m] and orientation, jets of the order of ``q``."""
+
+    def inverse_dynamics(self, q: Sequence[Jet]) -> list[Jet]:
+        """Return the link-side torques ``D_E q'' + n_E`` (2.65a), N jets of order r - 2."""
+
+    def mass_matrix(self, q: ca.SX) -> ca.SX:
+        """Return ``D_E(q)`` without rotors, shape (N, N)."""
+
+
+def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
+    """Return the torques that hold the links against gravity, ``g_L(q)`` of (2.65a).
+
+    Args:
+        robot: The robot.
+        q: Joint coordinates, shape (N, 1).
+
+    Returns:
+        Shape (N, 1) [Nm or N].
+    """
+    at_rest = [jets.constant(q[i], 2) for i in range(robot.dimension)]
+    return ca.vertcat(*[tau.coefficients[0] for tau in robot.inverse_dynamics(at_rest)])
+
+
+def gravity_function(robot: RobotModel) -> ca.Function:
+    """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
+    q = ca.SX.sym("q", robot.dimension)
+    return ca.Function("gravity", [q], [gravity_torque(robot, q)])
+
+
+def pose_function(robot: RobotModel) -> ca.Function:
+    """Return the direct kinematics ``q -> [y_t, R_e by rows]``, shapes (N,) and (12,)."""
+    q = ca.SX.sym("q", robot.dimension)
+    still = [jets.constant(q[i], 1) for i in range(robot.dimension)]
+    y, R = (jet.coefficients[0] for jet in robot.tool_pose(still))
+    return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))], ["q"], ["pose"])

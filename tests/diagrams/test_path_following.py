@@ -1,0 +1,212 @@
+"""The path following station: what is connected to what, and when it acts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from diagrams.path_following import build_path_following
+from diagrams.scenario import GainParameters, LawGains
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.model_files import resolve_model
+
+ENCODERS = ("joint_encoders", "y0")
+WIRES = {
+    ("plant", "state"): {("joint_encoders", "u0")},
+    ENCODERS: {
+        ("tool_kinematics", "joint_state"),
+        ("path_following_controller", "joint_state"),
+        ("log_signals", "u0"),
+    },
+    ("tool_kinematics", "tool_pose"): {("path_projector", "tool_pose"), ("log_signals", "u1")},
+    ("path_projector", "path_point"): {
+        ("path_following_controller", "path_point"),
+        ("log_signals", "u2"),
+    },
+    ("reference_generator", "reference"): {
+        ("path_following_controller", "reference"),
+        ("log_signals", "u3"),
+    },
+    ("path_following_controller", "law"): {("log_signals", "u4")},
+    ("path_following_controller", "drive"): {("hold", "u")},
+    ("hold", "y"): {("drives", "u0")},
+    ("drives", "y0"): {("plant", "actuation")},
+    ("log_signals", "y0"): {("log", "data")},
+}
+
+
+@pytest.fixture
+def rigid(load_scenario):
+    """The three-axis scenario with the law that is compiled fastest."""
+    settings = load_scenario("pfc_elastic_3r")
+    settings.controller.law = "rigid"
+    return settings
+
+
+@pytest.fixture
+def station(rigid):
+    return build_path_following(rigid, Path())
+
+
+def wires(diagram):
+    found = {}
+    for (system, index), (source, port) in diagram.connection_map().items():
+        begin = (source.get_name(), source.get_output_port(port).get_name())
+        end = (system.get_name(), system.get_input_port(index).get_name())
+        found.setdefault(begin, set()).add(end)
+    return found
+
+
+def start(station):
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.Initialize()
+    return simulator, simulator.get_mutable_context()
+
+
+def test_wiring(station):
+    assert wires(station.diagram) == WIRES
+    assert station.diagram.get_name() == "pfc_elastic_3r"
+    assert station.diagram.num_input_ports() == 0
+
+
+def test_a_failing_sensor_is_between_encoders_and_everything_else(rigid):
+    rigid.simulation.sensor_failure.time = 0.1
+    expected = dict(WIRES)
+    expected[("sensor_failure", "delivered")] = expected[ENCODERS]
+    expected[ENCODERS] = {("sensor_failure", "measured")}
+    assert wires(build_path_following(rigid, Path()).diagram) == expected
+
+
+@pytest.mark.parametrize("component", [-1, 12])
+def test_a_sensor_that_is_not_there(rigid, component):
+    rigid.simulation.sensor_failure.time = 0.1
+    rigid.simulation.sensor_failure.component = component
+    with pytest.raises(InputError) as caught:
+        build_path_following(rigid, Path())
+    for part in ("sensor_failure.component", str(component), "0 to 11"):
+        assert part in str(caught.value)
+
+
+def test_encoders_measure_links_and_motors(station, load_arm):
+    _, root = start(station)
+    x = np.random.default_rng(3).normal(size=12)
+    station.plant.SetPositionsAndVelocities(station.plant.GetMyMutableContextFromRoot(root), x)
+    encoders = station.diagram.GetSubsystemByName("joint_encoders")
+    measured = encoders.get_output_port().Eval(encoders.GetMyContextFromRoot(root))
+    arm = load_arm("comau_racer_1_4_elastic_3r")
+    arm.set_state(x)
+    motor, flex = arm.angles("motor"), arm.angles("flex")
+    rates = [
+        [arm.plant.GetJointByName(f"{kind}_{i}").get_angular_rate(arm.context) for i in (1, 2, 3)]
+        for kind in ("motor", "flex")
+    ]
+    expected = [*(motor + flex), *np.sum(rates, axis=0), *motor, *rates[0]]
+    np.testing.assert_allclose(measured, expected, atol=1e-14)
+
+
+def test_start(station):
+    _, root = start(station)
+    plant = station.plant.GetMyContextFromRoot(root)
+    x = station.plant.GetPositionsAndVelocities(plant)
+    np.testing.assert_array_equal(x, station.initial_state)
+    point = station.projector.GetOutputPort("path_point").Eval(
+        station.projector.GetMyContextFromRoot(root)
+    )
+    layout = station.law.linearization.layout
+    assert point[layout.theta][0] == pytest.approx(station.initial_theta, abs=1e-12)
+    assert point[layout.eta][0] == pytest.approx(0.96, abs=1e-9)
+
+
+def test_torque_is_held_from_the_tick_on(station):
+    """Within an interval the plant gets what the law gave at the interval's begin."""
+    simulator, root = start(station)
+    held = []
+    for tick in range(1, 6):
+        simulator.AdvanceTo((tick + 0.5) * 1e-3)
+        plant = station.plant.GetMyContextFromRoot(root)
+        held.append(station.plant.get_actuation_input_port().Eval(plant))
+    times, signals = station.log.read(root)
+    np.testing.assert_allclose(times, np.arange(6) * 1e-3, atol=1e-12)
+    drive = signals["law"][:, station.law.layout.drive]
+    np.testing.assert_array_equal(held, drive[1:])
+    assert np.all(np.abs(np.diff(drive, axis=0)).max(axis=1) > 1e-6)  # it does change
+
+
+def test_log_holds_every_signal(station):
+    simulator, root = start(station)
+    simulator.AdvanceTo(2e-3)
+    _, signals = station.log.read(root)
+    layout = station.law.linearization.layout
+    assert {name: x.shape for name, x in signals.items()} == {
+        "joint_state": (3, 12),
+        "tool_pose": (3, 12),
+        "path_point": (3, layout.size),
+        "reference": (3, 9),
+        "law": (3, station.law.layout.size),
+    }
+    kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
+    pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))
+    np.testing.assert_array_equal(signals["tool_pose"][-1], pose)
+
+
+def test_reference_lasts_as_long_as_its_moves(rigid):
+    rigid.reference.points = [0.96, 1.0]
+    rigid.reference.velocity, rigid.reference.acceleration = 0.01, 1.0
+    rigid.reference.dwell = 0.25
+    station = build_path_following(rigid, Path())
+    # two rests, cruise and two ramps that cover half of the cruise's way: 35/16 v/a each
+    expected = 2 * 0.25 + 0.04 / 0.01 + 35.0 / 16.0 * 0.01 / 1.0
+    assert station.reference_duration == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_joint_without_drive(rigid, tmp_path):
+    text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
+    assert text.count("<effort>900</effort>") == 1
+    lame = text.replace("<effort>900</effort>", "<effort>0</effort>")
+    (tmp_path / "lame.sdf").write_text(lame, encoding="utf-8")
+    rigid.robot.model = "lame.sdf"
+    with pytest.raises(InputError, match=r"robot\.model.*actuator"):
+        build_path_following(rigid, tmp_path)
+
+
+def test_a_velocity_servo_is_not_driven_by_torques(rigid):
+    """The plant's drives take torques, not velocities."""
+    poles = GainParameters(poles=[-3.0])
+    rigid.controller.law = "velocity_servo"
+    rigid.controller.gains["velocity_servo"] = LawGains(poles, poles)
+    with pytest.raises(InputError, match=r"controller\.law.*velocity_servo"):
+        build_path_following(rigid, Path())
+
+
+def test_drives_go_to_their_joints_in_any_order(rigid, tmp_path):
+    """Actuators of a plant are in the order of the file, which need not be the chain's."""
+    text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
+    begin, end = (text.index(f'<joint name="motor_{i}"') for i in (1, 2))
+    end = text.index("</joint>", begin) + len("</joint>")
+    joint = text[begin:end]
+    moved = (text[:begin] + text[end:]).replace("</model>", joint + "</model>", 1)
+    (tmp_path / "moved.sdf").write_text(moved, encoding="utf-8")
+    rigid.robot.model = "moved.sdf"
+    station = build_path_following(rigid, tmp_path)
+    plant = station.plant
+    actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
+    order = [actuator.joint().name() for actuator in actuators]
+    assert order != ["motor_1", "motor_2", "motor_3"]
+    drives = station.diagram.GetSubsystemByName("drives")
+    context = drives.CreateDefaultContext()
+    drives.get_input_port().FixValue(context, [1.0, 2.0, 3.0])
+    actuation = drives.get_output_port().Eval(context)
+    expected = {"motor_1": 1.0, "motor_2": 2.0, "motor_3": 3.0}
+    assert dict(zip(order, actuation, strict=True)) == expected
+
+
+def test_warning_only_where_joints_resonate_too_fast(load_scenario):
+    settings = load_scenario("pfc_elastic_3r")
+    assert build_path_following(settings, Path()).warnings == []
+    settings.controller.sampling_time = 1e-2
+    (warning,) = build_path_following(settings, Path()).warnings
+    assert "Hz" in warning
+    settings.controller.law = "rigid"
+    assert build_path_following(settings, Path()).warnings == []
