@@ -16,7 +16,12 @@ from diagrams.scenario import (
     Waypoints,
 )
 from pfsc_drake.control.decoupling import DecouplingInverse
-from pfsc_drake.control.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
+from pfsc_drake.control.linearization import (
+    RELATIVE_DEGREE,
+    ActuationOptions,
+    linearize_path,
+    linearize_trajectory,
+)
 from pfsc_drake.control.path_law import PathLaw, SafeState
 from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.errors import InputError
@@ -125,7 +130,8 @@ def make_law(parameters: ControllerParameters, chain: SerialChain, oriented: boo
             "the robot's drives take torques, and no servo is between them"
         )
     damping = parameters.boundary_layer_damping
-    linearization = linearize_path(
+    linearize = linearize_path if parameters.manifold == "path" else linearize_trajectory
+    linearization = linearize(
         chain,
         law,
         oriented=oriented,

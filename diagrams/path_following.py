@@ -5,18 +5,17 @@ from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
-    LogVectorOutput,
     MatrixGain,
-    Multiplexer,
-    VectorLogSink,
     ZeroOrderHold,
 )
 
+from diagrams.measurement import add_forces, add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.robot import add_robot, tool_frame
 from diagrams.scenario import PathFollowingScenario
+from diagrams.signal_log import SignalLog, add_log
 from diagrams.start import start_state
 from pfsc_drake.control.path_law import PathLaw
 from pfsc_drake.control.reference import rest_to_rest
@@ -28,34 +27,11 @@ from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.path_following_controller import PathFollowingController
 from pfsc_drake.systems.path_projector import PathProjector
 from pfsc_drake.systems.reference_generator import ReferenceGenerator
-from pfsc_drake.systems.sensor_failure import SensorFailure
 from pfsc_drake.systems.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.trajectory_point import TrajectoryPoint
 
 # rad per sampling interval, up to which the exact elastic law keeps its accuracy
 _FASTEST_RESONANCE = 1.0
-
-
-@dataclass(frozen=True)
-class SignalLog:
-    """Several signals in one log.
-
-    Attributes:
-        sink: The log.
-        rows: Rows of each signal in the log's data.
-    """
-
-    sink: VectorLogSink
-    rows: dict[str, slice]
-
-    def read(self, root: Context) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return the times [s], shape (samples,), and the signals, each (samples, size).
-
-        Args:
-            root: Context of the diagram.
-        """
-        log = self.sink.FindLog(root)
-        data = log.data()
-        return log.sample_times(), {name: data[rows].T for name, rows in self.rows.items()}
 
 
 @dataclass
@@ -71,10 +47,12 @@ class PathFollowingStation:
         law: The path following law.
         projector: Projector system.
         controller: Controller system.
-        log: Log of ``joint_state``, ``tool_pose``, ``path_point``, ``reference``, ``law``.
+        log: Log of ``joint_state``, ``tool_pose``, ``path_point``, ``reference``, ``law``,
+            with forces also ``wrench_ext``, ``tau_ext``.
         reference_duration: Length of the reference motion [s].
         initial_state: State of the plant at the start.
         initial_theta: Path parameter at the start.
+        on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         warnings: What may not go as well as hoped, one sentence each.
     """
 
@@ -90,6 +68,7 @@ class PathFollowingStation:
     reference_duration: float
     initial_state: np.ndarray
     initial_theta: float
+    on_motors: bool
     warnings: list[str]
 
     def set_start(self, root: Context) -> None:
@@ -141,8 +120,9 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         dwell=reference.dwell,
     )
 
-    joint_state = _add_joint_state(builder, plant, chain, coordinates, scenario)
-    kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(chain))
+    joint_state = add_joint_state(builder, plant, chain, coordinates, scenario)
+    on_motors = law_name == "rigid" and chain.is_elastic
+    kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(chain, on_motors))
     projector = builder.AddNamedSystem(
         "path_projector", PathProjector(path, relative_degree, period)
     )
@@ -161,8 +141,14 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
     builder.Connect(joint_state, controller.GetInputPort("joint_state"))
-    builder.Connect(path_point, controller.GetInputPort("path_point"))
     builder.Connect(generator.GetOutputPort("reference"), controller.GetInputPort("reference"))
+    if linearization.time_driven:
+        leader = builder.AddNamedSystem(
+            "trajectory_point", TrajectoryPoint(path, relative_degree, linearization.num_outputs)
+        )
+        builder.Connect(generator.GetOutputPort("reference"), leader.GetInputPort("reference"))
+        path_point = leader.GetOutputPort("path_point")
+    builder.Connect(path_point, controller.GetInputPort("path_point"))
     builder.Connect(controller.GetOutputPort("drive"), hold.get_input_port())
     builder.Connect(hold.get_output_port(), drives.get_input_port())
     builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
@@ -173,7 +159,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         "reference": generator.GetOutputPort("reference"),
         "law": controller.GetOutputPort("law"),
     }
-    log = _add_log(builder, signals, period)
+    signals |= add_forces(builder, plant, chain, scenario, linearization.layout, signals)
+    log = add_log(builder, signals, period)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "path_following")
     return PathFollowingStation(
@@ -189,46 +176,9 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         eta_p.domain[1],
         initial_state,
         initial_theta,
+        on_motors,
         _warnings(law_name, chain, coordinates.link_rows @ initial_state, period),
     )
-
-
-def _add_joint_state(
-    builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    chain: SerialChain,
-    coordinates: PlantCoordinates,
-    scenario: PathFollowingScenario,
-) -> OutputPort:
-    """Add the encoders: ``[q_J, v_J, q_M, v_M]`` of the plant's state."""
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
-    builder.Connect(plant.get_state_output_port(), encoders.get_input_port())
-    failure = scenario.simulation.sensor_failure
-    if failure.time < 0.0:
-        return encoders.get_output_port()
-    size = 4 * chain.dimension
-    if not 0 <= failure.component < size:
-        raise InputError(
-            f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
-        )
-    broken = builder.AddNamedSystem(
-        "sensor_failure", SensorFailure(size, failure.component, failure.time)
-    )
-    builder.Connect(encoders.get_output_port(), broken.GetInputPort("measured"))
-    return broken.GetOutputPort("delivered")
-
-
-def _add_log(builder: DiagramBuilder, signals: dict[str, OutputPort], period: float) -> SignalLog:
-    sizes = [port.size() for port in signals.values()]
-    multiplexer = builder.AddNamedSystem("log_signals", Multiplexer(sizes))
-    for i, port in enumerate(signals.values()):
-        builder.Connect(port, multiplexer.get_input_port(i))
-    sink = LogVectorOutput(multiplexer.get_output_port(), builder, period)
-    sink.set_name("log")
-    ends = np.cumsum(sizes).tolist()
-    rows = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-    return SignalLog(sink, dict(zip(signals, rows, strict=True)))
 
 
 def _warnings(

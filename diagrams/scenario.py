@@ -19,12 +19,14 @@ from diagrams.scenario_path import (
     PathParameters,
     Waypoints,
 )
+from pfsc_drake.control.force_profile import ForcePulse
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
 
 __all__ = [
     "BentLemniscate",
     "Circle",
     "ControllerParameters",
+    "ForcePulse",
     "GainParameters",
     "Keyframe",
     "LawGains",
@@ -173,6 +175,7 @@ class PathFollowingScenario:
         reference: Motion along the path.
         start: Where it starts.
         simulation: How it is integrated.
+        forces: Wrenches on the tool over time.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -187,6 +190,7 @@ class PathFollowingScenario:
     reference: ReferenceParameters = dc.field(default_factory=ReferenceParameters)
     start: StartParameters = dc.field(default_factory=StartParameters)
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)
+    forces: list[ForcePulse] = dc.field(default_factory=list)
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)

@@ -5,6 +5,8 @@ import dataclasses as dc
 from diagrams.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
 
+MANIFOLDS = ("path", "trajectory")
+
 
 @dc.dataclass
 class GainParameters:
@@ -58,6 +60,8 @@ class ControllerParameters:
         brake_damping: Damping of the safe state on every drive, as a fraction of its
             effort limit per rad/s.
         effort_scale: Fraction of the model's effort limits that the law may use.
+        manifold: ``path``: path following; ``trajectory``: classical tracking of a point
+            that moves along the path with time, for comparison.
     """
 
     law: str = "elastic"
@@ -68,9 +72,11 @@ class ControllerParameters:
     max_alpha: float = 0.95
     brake_damping: float = 0.1
     effort_scale: float = 1.0
+    manifold: str = "path"
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
+        require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
         for law in self.gains:
             require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
         require_positive("sampling_time", self.sampling_time)

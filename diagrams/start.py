@@ -56,8 +56,9 @@ def start_state(
 
 
 def _check_points(points: list[float], path: Path) -> None:
+    rounding = 1e-9 * path.length
     for eta in points:
-        if not path.closed and not 0.0 <= eta <= path.length:
+        if not path.closed and not -rounding <= eta <= path.length + rounding:
             raise InputError(
                 f"reference.points: {eta:g} m; the path is open and {path.length:.6g} m long"
             )

@@ -189,6 +189,9 @@ def path_following_metrics(
             metrics.add("max_path_deviation_while_moving", moving, "m")
         metrics.add("rms_path_deviation", rms_path_deviation(log, converged_after), "m")
         metrics.add("static_path_deviation", static_path_deviation(log), "m")
+    if "xi_M" in log:
+        distance = np.linalg.norm(log["xi_M"].values, axis=1)[log.time >= converged_after]
+        metrics.add("max_path_deviation_of_motors", _max(distance), "m")
     if "phi" in log:
         error = max_orientation_error_after(log, converged_after)
         metrics.add("max_orientation_error", error, "rad")
@@ -201,6 +204,29 @@ def path_following_metrics(
             metrics.add(f"peak_torque_{axis}", float(torque), log["tau_d"].unit)
         metrics.add("saturated_samples", saturation_count(log), "1")
     return metrics
+
+
+def metric_names(num_joints: int, oriented: bool, on_motors: bool = False) -> list[str]:
+    """Return the names of the metrics that :func:`path_following_metrics` gives.
+
+    Args:
+        num_joints: Number of drives.
+        oriented: Whether the log has orientation errors.
+        on_motors: Whether it has the path coordinates of the motors too.
+    """
+    return [
+        "settling_time",
+        "max_path_deviation",
+        "max_path_deviation_while_moving",
+        "rms_path_deviation",
+        "static_path_deviation",
+        *(["max_path_deviation_of_motors"] if on_motors else []),
+        *(["max_orientation_error"] if oriented else []),
+        "max_tangential_error",
+        "peak_speed",
+        *(f"peak_torque_{axis}" for axis in range(1, num_joints + 1)),
+        "saturated_samples",
+    ]
 
 
 def _max(values: FloatArray) -> float:

@@ -14,17 +14,19 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.block_diagram import block_diagram_svg
 from diagrams.path_following import PathFollowingStation, build_path_following
 from diagrams.replay import RecordedMotion, build_replay, record
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario, Waypoints
 from experiments.figures import write_figures
 from experiments.metrics import Metrics
-from experiments.path_metrics import path_following_metrics
+from experiments.path_metrics import metric_names, path_following_metrics
 from experiments.progress import ProgressListener
 from experiments.provenance import standard_attributes
 from experiments.report import write_report
 from experiments.run_log import RunLog
+from experiments.run_signals import collect_log, collect_motion
 from experiments.scenario_file import ScenarioFile
-from experiments.simulation import collect_log, collect_motion, simulate
+from experiments.simulation import simulate
 from experiments.tick import measure_tick
+from pfsc_drake.errors import InputError
 from pfsc_drake.typed_yaml import load_typed
 
 _PATH_POINTS = 600
@@ -72,14 +74,20 @@ def run_scenario(
     """
     progress(0.0, "preparing")
     settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
-    station = build_path_following(settings, scenario.path.parent)
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        station = build_path_following(settings, scenario.path.parent)
+        _check_targets(settings, station)
+    except InputError as error:
+        raise InputError(f"{scenario.path}: {error}") from None
+    settings.name = settings.name or scenario.name
+    settings.duration = duration or settings.duration or station.reference_duration
+    _resolve_files(settings, scenario.path.parent)
+    _prepare_folder(out)
     (out / "scenario.yaml").write_text(yaml_dump_typed(settings), encoding="utf-8")
 
-    span = duration or settings.duration or station.reference_duration
-    progress.expect(span)
+    progress.expect(settings.duration)
     with _steady_clock():
-        result = simulate(station, settings.simulation, span, progress)
+        result = simulate(station, settings.simulation, settings.duration, progress)
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
         log.attributes = standard_attributes(scenario.name)
@@ -90,9 +98,9 @@ def run_scenario(
         tick = measure_tick(station, result.root, log) * 1e6
     metrics = _metrics(log, settings)
     metrics.add("real_time_factor", result.real_time_factor, "1")
-    if len(tick):
-        metrics.add("controller_tick_us", float(np.median(tick)), "us", source="median")
-        metrics.add("controller_tick_us_p99", float(np.percentile(tick, 99)), "us")
+    median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
+    metrics.add("controller_tick_us", float(median), "us", source="median")
+    metrics.add("controller_tick_us_p99", float(p99), "us")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
         metrics.set_target(name, target.bound, target.source)
     metrics.write(out / "metrics.json")
@@ -102,7 +110,6 @@ def run_scenario(
         progress(end, "recording")
         page = _write_recording(settings, scenario.path.parent, station, motion, out)
     progress(end, "drawing")
-    shutil.rmtree(out / "figures", ignore_errors=True)
     pictures = write_figures(log, _path_points(station), out / "figures") if figures else []
     report = write_report(
         out,
@@ -119,6 +126,45 @@ def run_scenario(
     )
     progress(end, "done")
     return RunOutcome(result.fault, report, metrics, station.warnings)
+
+
+def _check_targets(settings: PathFollowingScenario, station: PathFollowingStation) -> None:
+    """Refuse a target for a metric that the run will not have."""
+    linearization = station.law.linearization
+    known = [
+        *metric_names(linearization.num_joints, linearization.num_outputs > 3, station.on_motors),
+        "real_time_factor",
+        "controller_tick_us",
+        "controller_tick_us_p99",
+    ]
+    for name in settings.targets.get(settings.controller.law, {}):
+        if name not in known:
+            raise InputError(
+                f"targets.{settings.controller.law}.{name}: no such metric; "
+                f"allowed: {', '.join(known)}"
+            )
+
+
+def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
+    """Make file names independent of the scenario's folder, so that the copy runs too."""
+    shape, model = settings.path.shape, settings.robot.model
+    if isinstance(shape, Waypoints):
+        shape.file = str((folder / shape.file).resolve())
+    if Path(model).suffix and not model.startswith("package://"):
+        settings.robot.model = str((folder / model).resolve())
+
+
+def _prepare_folder(out: Path) -> None:
+    """Make the folder for the results and take away what an earlier run left there."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in ("scenario.yaml", "log.h5", "metrics.json", "recording.html", "report.html"):
+            (out / name).unlink(missing_ok=True)
+        shutil.rmtree(out / "figures", ignore_errors=True)
+    except OSError as error:
+        raise InputError(
+            f"--out {out}: cannot be written: {error.strerror}; allowed: a folder to write in"
+        ) from None
 
 
 def _metrics(log: RunLog, settings: PathFollowingScenario) -> Metrics:

@@ -8,6 +8,7 @@ import numpy as np
 from pfsc_drake.control import actuation
 from pfsc_drake.control.actuation import DrivenMotion, DriveState, joint_jets
 from pfsc_drake.control.path_coordinates import PathGeometry, path_coordinates
+from pfsc_drake.control.trajectory_errors import trajectory_errors
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.jets import Jet
@@ -45,7 +46,8 @@ class Linearization:
 
     Attributes:
         function: CasADi function ``(state, tau_ext, path_point) -> (Y, A, b, gain, drift,
-            offset)``.
+            offset)``; for trajectories with a fourth argument, the derivatives 0..r of
+            the reference point's arc length, shape (r + 1,).
             ``state`` is ``[q_J, v_J, q_M, v_M]``, shape (4N,); ``tau_ext`` holds the
             external torques and their derivatives up to order r - 2, shape
             (N max(r - 1, 0),); ``path_point`` is laid out by ``layout``. ``Y`` holds the
@@ -56,6 +58,8 @@ class Linearization:
         num_outputs: ``m``, 3 (position) or 6 (position and orientation).
         extrapolated: Whether ``gain q^(r) + drift`` is to be extrapolated to the middle
             of the sampling interval.
+        time_driven: Whether the virtual output is the error from a reference point that
+            moves with time, instead of the path coordinates.
     """
 
     function: ca.Function
@@ -64,6 +68,7 @@ class Linearization:
     num_joints: int
     num_outputs: int
     extrapolated: bool
+    time_driven: bool = False
 
 
 def linearize_path(
@@ -84,6 +89,36 @@ def linearize_path(
     Raises:
         InputError: If the law is unknown, or does not suit the robot or the path.
     """
+    return _linearize(robot, law, oriented, options or ActuationOptions(), time_driven=False)
+
+
+def linearize_trajectory(
+    robot: RobotModel,
+    law: str,
+    *,
+    oriented: bool,
+    options: ActuationOptions | None = None,
+) -> Linearization:
+    """Derive the computed torque law for a point that moves along a path with time (Sec. 3.8.4).
+
+    The same law on the same drives, with the errors of :func:`trajectory_errors` in place
+    of the path coordinates.
+
+    Args:
+        robot: The robot.
+        law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
+        oriented: Whether the tool's orientation follows the path too.
+        options: What the actuation model needs besides.
+
+    Raises:
+        InputError: If the law is unknown, or does not suit the robot or the path.
+    """
+    return _linearize(robot, law, oriented, options or ActuationOptions(), time_driven=True)
+
+
+def _linearize(
+    robot: RobotModel, law: str, oriented: bool, options: ActuationOptions, *, time_driven: bool
+) -> Linearization:
     if law not in RELATIVE_DEGREE:
         raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
     r, n, m = RELATIVE_DEGREE[law], robot.dimension, 6 if oriented else 3
@@ -95,29 +130,35 @@ def linearize_path(
         )
     layout = PathPointLayout(r, oriented)
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    point = ca.SX.sym("path_point", layout.size)
+    point, progress = ca.SX.sym("path_point", layout.size), ca.SX.sym("progress", r + 1)
     external = ca.vertsplit(tau_ext, n) if r > 1 else []
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
-    measured = DriveState(q_J, v_J, q_M, v_M, external)
-    options = options or ActuationOptions()
-    motion = _driven_motion(robot, law, measured, options)
+    motion = _driven_motion(robot, law, DriveState(q_J, v_J, q_M, v_M, external), options)
     path = _path_geometry(layout, point)
+    eta_d = Jet.from_derivatives(ca.vertsplit(progress))
 
-    q = joint_jets([*motion.q, ca.SX(n, 1)])
-    output = _virtual_output(robot, q, path)
+    def virtual_output(derivatives: list[ca.SX]) -> list[Jet]:
+        y, R_e = robot.tool_pose(joint_jets(derivatives))
+        if time_driven:
+            return trajectory_errors(y, R_e, path, eta_d)
+        return path_coordinates(y, R_e, path)
+
+    output = virtual_output([*motion.q, ca.SX(n, 1)])
     Y = ca.horzcat(*[ca.vertcat(*[y.derivative(k) for y in output]) for k in range(r)])
     b = ca.vertcat(*[y.derivative(r) for y in output])
-    drives = [motion.gain, motion.drift, motion.offset]
-    results = [Y, _decoupling_matrix(robot, motion, path), b, *drives]
+    # A = d yhat / dq (3.22): the virtual output's rate is affine in q'
+    rate = ca.SX.sym("rate", n)
+    slopes = ca.vertcat(*[y.coefficients[1] for y in virtual_output([motion.q[0], rate])])
+    results = [Y, ca.jacobian(slopes, rate), b, motion.gain, motion.drift, motion.offset]
     function = ca.Function(
-        f"path_{law}",
-        [state, tau_ext, point],
+        f"{'trajectory' if time_driven else 'path'}_{law}",
+        [state, tau_ext, point, *([progress] if time_driven else [])],
         [ca.densify(e) for e in ca.cse(results)],
-        ["state", "tau_ext", "path_point"],
+        ["state", "tau_ext", "path_point", *(["progress"] if time_driven else [])],
         ["Y", "A", "b", "gain", "drift", "offset"],
     )
     extrapolated = law == "elastic" and options.sampling_time > 0.0
-    return Linearization(function, r, layout, n, m, extrapolated)
+    return Linearization(function, r, layout, n, m, extrapolated, time_driven)
 
 
 def _driven_motion(
@@ -159,14 +200,3 @@ def _path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
         position=ca.vertsplit(point[layout.position], 3),
         quaternion=quaternion,
     )
-
-
-def _virtual_output(robot: RobotModel, q: list[Jet], path: PathGeometry) -> list[Jet]:
-    return path_coordinates(*robot.tool_pose(q), path)
-
-
-def _decoupling_matrix(robot: RobotModel, motion: DrivenMotion, path: PathGeometry) -> ca.SX:
-    """Return ``A = d yhat / dq`` (3.22): the virtual output's rate is ``A q'``."""
-    rate = ca.SX.sym("rate", robot.dimension)
-    output = _virtual_output(robot, joint_jets([motion.q[0], rate]), path)
-    return ca.jacobian(ca.vertcat(*[y.coefficients[1] for y in output]), rate)

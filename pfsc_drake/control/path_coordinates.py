@@ -78,7 +78,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ]
     if not path.quaternion:
         return [eta, *xi]
-    return [eta, *xi, *_orientation_error(R_e, jets.compose(path.quaternion, theta))]
+    return [eta, *xi, *orientation_error(R_e, jets.compose(path.quaternion, theta))]
 
 
 def _transported(normal: ca.SX, e_par: Jet) -> Jet:
@@ -89,10 +89,17 @@ def _transported(normal: ca.SX, e_par: Jet) -> Jet:
     return jets.solve_ode(lambda e: -(e_par * jets.dot(turning, e)), normal, e_par.order)
 
 
-def _orientation_error(R_e: Jet, q_d: Jet) -> list[Jet]:
+def orientation_error(R_e: Jet, q_d: Jet) -> list[Jet]:
     """Return the ZYX angles (2.7) of ``R_d' R_e``, each from the ratio of two entries.
 
     The norm of the quaternion scales all entries alike and cancels.
+
+    Args:
+        R_e: Tool orientation, matrix jet.
+        q_d: Quaternion (w, x, y, z) of the reference orientation, of any positive norm.
+
+    Returns:
+        3 scalar jets [rad].
     """
     R_d = quaternion_rotation(q_d)
     x, z = R_d.T @ R_e[:, 0], R_d[:, 2]

@@ -257,8 +257,14 @@ def _law_function(linearization: Linearization, stabilization: Stabilization) ->
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("path_point", linearization.layout.size)
     reference, integral = ca.SX.sym("reference", (r + 1) * m), ca.SX.sym("integral", m)
-    Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point)
-    v = stabilization.virtual_input(ca.horzsplit(Y), ca.vertsplit(reference, m), integral)
+    y_p = ca.vertsplit(reference, m)
+    progress = []
+    if linearization.time_driven:
+        # the reference point moves with time, and the errors from it shall vanish
+        progress = [ca.vertcat(*[y[0] for y in y_p])]
+        y_p = [ca.SX(m, 1)] * (r + 1)
+    Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point, *progress)
+    v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
     return ca.Function(
         "path_law",
         [state, point, reference, integral, tau_ext],

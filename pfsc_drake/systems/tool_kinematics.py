@@ -13,11 +13,17 @@ class ToolKinematics(LeafSystem):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
         tool_pose (output): ``[y_t, R_e]``, tool point [m] and orientation by rows, in
             world axes, shape (12,).
+
+    Args:
+        robot: The robot.
+        of_motors: Whether the pose is that of the motor coordinates q_M, for laws that
+            act on them.
     """
 
-    def __init__(self, robot: RobotModel) -> None:
+    def __init__(self, robot: RobotModel, of_motors: bool = False) -> None:
         super().__init__()
         n = robot.dimension
+        self._part = slice(2 * n, 3 * n) if of_motors else slice(0, n)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         self.DeclareVectorOutputPort(
             "tool_pose",
@@ -31,6 +37,6 @@ class ToolKinematics(LeafSystem):
         self._buffer.set_res(0, self._pose.data)
 
     def _calc_tool_pose(self, context: Context, output: BasicVector) -> None:
-        self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
+        self._q[:] = self._joint_state.Eval(context)[self._part]
         self._evaluate()
         output.SetFromVector(self._pose)

@@ -37,16 +37,16 @@ WIRES = {
 
 
 @pytest.fixture
-def rigid(load_scenario):
-    """The three-axis scenario with the law that is compiled fastest."""
+def settings(load_scenario):
+    """The three-axis scenario with a law that is compiled fast."""
     settings = load_scenario("pfc_elastic_3r")
-    settings.controller.law = "rigid"
+    settings.controller.law = "singular_perturbation"
     return settings
 
 
 @pytest.fixture
-def station(rigid):
-    return build_path_following(rigid, Path())
+def station(settings):
+    return build_path_following(settings, Path())
 
 
 def wires(diagram):
@@ -71,20 +71,36 @@ def test_wiring(station):
     assert station.diagram.num_input_ports() == 0
 
 
-def test_a_failing_sensor_is_between_encoders_and_everything_else(rigid):
-    rigid.simulation.sensor_failure.time = 0.1
+def test_the_rigid_law_sees_the_motors_only(settings):
+    """Its path point belongs to where the tool would be without deflection."""
+    settings.controller.law = "rigid"
+    station = build_path_following(settings, Path())
+    _, root = start(station)
+    kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
+    pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))
+    x = station.initial_state.copy()
+    assert np.abs(x[1:6:2]).max() > 1e-3
+    x[1:6:2] = 0.0  # the joints' deflections
+    context = station.plant.CreateDefaultContext()
+    station.plant.SetPositionsAndVelocities(context, x)
+    tool = station.plant.GetFrameByName("tool_point").CalcPoseInWorld(context)
+    np.testing.assert_allclose(pose[:3], tool.translation(), atol=1e-12)
+
+
+def test_a_failing_sensor_is_between_encoders_and_everything_else(settings):
+    settings.simulation.sensor_failure.time = 0.1
     expected = dict(WIRES)
     expected[("sensor_failure", "delivered")] = expected[ENCODERS]
     expected[ENCODERS] = {("sensor_failure", "measured")}
-    assert wires(build_path_following(rigid, Path()).diagram) == expected
+    assert wires(build_path_following(settings, Path()).diagram) == expected
 
 
 @pytest.mark.parametrize("component", [-1, 12])
-def test_a_sensor_that_is_not_there(rigid, component):
-    rigid.simulation.sensor_failure.time = 0.1
-    rigid.simulation.sensor_failure.component = component
+def test_a_sensor_that_is_not_there(settings, component):
+    settings.simulation.sensor_failure.time = 0.1
+    settings.simulation.sensor_failure.component = component
     with pytest.raises(InputError) as caught:
-        build_path_following(rigid, Path())
+        build_path_following(settings, Path())
     for part in ("sensor_failure.component", str(component), "0 to 11"):
         assert part in str(caught.value)
 
@@ -151,36 +167,36 @@ def test_log_holds_every_signal(station):
     np.testing.assert_array_equal(signals["tool_pose"][-1], pose)
 
 
-def test_reference_lasts_as_long_as_its_moves(rigid):
-    rigid.reference.points = [0.96, 1.0]
-    rigid.reference.velocity, rigid.reference.acceleration = 0.01, 1.0
-    rigid.reference.dwell = 0.25
-    station = build_path_following(rigid, Path())
+def test_reference_lasts_as_long_as_its_moves(settings):
+    settings.reference.points = [0.96, 1.0]
+    settings.reference.velocity, settings.reference.acceleration = 0.01, 1.0
+    settings.reference.dwell = 0.25
+    station = build_path_following(settings, Path())
     # two rests, cruise and two ramps that cover half of the cruise's way: 35/16 v/a each
     expected = 2 * 0.25 + 0.04 / 0.01 + 35.0 / 16.0 * 0.01 / 1.0
     assert station.reference_duration == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_joint_without_drive(rigid, tmp_path):
+def test_a_joint_without_drive(settings, tmp_path):
     text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
     assert text.count("<effort>900</effort>") == 1
     lame = text.replace("<effort>900</effort>", "<effort>0</effort>")
     (tmp_path / "lame.sdf").write_text(lame, encoding="utf-8")
-    rigid.robot.model = "lame.sdf"
+    settings.robot.model = "lame.sdf"
     with pytest.raises(InputError, match=r"robot\.model.*actuator"):
-        build_path_following(rigid, tmp_path)
+        build_path_following(settings, tmp_path)
 
 
-def test_a_velocity_servo_is_not_driven_by_torques(rigid):
+def test_a_velocity_servo_is_not_driven_by_torques(settings):
     """The plant's drives take torques, not velocities."""
     poles = GainParameters(poles=[-3.0])
-    rigid.controller.law = "velocity_servo"
-    rigid.controller.gains["velocity_servo"] = LawGains(poles, poles)
+    settings.controller.law = "velocity_servo"
+    settings.controller.gains["velocity_servo"] = LawGains(poles, poles)
     with pytest.raises(InputError, match=r"controller\.law.*velocity_servo"):
-        build_path_following(rigid, Path())
+        build_path_following(settings, Path())
 
 
-def test_drives_go_to_their_joints_in_any_order(rigid, tmp_path):
+def test_drives_go_to_their_joints_in_any_order(settings, tmp_path):
     """Actuators of a plant are in the order of the file, which need not be the chain's."""
     text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
     begin, end = (text.index(f'<joint name="motor_{i}"') for i in (1, 2))
@@ -188,8 +204,8 @@ def test_drives_go_to_their_joints_in_any_order(rigid, tmp_path):
     joint = text[begin:end]
     moved = (text[:begin] + text[end:]).replace("</model>", joint + "</model>", 1)
     (tmp_path / "moved.sdf").write_text(moved, encoding="utf-8")
-    rigid.robot.model = "moved.sdf"
-    station = build_path_following(rigid, tmp_path)
+    settings.robot.model = "moved.sdf"
+    station = build_path_following(settings, tmp_path)
     plant = station.plant
     actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
     order = [actuator.joint().name() for actuator in actuators]
@@ -202,8 +218,8 @@ def test_drives_go_to_their_joints_in_any_order(rigid, tmp_path):
     assert dict(zip(order, actuation, strict=True)) == expected
 
 
-def test_warning_only_where_joints_resonate_too_fast(load_scenario):
-    settings = load_scenario("pfc_elastic_3r")
+def test_warning_only_where_joints_resonate_too_fast(settings):
+    settings.controller.law = "elastic"
     assert build_path_following(settings, Path()).warnings == []
     settings.controller.sampling_time = 1e-2
     (warning,) = build_path_following(settings, Path()).warnings

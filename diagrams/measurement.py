@@ -1,0 +1,93 @@
+"""What the controller measures, and what disturbs the robot."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain
+
+from diagrams.robot import tool_frame
+from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.control.force_profile import ForceProfile
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.systems.external_wrench import ExternalWrench
+from pfsc_drake.systems.scripted_force import ScriptedForce
+from pfsc_drake.systems.sensor_failure import SensorFailure
+
+
+def add_joint_state(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    chain: SerialChain,
+    coordinates: PlantCoordinates,
+    scenario: PathFollowingScenario,
+) -> OutputPort:
+    """Add the encoders, and return ``[q_J, v_J, q_M, v_M]`` as measured.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        chain: The robot.
+        coordinates: Where its coordinates stand in the plant's state.
+        scenario: The scenario.
+
+    Raises:
+        InputError: If a sensor is to fail that does not exist.
+    """
+    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
+    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
+    builder.Connect(plant.get_state_output_port(), encoders.get_input_port())
+    failure = scenario.simulation.sensor_failure
+    if failure.time < 0.0:
+        return encoders.get_output_port()
+    size = 4 * chain.dimension
+    if not 0 <= failure.component < size:
+        raise InputError(
+            f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
+        )
+    broken = builder.AddNamedSystem(
+        "sensor_failure", SensorFailure(size, failure.component, failure.time)
+    )
+    builder.Connect(encoders.get_output_port(), broken.GetInputPort("measured"))
+    return broken.GetOutputPort("delivered")
+
+
+def add_forces(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    chain: SerialChain,
+    scenario: PathFollowingScenario,
+    layout: PathPointLayout,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add the scenario's forces on the tool, and return their signals for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        chain: The robot.
+        scenario: The scenario.
+        layout: Layout of the path point.
+        ports: ``joint_state`` and ``path_point``.
+    """
+    if not scenario.forces:
+        return {}
+    profile = ForceProfile(scenario.forces)
+    operator = builder.AddNamedSystem(
+        "operator", ScriptedForce(profile, layout, scenario.controller.sampling_time)
+    )
+    if profile.needs_path:
+        builder.Connect(ports["path_point"], operator.GetInputPort("path_point"))
+    wrench = operator.GetOutputPort("wrench")
+    contact = builder.AddNamedSystem(
+        "external_wrench", ExternalWrench(tool_frame(plant, scenario.robot), chain)
+    )
+    builder.Connect(wrench, contact.GetInputPort("wrench"))
+    builder.Connect(ports["joint_state"], contact.GetInputPort("joint_state"))
+    builder.Connect(
+        contact.GetOutputPort("applied_spatial_force"),
+        plant.get_applied_spatial_force_input_port(),
+    )
+    return {"wrench_ext": wrench, "tau_ext": contact.GetOutputPort("tau_ext")}

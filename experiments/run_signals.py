@@ -1,0 +1,210 @@
+"""The signals of a run, from what its station logged."""
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.path_following import PathFollowingStation
+from diagrams.replay import RecordedMotion
+from experiments.run_log import RunLog
+from pfsc_drake.control.path_law import Fault
+from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
+from pfsc_drake.robot.robot_model import pose_function
+
+
+def collect_log(station: PathFollowingStation, root: Context) -> RunLog:
+    """Return the signals of a run, named and with units as scripts expect them.
+
+    The tool's pose and its path coordinates are those of the links, also where the law
+    acts on motor coordinates or on the errors from a moving reference point.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context at the end.
+    """
+    times, raw = station.log.read(root)
+    log = RunLog(times)
+    _add_joints(log, station, raw["joint_state"], raw["law"])
+    pose = _tool_poses(station, raw["joint_state"])
+    log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
+    log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
+    linearization, layout = station.law.linearization, station.law.layout
+    Y = raw["law"][:, layout.manifold_state]
+    Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
+    points = raw["path_point"]
+    if linearization.time_driven or station.on_motors:
+        if linearization.time_driven:
+            log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
+        else:
+            log.add("eta_M", Y[:, 0, 0], "m")
+            log.add("xi_M", Y[:, 0, 1:3], "m", ["xi_M_1", "xi_M_2"])
+        points = _project(station, pose, linearization.relative_degree)
+        reference = raw["path_point"] if linearization.time_driven else points
+        seen = _seen_from_path(times, pose, linearization.layout, points, reference)
+        Y[:, : seen.shape[1]] = seen[:, : Y.shape[1]]
+    log.add("theta", points[:, linearization.layout.theta], "1")
+    log.add("alpha", points[:, linearization.layout.alpha], "1")
+    _add_manifold(log, station, raw, Y)
+    orientation_from = raw["path_point"] if linearization.time_driven else points
+    _add_orientation(log, station, orientation_from, pose)
+    _add_forces(log, raw)
+    return log
+
+
+def _tool_poses(station: PathFollowingStation, joint_state: np.ndarray) -> np.ndarray:
+    """Return ``[y_t, R_e]`` of the links, shape (samples, 12)."""
+    q_J = joint_state[:, : station.chain.dimension]
+    if len(q_J) == 0:
+        return np.zeros((0, 12))
+    return np.array(pose_function(station.chain).map(len(q_J))(q_J.T)).T
+
+
+def collect_motion(station: PathFollowingStation, root: Context, period: float) -> RecordedMotion:
+    """Return the motion of a run at the frames of a recording, as far as it is finite.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context at the end.
+        period: Time between frames [s].
+    """
+    times, raw = station.log.read(root)
+    finite = np.isfinite(np.hstack([raw["path_point"], raw["joint_state"]])).all(axis=1)
+    usable = np.flatnonzero(finite)
+    stride = max(1, round(period / station.controller.period))
+    frames = usable[::stride]
+    state = raw["joint_state"][frames]
+    states = [station.coordinates.plant_state(x) for x in state]
+    num_states = station.coordinates.num_states
+    positions = np.array(states).reshape(len(frames), num_states)
+    positions = positions[:, : station.plant.num_positions()]
+    return RecordedMotion(
+        times[frames], positions, _tool_poses(station, state), raw["path_point"][frames]
+    )
+
+
+def _add_joints(
+    log: RunLog, station: PathFollowingStation, state: np.ndarray, law: np.ndarray
+) -> None:
+    chain, n = station.chain, station.chain.dimension
+    q_J, v_J, q_M, v_M = np.hsplit(state, 4)
+    angle, rate, effort = _joint_units(station)
+    axes = [str(i + 1) for i in range(n)]
+    for name, values, unit in (
+        ("q_J", q_J, angle),
+        ("v_J", v_J, rate),
+        ("q_M", q_M, angle),
+        ("v_M", v_M, rate),
+    ):
+        log.add(name, values, unit, [f"{name}_{axis}" for axis in axes])
+    drive = law[:, station.law.layout.drive]
+    if station.law.linearization.relative_degree > 1:
+        labels = [f"tau_d_{axis}" for axis in axes]
+        log.add("tau_d", drive, effort, labels, station.law.limits)
+    if chain.is_elastic:
+        tau_J = chain.K_s * (q_M - q_J) + chain.K_d * (v_M - v_J)
+        log.add("tau_J", tau_J, effort, [f"tau_J_{axis}" for axis in axes])
+
+
+def _joint_units(station: PathFollowingStation) -> tuple[str, str, str]:
+    if all(link.is_revolute for link in station.chain.links):
+        return "rad", "rad/s", "Nm"
+    if any(link.is_revolute for link in station.chain.links):
+        return "rad or m", "rad/s or m/s", "Nm or N"
+    return "m", "m/s", "N"
+
+
+def _add_manifold(
+    log: RunLog, station: PathFollowingStation, raw: dict[str, np.ndarray], Y: np.ndarray
+) -> None:
+    law, layout, linearization = raw["law"], station.law.layout, station.law.linearization
+    m = linearization.num_outputs
+    Y_p = raw["reference"].reshape(len(law), -1, m)
+    parts = {"eta": slice(0, 1), "xi": slice(1, 3), "phi": slice(3, m)}
+    units = {"eta": "m", "xi": "m", "phi": "rad"}
+    labels = {"eta": ["eta"], "xi": ["xi_1", "xi_2"], "phi": ["phi_z", "phi_y", "phi_x"]}
+    for name, part in parts.items():
+        if part.start >= m:
+            continue
+        log.add(name, Y[:, 0, part], units[name], labels[name])
+        log.add(f"{name}_p", Y_p[:, 0, part], units[name], [f"{x}_p" for x in labels[name]])
+        if linearization.relative_degree > 1:
+            rates = [f"{x}_dot" for x in labels[name]]
+            log.add(f"{name}_dot", Y[:, 1, part], f"{units[name]}/s", rates)
+    log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{linearization.relative_degree}")
+    status = law[:, layout.status]
+    log.add("fault", status[:, 0].astype(int), "1", [fault.name.lower() for fault in Fault])
+    log.add("rcond", status[:, 1], "1")
+    log.add("saturated_drives", status[:, 2].astype(int), "1")
+
+
+def _project(station: PathFollowingStation, pose: np.ndarray, relative_degree: int) -> np.ndarray:
+    """Project a motion of the tool on the path, sample by sample; shape (samples, size)."""
+    path = station.path
+    evaluator = path.evaluator(relative_degree)
+    points = np.full((len(pose), evaluator.layout.size), np.nan)
+    theta = station.initial_theta
+    for k, y_t in enumerate(pose[:, :3]):
+        if np.isfinite(y_t).all():
+            points[k] = evaluator(y_t.tolist(), theta)
+            theta = points[k, 0]
+    return points
+
+
+def _seen_from_path(
+    times: np.ndarray,
+    pose: np.ndarray,
+    layout: PathPointLayout,
+    points: np.ndarray,
+    reference: np.ndarray,
+) -> np.ndarray:
+    """Return the virtual output of a motion of the tool and its difference quotients.
+
+    Args:
+        times: [s], shape (samples,).
+        pose: ``[y_t, R_e]``, shape (samples, 12).
+        layout: Layout of the points.
+        points: The path next to the tool, shape (samples, size).
+        reference: The path where the law takes the reference orientation from.
+
+    Returns:
+        Shape (samples, 2, m).
+    """
+    sigma, slope = (points[:, layout.position][:, i : i + 3] for i in (0, 3))
+    e_par = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+    e_perp, offset = points[:, layout.normal], pose[:, :3] - sigma
+    columns = [points[:, layout.eta][:, 0]]
+    columns += [np.sum(e * offset, axis=1) for e in (e_perp, np.cross(e_par, e_perp))]
+    if layout.oriented:
+        R_e, R_d = _rotations(layout, pose, reference)
+        columns += list(matrix_to_zyx(np.swapaxes(R_d, 1, 2) @ R_e).T)
+    output = np.column_stack(columns)
+    rate = np.gradient(output, times, axis=0) if len(times) > 1 else np.zeros_like(output)
+    return np.stack([output, rate], axis=1)
+
+
+def _rotations(
+    layout: PathPointLayout, pose: np.ndarray, point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
+    finite = (np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))[:, None]
+    quaternion = np.where(finite, point[:, layout.quaternion][:, :4], [1.0, 0.0, 0.0, 0.0])
+    R_e = np.where(finite, pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
+    return R_e, quaternion_to_matrix(quaternion)
+
+
+def _add_orientation(
+    log: RunLog, station: PathFollowingStation, point: np.ndarray, pose: np.ndarray
+) -> None:
+    """Add the ZYX angles of the tool and of the reference that the law compares it with."""
+    layout = station.law.linearization.layout
+    if not layout.oriented:
+        return
+    R_e, R_d = _rotations(layout, pose, point)
+    for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
+        log.add(name, np.unwrap(matrix_to_zyx(R), axis=0), "rad", ["z", "y", "x"])
+
+
+def _add_forces(log: RunLog, raw: dict[str, np.ndarray]) -> None:
+    if "wrench_ext" in raw:
+        labels = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
+        log.add("wrench_ext", raw["wrench_ext"], "N, Nm", labels)
+        log.add("tau_ext", raw["tau_ext"], "Nm")

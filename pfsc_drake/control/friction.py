@@ -1,0 +1,179 @@
+"""Dry and viscous joint friction with true sticking: pure formulas."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class BristleFriction:
+    """Coulomb and viscous friction (2.34), (2.41) behind a bristle of finite stiffness.
+
+    The dry part of (2.34) is Coulomb's law in its set-valued form, on the velocity with
+    which the tips of the bristles slip::
+
+        f_d in f_c Sgn(v - delta s'),   f_d = f_c (s + tau s'),   tau_f = f_d + f_v v
+
+    with the deflection ``s`` of the bristles in units of the presliding displacement
+    ``delta``. Solved for ``s'`` this is an ordinary differential equation with a
+    Lipschitz right side and without a switch::
+
+        f_d = f_c sat(s + tau v / delta),   s' = (sat(s + tau v / delta) - s) / tau
+
+    where ``sat`` limits to [-1, 1]. What follows from it:
+
+    - **Stick**: as long as ``|f_d| < f_c`` holds, ``s' = v / delta``: the bristles are a
+      spring of stiffness ``f_c / delta`` and a damper, the tips do not move at all. Under
+      any constant load below ``f_c`` the joint comes to rest, velocity 0 and not merely
+      small; oscillating loads cause no drift. While a load changes slowly, the joint gives
+      by ``delta / f_c`` per Nm; a load of 0.95 ``f_c`` applied at once shoots over and slips
+      once, to rest after about 2.4 ``delta`` (with the defaults below).
+    - **Break-away** at ``f_c``; the dry part never exceeds it.
+    - **Slip**: ``f_d = f_c sign(v)`` exactly, at every velocity, once the bristles are
+      bent (``|s| = 1``), hence (2.34).
+    - **Passive**: ``tau_f v - d/dt(f_c delta s^2 / 2) >= 0`` always.
+    - **Not stiff**: the fastest rate of ``s`` is 1/tau at any sliding velocity, unlike
+      that of the models of Dahl or LuGre, which grows with ``|v| / delta``.
+
+    All arrays have shape (N,); the units are those of a revolute joint, for a slide read
+    m for rad and N for Nm.
+
+    Attributes:
+        coulomb: ``f_c`` [Nm], not negative; 0 for a joint without dry friction.
+        viscous: ``f_v`` [Nm s/rad], not negative.
+        presliding: ``delta`` [rad], positive.
+        relaxation: ``tau`` [s], positive.
+
+    Raises:
+        InputError: If the shapes differ or a value is out of range.
+    """
+
+    coulomb: np.ndarray
+    viscous: np.ndarray
+    presliding: np.ndarray
+    relaxation: np.ndarray
+
+    def __post_init__(self) -> None:
+        size = np.size(self.coulomb)
+        for name in ("coulomb", "viscous", "presliding", "relaxation"):
+            positive = name in ("presliding", "relaxation")
+            object.__setattr__(self, name, _vector(name, getattr(self, name), size, positive))
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.coulomb.size
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness of the bristles ``f_c / delta`` [Nm/rad], shape (N,)."""
+        return self.coulomb / self.presliding
+
+    def bend(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return ``f_d / f_c = sat(s + tau v / delta)``, shape (N,).
+
+        Args:
+            s: Deflection of the bristles, shape (N,).
+            v: Velocity [rad/s], shape (N,).
+        """
+        return np.clip(s + self.relaxation / self.presliding * v, -1.0, 1.0)
+
+    def torque(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return ``tau_f`` [Nm], shape (N,), positive against a positive velocity.
+
+        Args:
+            s: Deflection of the bristles, shape (N,).
+            v: Velocity [rad/s], shape (N,).
+        """
+        return self.coulomb * self.bend(s, v) + self.viscous * v
+
+    def rate(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return ``s'`` [1/s], shape (N,).
+
+        Args:
+            s: Deflection of the bristles, shape (N,).
+            v: Velocity [rad/s], shape (N,).
+        """
+        return (self.bend(s, v) - s) / self.relaxation
+
+    def energy(self, s: np.ndarray) -> np.ndarray:
+        """Return what the bent bristles store, ``f_c delta s^2 / 2`` [J], shape (N,).
+
+        Args:
+            s: Deflection of the bristles, shape (N,).
+        """
+        return 0.5 * self.coulomb * self.presliding * s**2
+
+    def deflection(self, torque: np.ndarray) -> np.ndarray:
+        """Return the deflection that holds a load at rest, limited to [-1, 1], shape (N,).
+
+        Args:
+            torque: Load that friction carries [Nm], shape (N,).
+        """
+        load = np.asarray(torque, dtype=float)
+        limit = np.where(self.coulomb > 0.0, self.coulomb, np.inf)
+        return np.clip(load / limit, -1.0, 1.0)
+
+
+def bristles_for_step(
+    coulomb: np.ndarray,
+    viscous: np.ndarray,
+    inertia: np.ndarray,
+    step: float,
+    *,
+    frequency: float = 1.0,
+    damping: float = 1.0,
+    smallest: float = 1e-6,
+) -> BristleFriction:
+    """Return friction with the stiffest bristles that an integration step allows.
+
+    A stuck inertia J oscillates with ``omega = sqrt(f_c / (delta J))`` and the damping ratio
+    ``tau omega / 2``. Given ``omega h = frequency`` this makes::
+
+        delta = f_c h^2 / (J frequency^2),   tau = 2 damping h / frequency
+
+    Explicit integration of a continuous plant with RK3 or RK5 at a fixed step h takes the
+    default (omega h = 1, poles at -1/h, which RK3 damps by 1/3 per step). A discrete plant
+    that reads the torque at its ticks needs ``frequency=0.5``, four times the displacement:
+    stability requires ``2 damping omega h < 2 - (omega h)^2 / 2``. Examples at h = 1 ms:
+    5 N on 1.5 kg 3.3 um, 102 Nm on 5 kg m^2 21 urad, 3.7 Nm on 0.06 kg m^2 63 urad.
+
+    Args:
+        coulomb: ``f_c`` [Nm], shape (N,).
+        viscous: ``f_v`` [Nm s/rad], shape (N,).
+        inertia: Smallest inertia that friction may see [kg m^2], shape (N,): ``D_M``,
+            for elastic as for rigid joints (it bounds the rigid robot's from below); the
+            mass of a slide.
+        step: Integration step or sampling time h [s].
+        frequency: ``omega h``, in (0, 1.5].
+        damping: Damping ratio of the stuck inertia; larger inertias are damped less.
+        smallest: Lower limit of ``delta`` [rad], for joints with little friction.
+
+    Raises:
+        InputError: If an argument is out of range.
+    """
+    size = np.size(coulomb)
+    f_c = _vector("coulomb", coulomb, size, positive=False)
+    J = _vector("inertia", inertia, size, positive=True)
+    options = {"step": step, "frequency": frequency, "damping": damping, "smallest": smallest}
+    for name, value in options.items():
+        if not 0.0 < value < np.inf:
+            raise InputError(f"friction: {name} = {value!r}; must be positive and finite")
+    if frequency > 1.5:
+        raise InputError(f"friction: frequency = {frequency!r}; must be at most 1.5")
+    delta = np.maximum(f_c * step**2 / (J * frequency**2), smallest)
+    return BristleFriction(f_c, viscous, delta, np.full(size, 2.0 * damping * step / frequency))
+
+
+def _vector(name: str, value: np.ndarray, size: int, positive: bool) -> np.ndarray:
+    array = np.array(value, dtype=float)
+    if array.shape != (size,) or size == 0:
+        raise InputError(f"friction: {name} of shape {array.shape}; must be ({size},), as coulomb")
+    low = array <= 0.0 if positive else array < 0.0
+    if np.any(low | ~np.isfinite(array)):
+        allowed = "positive and finite" if positive else "finite and not negative"
+        raise InputError(f"friction: {name} = {array.tolist()}; must be {allowed}")
+    array.flags.writeable = False
+    return array

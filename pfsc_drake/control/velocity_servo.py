@@ -1,0 +1,166 @@
+"""Joint velocity control: pure formulas."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class ServoGains:
+    """Gains of N joint velocity controllers; arrays of shape (N,), see :class:`VelocityServoLaw`.
+
+    Attributes:
+        proportional: ``K_p`` [Nm s/rad].
+        integral: ``K_i`` [Nm/rad].
+        reference: ``K_w`` [Nm s/rad], weight of the reference in the proportional part.
+        period: Sampling time T [s] that they are for.
+
+    Raises:
+        InputError: If the shapes differ, or a gain or the period is out of range.
+    """
+
+    proportional: np.ndarray
+    integral: np.ndarray
+    reference: np.ndarray
+    period: float
+
+    def __post_init__(self) -> None:
+        size = np.size(self.proportional)
+        for name in ("proportional", "integral", "reference"):
+            positive = name != "integral"
+            object.__setattr__(self, name, _vector(name, getattr(self, name), size, positive))
+        if not 0.0 < self.period < np.inf:
+            raise InputError(f"servo: period = {self.period!r} s; must be positive and finite")
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.proportional.size
+
+
+def servo_gains(
+    inertia: np.ndarray,
+    bandwidth: float | np.ndarray,
+    period: float,
+    integral_rate: float | np.ndarray | None = None,
+) -> ServoGains:
+    """Return gains that make ``v = v_ref / (s / omega + 1)`` of an inertia, at the ticks.
+
+    With ``J v_{k+1} = J v_k + T u_k`` the closed loop has its poles at
+    ``a = exp(-omega T)`` and ``b = exp(-omega_I T)``, and the reference does not excite
+    the second one, so that a step is followed without overshoot::
+
+        K_p = J (2 - a - b) / T,  K_i = J (1 - a)(1 - b) / T^2,  K_w = J (1 - a) / T
+
+    A load is removed with the slower rate ``omega_I``. Where the inertia of a robot is c
+    times the given one, the bandwidth is about ``omega / c``.
+
+    Args:
+        inertia: ``J`` [kg m^2], shape (N,), see :func:`joint_inertia`.
+        bandwidth: ``omega`` [rad/s], of all joints or shape (N,).
+        period: Sampling time T [s].
+        integral_rate: ``omega_I`` [rad/s], likewise; by default a quarter of ``omega``, 0
+            for no integral part.
+
+    Raises:
+        InputError: If an argument is out of range, or ``omega T`` is above 1, where little
+            is left of the margin against loads between the ticks.
+    """
+    J = _vector("inertia", inertia, np.size(inertia), positive=True)
+    if not 0.0 < period < np.inf:
+        raise InputError(f"servo: period = {period!r} s; must be positive and finite")
+    omega = _vector("bandwidth", np.broadcast_to(bandwidth, J.shape), J.size, positive=True)
+    rate = omega / 4.0 if integral_rate is None else np.broadcast_to(integral_rate, J.shape)
+    omega_I = _vector("integral_rate", rate, J.size, positive=False)
+    if np.max(omega) * period > 1.0:
+        raise InputError(
+            f"servo: bandwidth = {np.max(omega):g} rad/s; must be at most 1/period = "
+            f"{1.0 / period:g} rad/s"
+        )
+    a, b = np.exp(-omega * period), np.exp(-omega_I * period)
+    return ServoGains(
+        J * (2.0 - a - b) / period,
+        J * (1.0 - a) * (1.0 - b) / period**2,
+        J * (1.0 - a) / period,
+        period,
+    )
+
+
+def joint_inertia(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
+    """Return the inertia that each drive sees, the others free to hold: ``diag(D_E) + D_M``.
+
+    Args:
+        robot: The robot.
+        q_J: Joint coordinates, shape (N,).
+
+    Returns:
+        Shape (N,) [kg m^2 or kg].
+    """
+    q = ca.SX.sym("q", robot.dimension)
+    D_E = np.array(ca.Function("D_E", [q], [ca.diag(robot.mass_matrix(q))])(q_J)).ravel()
+    return D_E + robot.D_M
+
+
+class VelocityServoLaw:
+    """PI velocity control of the joints with gravity feed-forward, which closes (3.48).
+
+    With the gravity torque ``g`` at the present joint coordinates and the integral part
+    ``x`` [Nm], at every tick::
+
+        u     = g(q_J) + K_w v_ref - K_p v_M + x
+        tau_d = sat(u)
+        x    += K_i T (v_ref + K_w^-1 (tau_d - u) - v_M)
+
+    The integral part follows the reference velocity that the torque limits can realize
+    (Hanus' conditioning), so that it does not wind up while ``tau_d`` is limited.
+
+    Args:
+        gains: Gains, N joints.
+        limits: Largest magnitudes of the drive torques [Nm], shape (N,).
+
+    Raises:
+        InputError: If the limits do not fit the gains or are not positive.
+    """
+
+    def __init__(self, gains: ServoGains, limits: np.ndarray) -> None:
+        self.gains = gains
+        # infinite: a drive without a limit
+        limits = np.asarray(limits, dtype=float)
+        if limits.shape != (gains.dimension,) or not np.all(limits > 0.0):
+            raise InputError(
+                f"servo: limits = {limits.tolist()}; must be {gains.dimension} positive torques"
+            )
+        self.limits = limits
+
+    def torque(
+        self, v: np.ndarray, v_ref: np.ndarray, gravity: np.ndarray, x: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the drive torque and the next integral part, each (N,) [Nm].
+
+        Args:
+            v: Velocity of the motors [rad/s], shape (N,).
+            v_ref: Reference velocity [rad/s], shape (N,).
+            gravity: ``g(q_J)`` [Nm], shape (N,).
+            x: Integral part [Nm], shape (N,).
+        """
+        gains = self.gains
+        u = gravity + gains.reference * v_ref - gains.proportional * v + x
+        tau_d = np.clip(u, -self.limits, self.limits)
+        realizable = v_ref + (tau_d - u) / gains.reference
+        return tau_d, x + gains.integral * gains.period * (realizable - v)
+
+
+def _vector(name: str, value: np.ndarray, size: int, positive: bool) -> np.ndarray:
+    array = np.array(value, dtype=float)
+    if array.shape != (size,) or size == 0:
+        raise InputError(f"servo: {name} of shape {array.shape}; must be ({size},)")
+    low = array <= 0.0 if positive else array < 0.0
+    if np.any(low | ~np.isfinite(array)):
+        allowed = "positive and finite" if positive else "finite and not negative"
+        raise InputError(f"servo: {name} = {array.tolist()}; must be {allowed}")
+    array.flags.writeable = False
+    return array
