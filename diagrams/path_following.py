@@ -149,7 +149,7 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         builder.Connect(generator.GetOutputPort("reference"), leader.GetInputPort("reference"))
         path_point = leader.GetOutputPort("path_point")
     builder.Connect(path_point, controller.GetInputPort("path_point"))
-    builder.Connect(controller.GetOutputPort("drive"), hold.get_input_port())
+    builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
     builder.Connect(hold.get_output_port(), drives.get_input_port())
     builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
     signals = {

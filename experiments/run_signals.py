@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context
 from diagrams.path_following import PathFollowingStation
 from diagrams.replay import RecordedMotion
 from experiments.run_log import RunLog
+from pfsc_drake.control.linearization import path_output_function
 from pfsc_drake.control.path_law import Fault
 from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
 from pfsc_drake.robot.robot_model import pose_function
@@ -38,9 +39,10 @@ def collect_log(station: PathFollowingStation, root: Context) -> RunLog:
             log.add("eta_M", Y[:, 0, 0], "m")
             log.add("xi_M", Y[:, 0, 1:3], "m", ["xi_M_1", "xi_M_2"])
         points = _project(station, pose, linearization.relative_degree)
-        reference = raw["path_point"] if linearization.time_driven else points
-        seen = _seen_from_path(times, pose, linearization.layout, points, reference)
-        Y[:, : seen.shape[1]] = seen[:, : Y.shape[1]]
+        seen = _path_output(station, raw["joint_state"], points)
+        # the orientation errors of trajectory tracking stay those from the moving reference
+        replaced = slice(0, 3) if linearization.time_driven else slice(None)
+        Y[:, :2, replaced] = seen[:, : Y.shape[1], replaced]
     log.add("theta", points[:, linearization.layout.theta], "1")
     log.add("alpha", points[:, linearization.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
@@ -149,36 +151,14 @@ def _project(station: PathFollowingStation, pose: np.ndarray, relative_degree: i
     return points
 
 
-def _seen_from_path(
-    times: np.ndarray,
-    pose: np.ndarray,
-    layout: PathPointLayout,
-    points: np.ndarray,
-    reference: np.ndarray,
+def _path_output(
+    station: PathFollowingStation, joint_state: np.ndarray, points: np.ndarray
 ) -> np.ndarray:
-    """Return the virtual output of a motion of the tool and its difference quotients.
-
-    Args:
-        times: [s], shape (samples,).
-        pose: ``[y_t, R_e]``, shape (samples, 12).
-        layout: Layout of the points.
-        points: The path next to the tool, shape (samples, size).
-        reference: The path where the law takes the reference orientation from.
-
-    Returns:
-        Shape (samples, 2, m).
-    """
-    sigma, slope = (points[:, layout.position][:, i : i + 3] for i in (0, 3))
-    e_par = slope / np.linalg.norm(slope, axis=1, keepdims=True)
-    e_perp, offset = points[:, layout.normal], pose[:, :3] - sigma
-    columns = [points[:, layout.eta][:, 0]]
-    columns += [np.sum(e * offset, axis=1) for e in (e_perp, np.cross(e_par, e_perp))]
-    if layout.oriented:
-        R_e, R_d = _rotations(layout, pose, reference)
-        columns += list(matrix_to_zyx(np.swapaxes(R_d, 1, 2) @ R_e).T)
-    output = np.column_stack(columns)
-    rate = np.gradient(output, times, axis=0) if len(times) > 1 else np.zeros_like(output)
-    return np.stack([output, rate], axis=1)
+    """Return the virtual output of the links and its rate, shape (samples, 2, m)."""
+    n, linearization = station.chain.dimension, station.law.linearization
+    function = path_output_function(station.chain, linearization.layout).map(len(points))
+    Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
+    return Y.T.reshape(len(points), 2, linearization.num_outputs)
 
 
 def _rotations(

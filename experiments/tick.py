@@ -22,7 +22,7 @@ def measure_tick(station: PathFollowingStation, root: Context, log: RunLog) -> n
     Returns:
         Wall clock time of each evaluation [s].
     """
-    drive = station.controller.GetOutputPort("drive")
+    drive = station.controller.GetOutputPort(station.controller.drive_port)
     controller = station.controller.GetMyContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
     plant = station.plant.GetMyMutableContextFromRoot(root)

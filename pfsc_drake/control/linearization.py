@@ -161,6 +161,24 @@ def _linearize(
     return Linearization(function, r, layout, n, m, extrapolated, time_driven)
 
 
+def path_output_function(robot: RobotModel, layout: PathPointLayout) -> ca.Function:
+    """Return the virtual output and its rate of any joint motion.
+
+    Args:
+        robot: The robot.
+        layout: Layout of the path point.
+
+    Returns:
+        CasADi function ``(q, v, path_point) -> Y``, shapes (N,), (N,), (size,) and (m, 2).
+    """
+    q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
+    point = ca.SX.sym("path_point", layout.size)
+    y, R_e = robot.tool_pose(joint_jets([q, v]))
+    output = path_coordinates(y, R_e, _path_geometry(layout, point))
+    Y = ca.horzcat(*[ca.vertcat(*[x.derivative(k) for x in output]) for k in range(2)])
+    return ca.Function("path_output", [q, v, point], [ca.densify(Y)])
+
+
 def _driven_motion(
     robot: RobotModel, law: str, state: DriveState, options: ActuationOptions
 ) -> DrivenMotion:

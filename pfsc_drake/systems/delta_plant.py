@@ -2,10 +2,19 @@
 
 import casadi as ca
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    ContinuousState,
+    EventStatus,
+    LeafSystem,
+)
 
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.delta import DeltaRobot
+
+# a slide this far beyond its travel [m] is at its end but for rounding
+_ROUNDING = 1e-9
 
 
 class DeltaPlant(LeafSystem):
@@ -15,8 +24,10 @@ class DeltaPlant(LeafSystem):
 
         D(q) q'' + C(q, q') q' + g(q) = tau + J_D^T f_ext
 
-    Integrate it by RK3 with error control or by RK4. Where the slides are so far apart that
-    the rods cannot meet, the derivatives are NaN.
+    Integrate it by RK3 with error control or with a fixed step of 1 ms. Nothing holds a slide
+    at the end of its travel, and singular configurations are not far behind it: a step that
+    ends outside the travel fails, so that ``Simulator.AdvanceTo`` raises RuntimeError and says
+    which slide it was. (The constrained plant of ``add_delta_plant`` has stops.)
 
     Ports:
         actuation (input): Drive forces less friction ``tau`` [N], shape (3,).
@@ -46,7 +57,9 @@ class DeltaPlant(LeafSystem):
         self.DeclareVectorOutputPort(
             "tool_position", 3, self._calc_tool_position, prerequisites_of_calc={self.q_ticket()}
         )
+        self.DeclarePerStepPublishEvent(self._check_travel)
         self._robot = robot
+        self._lower, self._upper = robot.gather("position_limits").T
         self._x, self._tau, self._f_ext = np.zeros(2 * n), np.zeros(n), np.zeros(3)
         self._rate, self._y_t = np.zeros(2 * n), np.zeros(3)
         functions = [_dynamics_function(robot), _position_function(robot)]
@@ -77,6 +90,19 @@ class DeltaPlant(LeafSystem):
         self._f_ext[:] = self._external_force.Eval(context) if connected else 0.0
         self._evaluate_dynamics()
         derivatives.SetFromVector(self._rate)
+
+    def _check_travel(self, context: Context) -> EventStatus:
+        q = context.get_continuous_state_vector().CopyToVector()[: self._robot.dimension]
+        # written so that NaN is outside
+        inside = (q >= self._lower - _ROUNDING) & (q <= self._upper + _ROUNDING)
+        if inside.all():
+            return EventStatus.DidNothing()
+        i = int(np.argmin(inside))
+        return EventStatus.Failed(
+            self,
+            f"slide {i + 1} left its travel at t = {context.get_time():.6g} s: q = {q[i]:.6g} m; "
+            f"allowed are {self._lower[i]:.6g} m to {self._upper[i]:.6g} m",
+        )
 
     def _calc_state(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_continuous_state_vector().CopyToVector())

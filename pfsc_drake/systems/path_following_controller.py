@@ -29,8 +29,9 @@ class PathFollowingController(LeafSystem):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         path_point (input): From :class:`PathProjector`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
-        drive (output): Drive torques within their limits [Nm], shape (N,); for
-            velocity servos the reference velocities [rad/s].
+        drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
+            For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
+            m/s]; the attribute ``drive_port`` holds the name.
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
@@ -70,7 +71,9 @@ class PathFollowingController(LeafSystem):
         self._output: OutputPort = self.DeclareVectorOutputPort(
             "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
-        for name in ("drive", "manifold_state", "virtual_input", "status"):
+        self.drive_port = "drive_torque" if r > 1 else "velocity_reference"
+        self._declare_part(self.drive_port, self.layout.drive, sources)
+        for name in ("manifold_state", "virtual_input", "status"):
             self._declare_part(name, getattr(self.layout, name), sources)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)

@@ -96,7 +96,7 @@ class Chain:
         builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
         builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
         builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))
-        builder.ExportOutput(controller.GetOutputPort("drive"), "drive")
+        builder.ExportOutput(controller.GetOutputPort("drive_torque"), "drive")
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self.controller, self.projector = controller, projector

@@ -29,7 +29,7 @@ WIRES = {
         ("log_signals", "u3"),
     },
     ("path_following_controller", "law"): {("log_signals", "u4")},
-    ("path_following_controller", "drive"): {("hold", "u")},
+    ("path_following_controller", "drive_torque"): {("hold", "u")},
     ("hold", "y"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
     ("log_signals", "y0"): {("log", "data")},

@@ -167,7 +167,11 @@ def predicted(coefficients, start, t):
     """Return the solution of the error dynamics (3.67) from a start at rest."""
     companion = np.diag(np.ones(3), 1)
     companion[3] = -np.array(coefficients)
-    return np.array([(expm(companion * time) @ [start, 0.0, 0.0, 0.0])[0] for time in t])
+    step = expm(companion * TICK)
+    errors = [np.array([start, 0.0, 0.0, 0.0])]
+    for _ in t[1:]:
+        errors.append(step @ errors[-1])
+    return np.array(errors)[:, 0]
 
 
 def derivative(x):

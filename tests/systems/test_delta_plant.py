@@ -101,6 +101,23 @@ def test_two_contexts_of_one_plant_do_not_share_results(robot):
         assert np.allclose(result, robot.tool_position(q), rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize(("force", "end"), [(-60.0, "q = -0.0"), (60.0, "q = 0.4")])
+def test_leaving_the_travel_ends_the_simulation_with_a_reason(robot, force, end):
+    """In front of the singular configuration, where steps would become ever smaller."""
+    with pytest.raises(RuntimeError, match=rf"slide 2 left its travel at t = 0\.\d+ s: {end}"):
+        simulate(DeltaPlant(robot), np.full(3, 0.2), None, [-13.0, force, -13.0], None, 5.0)
+
+
+def test_a_state_that_is_not_finite_ends_the_simulation(robot):
+    with pytest.raises(RuntimeError, match="slide 1 left its travel"):
+        simulate(DeltaPlant(robot), np.full(3, np.nan), None, np.zeros(3), None, 0.1)
+
+
+def test_the_ends_of_the_travel_belong_to_it(robot):
+    for q in ([0.0, 0.1, 0.2], [0.4, 0.3, 0.35]):
+        simulate(DeltaPlant(robot), np.array(q), None, np.zeros(3), None, 0.0)
+
+
 def test_where_the_rods_cannot_meet_the_derivatives_are_not_finite(robot):
     longer = load_delta_parameters()
     longer.geometry.l_BC = 0.3

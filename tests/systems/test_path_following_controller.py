@@ -72,7 +72,8 @@ def test_parts_are_the_laws_own(bench):
     law = bench.law
     result = law.evaluate(bench.state, bench.point, bench.reference, np.zeros(3))
     assert np.array_equal(bench.output("law"), result)
-    for name in ("drive", "manifold_state", "virtual_input", "status"):
+    assert np.array_equal(bench.output("drive_torque"), result[law.layout.drive])
+    for name in ("manifold_state", "virtual_input", "status"):
         assert np.array_equal(bench.output(name), result[getattr(law.layout, name)])
     assert bench.system.fault(bench.context) == Fault.NONE
 
@@ -89,10 +90,10 @@ def test_the_integral_of_the_error_accumulates(arm, path, make_law):
 
 
 def test_without_integral_part_nothing_accumulates(bench):
-    before = bench.output("drive")
+    before = bench.output("drive_torque")
     bench.start()
     bench.tick(10)
-    assert np.array_equal(bench.output("drive"), before)
+    assert np.array_equal(bench.output("drive_torque"), before)
 
 
 def test_a_fault_shows_at_once_and_holds(bench, arm):
@@ -108,16 +109,16 @@ def test_a_fault_shows_at_once_and_holds(bench, arm):
     # the measurement is back: the links are held where they are, and braked
     weight = arm.weight(bench.state[:3])
     expected = weight - 30.0 * bench.state[9:]
-    assert np.allclose(bench.output("drive"), expected, rtol=0, atol=1e-9)
+    assert np.allclose(bench.output("drive_torque"), expected, rtol=0, atol=1e-9)
 
 
 def test_a_fault_without_measurement_holds_the_last_good_position(bench, arm):
     bench.start()
     bench.tick(2)
     bench.fix(state=np.full(12, np.nan))
-    assert np.allclose(bench.output("drive"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
+    assert np.allclose(bench.output("drive_torque"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
     bench.tick(2)
-    assert np.allclose(bench.output("drive"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
+    assert np.allclose(bench.output("drive_torque"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
 
 
 def test_a_later_fault_does_not_replace_the_first(bench):
@@ -181,7 +182,7 @@ def test_the_last_ticks_drive_is_extrapolated(path):
 
 def test_every_output_depends_on_every_input_at_once(bench):
     system = bench.system
-    for output in ("law", "drive", "manifold_state", "virtual_input", "status"):
+    for output in ("law", "drive_torque", "manifold_state", "virtual_input", "status"):
         port = int(system.GetOutputPort(output).get_index())
         for name in ("joint_state", "path_point", "reference"):
             assert system.HasDirectFeedthrough(int(system.GetInputPort(name).get_index()), port)
@@ -210,7 +211,7 @@ def closed_loop(arm, path, law, theta):
     builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
     builder.Connect(source.get_output_port(), controller.GetInputPort("reference"))
     # the plant's state does not depend on the torque at once, so nothing is algebraic
-    builder.Connect(controller.GetOutputPort("drive"), plant.get_actuation_input_port())
+    builder.Connect(controller.GetOutputPort("drive_torque"), plant.get_actuation_input_port())
     return builder.Build(), plant, controller
 
 
@@ -241,7 +242,7 @@ def test_a_loop_from_the_drives_to_the_measurement_is_refused(bench):
     builder = DiagramBuilder()
     controller = builder.AddSystem(bench.system)
     gain = builder.AddSystem(MatrixGain(np.ones((12, 3))))
-    builder.Connect(controller.GetOutputPort("drive"), gain.get_input_port())
+    builder.Connect(controller.GetOutputPort("drive_torque"), gain.get_input_port())
     builder.Connect(gain.get_output_port(), controller.GetInputPort("joint_state"))
     with pytest.raises(RuntimeError, match="algebraic loop"):
         builder.Build()
