@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import MatrixGain
+from pydrake.systems.primitives import Adder, MatrixGain, ZeroOrderHold
 
 from diagrams.robot import tool_frame
 from diagrams.scenario import PathFollowingScenario
@@ -12,6 +12,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.systems.decoupled_force import DecoupledForce
 from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.scripted_force import ScriptedForce
 from pfsc_drake.systems.sensor_failure import SensorFailure
@@ -71,16 +72,35 @@ def add_forces(
         scenario: The scenario.
         layout: Layout of the path point.
         ports: ``joint_state`` and ``path_point``.
+
+    Raises:
+        InputError: If a force does not suit the robot.
     """
-    if not scenario.forces:
+    period, sources = scenario.controller.sampling_time, []
+    if scenario.forces:
+        profile = ForceProfile(scenario.forces)
+        operator = builder.AddNamedSystem("operator", ScriptedForce(profile, layout, period))
+        if profile.needs_path:
+            builder.Connect(ports["path_point"], operator.GetInputPort("path_point"))
+        sources.append(operator.GetOutputPort("wrench"))
+    pulse = scenario.hold_back
+    if pulse.force != 0.0:
+        if not layout.oriented:
+            raise InputError("hold_back.force: needs a path with orientation and six axes")
+        shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
+        brake = builder.AddNamedSystem("hold_back", DecoupledForce(chain, layout, shape, period))
+        for name in ("joint_state", "path_point"):
+            builder.Connect(ports[name], brake.GetInputPort(name))
+        sources.append(brake.GetOutputPort("wrench"))
+    if not sources:
         return {}
-    profile = ForceProfile(scenario.forces)
-    operator = builder.AddNamedSystem(
-        "operator", ScriptedForce(profile, layout, scenario.controller.sampling_time)
-    )
-    if profile.needs_path:
-        builder.Connect(ports["path_point"], operator.GetInputPort("path_point"))
-    wrench = operator.GetOutputPort("wrench")
+    total = builder.AddNamedSystem("wrench", Adder(len(sources), 6))
+    for i, source in enumerate(sources):
+        builder.Connect(source, total.get_input_port(i))
+    # held over a tick, so that it is computed once and not in every stage of the integrator
+    hold = builder.AddNamedSystem("wrench_hold", ZeroOrderHold(period, 6))
+    builder.Connect(total.get_output_port(), hold.get_input_port())
+    wrench = hold.get_output_port()
     contact = builder.AddNamedSystem(
         "external_wrench", ExternalWrench(tool_frame(plant, scenario.robot), chain)
     )

@@ -28,6 +28,7 @@ __all__ = [
     "ControllerParameters",
     "ForcePulse",
     "GainParameters",
+    "HoldBackParameters",
     "Keyframe",
     "LawGains",
     "Line",
@@ -99,6 +100,31 @@ class StartParameters:
     def __post_init__(self) -> None:
         require_numbers("offset", self.offset, 2)
         require_numbers("rotation_deg", self.rotation_deg, 3)
+        finite = bool(np.isfinite(self.posture_deg).all())
+        require(finite, "posture_deg", self.posture_deg, "finite numbers")
+
+
+@dc.dataclass
+class HoldBackParameters:
+    """A wrench that holds the robot back along its path and has no other effect (Sec. 3.8.4).
+
+    Attributes:
+        begin: When it leaves zero [s].
+        end: When it is zero again [s].
+        force: Along the tangent [N], negative against growing ``eta``; 0 for none.
+        ramp: Time from zero to full and back [s].
+    """
+
+    begin: float = 0.0
+    end: float = 1.0
+    force: float = 0.0
+    ramp: float = 0.05
+
+    def __post_init__(self) -> None:
+        require(np.isfinite(self.force), "force", self.force, "a finite number")
+        require_positive("ramp", self.ramp)
+        long_enough = 2.0 * self.ramp <= (self.end - self.begin) * (1.0 + 1e-9)
+        require(long_enough, "end", self.end, "begin + 2 ramp or later")
 
 
 @dc.dataclass
@@ -135,7 +161,7 @@ class SimulationParameters:
     def __post_init__(self) -> None:
         schemes = GetIntegrationSchemes()
         require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
-        require_positive("max_step", self.max_step)
+        require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
         require_positive("frame_period", self.frame_period)
         require_not_negative("accuracy", self.accuracy)
         # their error control works on stale values after a rejected step
@@ -176,6 +202,7 @@ class PathFollowingScenario:
         start: Where it starts.
         simulation: How it is integrated.
         forces: Wrenches on the tool over time.
+        hold_back: A wrench that only slows the robot down.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -191,11 +218,14 @@ class PathFollowingScenario:
     start: StartParameters = dc.field(default_factory=StartParameters)
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)
     forces: list[ForcePulse] = dc.field(default_factory=list)
+    hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        plain = not set(self.name) & set("/\\:") and self.name not in (".", "..")
+        require(plain, "name", self.name, "a name without slashes and colons")
         require_not_negative("duration", self.duration)
         require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:

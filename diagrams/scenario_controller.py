@@ -79,6 +79,9 @@ class ControllerParameters:
         require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
         for law in self.gains:
             require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
-        require_positive("sampling_time", self.sampling_time)
+        in_range = 1e-5 <= self.sampling_time <= 0.1
+        require(
+            in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"
+        )
         require_positive("effort_scale", self.effort_scale)
         require_not_negative("brake_damping", self.brake_damping)

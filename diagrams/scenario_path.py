@@ -77,7 +77,8 @@ class Waypoints:
         require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
 
 
-PathShape = Union[BentLemniscate, Circle, Line, Waypoints]  # noqa: UP007 (Drake's YAML needs it)
+# the first is what a shape without a tag means
+PathShape = Union[Waypoints, BentLemniscate, Circle, Line]  # noqa: UP007 (Drake's YAML needs it)
 
 
 @dc.dataclass

@@ -91,7 +91,8 @@ def run_scenario(
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
         log.attributes = standard_attributes(scenario.name)
-        log.attributes["fault"] = result.fault or ""
+        if result.fault is not None:
+            log.attributes["fault"] = result.fault
         log.write(out / "log.h5")
         motion = collect_motion(station, result.root, settings.simulation.frame_period)
         progress(end, "measuring the tick")

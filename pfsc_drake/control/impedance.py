@@ -221,8 +221,8 @@ class ImpedanceLaw:
         self._response_order = min(response_order, relative_degree)
         kinds = [parameters.tangential, parameters.transversal, parameters.rotational]
         # they may have been changed since they were made
-        for profile_or_kind in (p for k in kinds for p in (k.mass, k.damping, k.stiffness, k)):
-            profile_or_kind.__post_init__()
+        for part in (p for k in kinds for p in (k.mass, k.damping, k.stiffness, k)):
+            part.__post_init__()
         self._repeats = [1, 2] if num_outputs == 3 else [1, 2, 3]
         table = [[kind.mass, kind.damping, kind.stiffness] for kind in kinds[: len(self._repeats)]]
         self._profiles = [[(p.over, p.interpolant()) for p in row] for row in table]

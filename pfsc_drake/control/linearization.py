@@ -134,7 +134,7 @@ def _linearize(
     external = ca.vertsplit(tau_ext, n) if r > 1 else []
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
     motion = _driven_motion(robot, law, DriveState(q_J, v_J, q_M, v_M, external), options)
-    path = _path_geometry(layout, point)
+    path = path_geometry(layout, point)
     eta_d = Jet.from_derivatives(ca.vertsplit(progress))
 
     def virtual_output(derivatives: list[ca.SX]) -> list[Jet]:
@@ -174,7 +174,7 @@ def path_output_function(robot: RobotModel, layout: PathPointLayout) -> ca.Funct
     q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
     point = ca.SX.sym("path_point", layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, v]))
-    output = path_coordinates(y, R_e, _path_geometry(layout, point))
+    output = path_coordinates(y, R_e, path_geometry(layout, point))
     Y = ca.horzcat(*[ca.vertcat(*[x.derivative(k) for x in output]) for k in range(2)])
     return ca.Function("path_output", [q, v, point], [ca.densify(Y)])
 
@@ -210,7 +210,8 @@ def _driven_motion(
     return models[law](robot, state)
 
 
-def _path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
+def path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
+    """Return the parts of a path point as the path map needs them."""
     quaternion = ca.vertsplit(point[layout.quaternion], 4) if layout.oriented else []
     return PathGeometry(
         eta=point[layout.eta],

@@ -222,7 +222,7 @@ class PathLaw:
             self._inverse.accepts(solution)
             and alpha < self._max_alpha
             and status != PathStatus.NOT_CONVERGED
-            and math.isfinite(result.sum())
+            and math.isfinite(result.sum() + self._state.sum())
         ):
             return Fault.NONE
         inputs = (self._state, self._reference, self._integral, self._tau_ext)

@@ -1,7 +1,7 @@
 """The DELTA robot with linear drives, as the control laws see it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -31,7 +31,7 @@ class DeltaRobot:
         parameters: Physical parameters; not to be changed afterwards.
     """
 
-    parameters: DeltaParameters = field(default_factory=DeltaParameters)
+    parameters: DeltaParameters
 
     @property
     def dimension(self) -> int:

@@ -1,4 +1,8 @@
-"""Kinematics of a DELTA robot with linear drives on jets (Sec. 2.2)."""
+"""Kinematics of a DELTA robot with linear drives on jets (Sec. 2.2).
+
+In (2.23) the last vector, from C_i to E, is ``-l_EC e_xi``; the dissertation's text has lost the
+sign, while (2.24) and all that follows, with ``l = l_A - l_EC``, hold with it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

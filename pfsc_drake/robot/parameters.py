@@ -291,9 +291,8 @@ def load_parameters(robot: str | Path) -> RobotParameters:
     if not path.suffix:
         path = models_directory() / path / "parameters.yaml"
         if not path.is_file():
-            known = sorted(
-                file.parent.name for file in models_directory().glob("*/parameters.yaml")
-            )
+            arms = {file.parent.name for file in models_directory().glob("*/*.sdf")}
+            known = sorted(arms)
             raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
     return load_file(RobotParameters, path)
 

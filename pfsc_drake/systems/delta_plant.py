@@ -95,14 +95,14 @@ class DeltaPlant(LeafSystem):
         q = context.get_continuous_state_vector().CopyToVector()[: self._robot.dimension]
         # written so that NaN is outside
         inside = (q >= self._lower - _ROUNDING) & (q <= self._upper + _ROUNDING)
-        if inside.all():
-            return EventStatus.DidNothing()
-        i = int(np.argmin(inside))
-        return EventStatus.Failed(
-            self,
-            f"slide {i + 1} left its travel at t = {context.get_time():.6g} s: q = {q[i]:.6g} m; "
-            f"allowed are {self._lower[i]:.6g} m to {self._upper[i]:.6g} m",
-        )
+        if not inside.all():
+            i = int(np.argmin(inside))
+            # EventStatus.Failed from Python crashes the process
+            raise RuntimeError(
+                f"slide {i + 1} left its travel at t = {context.get_time():.6g} s: "
+                f"q = {q[i]:.6g} m; allowed are {self._lower[i]:.6g} m to {self._upper[i]:.6g} m"
+            )
+        return EventStatus.DidNothing()
 
     def _calc_state(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_continuous_state_vector().CopyToVector())

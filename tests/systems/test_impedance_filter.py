@@ -277,7 +277,7 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
         ("transform", "filter.manifold_force"),
         ("controller.manifold_state", "filter.manifold_state"),
         ("filter.reference", "controller.reference"),
-        ("controller.drive", "hold"),
+        ("controller.drive_torque", "hold"),
     ):
         (a, _, output), (b, _, name) = source.partition("."), sink.partition(".")
         begin = parts[a].GetOutputPort(output) if output else parts[a].get_output_port()
