@@ -1,4 +1,4 @@
-"""The command line: ``list`` the shipped scenarios, ``run`` one.
+"""The command line: ``list`` the shipped scenarios, ``run`` one, ``compare`` runs.
 
 Exit status: 0 the run completed; 2 the input is wrong (one line on stderr); 3 a fault stopped the
 run, everything logged so far is kept; 130 interrupted.
@@ -89,6 +89,18 @@ def run_command(
         _print_error("interrupted")
         status = INTERRUPTED
     raise typer.Exit(status)
+
+
+@app.command("compare")
+def compare_command(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs.")],
+    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/comparison"),
+) -> None:
+    """Put several runs on one page."""
+    from experiments.compare import write_comparison
+
+    page = write_comparison(runs, out)
+    Console().print(f"Open the comparison: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
