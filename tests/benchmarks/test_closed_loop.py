@@ -1,0 +1,39 @@
+"""Wall clock time of a fifth of a second of the shipped closed loops."""
+
+from pathlib import Path
+
+import pytest
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+
+from diagrams.path_following import build_path_following
+from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.typed_yaml import load_file
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
+SPAN = 0.2
+
+
+@pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
+def test_closed_loop(benchmark, name):
+    scenario = load_file(PathFollowingScenario, SCENARIOS / f"{name}.yaml")
+    station = build_path_following(scenario, SCENARIOS)
+    simulator = Simulator(station.diagram)
+    ApplySimulatorConfig(
+        SimulatorConfig(
+            integration_scheme=scenario.simulation.integrator,
+            max_step_size=scenario.simulation.max_step,
+            use_error_control=False,
+        ),
+        simulator,
+    )
+    root = simulator.get_mutable_context()
+
+    def restart():
+        root.SetTime(0.0)
+        station.set_start(root)
+        simulator.Initialize()
+
+    benchmark.pedantic(lambda: simulator.AdvanceTo(SPAN), setup=restart, rounds=5, iterations=1)
+    assert root.get_time() == SPAN
+    if benchmark.stats is not None:
+        benchmark.extra_info["real_time_factor"] = SPAN / benchmark.stats.stats.median
