@@ -1,4 +1,4 @@
-"""The command line: ``list`` the shipped scenarios, ``run`` one, ``compare`` runs.
+"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``study`` the laws.
 
 Exit status: 0 the run completed; 2 the input is wrong (one line on stderr); 3 a fault stopped the
 run, everything logged so far is kept; 130 interrupted.
@@ -101,6 +101,19 @@ def compare_command(
 
     page = write_comparison(runs, out)
     Console().print(f"Open the comparison: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
+
+
+@app.command("study")
+def study_command(
+    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
+) -> None:
+    """Which law when: all laws on joints of rising stiffness (about half a minute)."""
+    from experiments.stiffness_study import write_study
+
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    console = Console()
+    page = write_study(out, lambda line: console.print(line, highlight=False, markup=False))
+    console.print(f"Open the study: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
