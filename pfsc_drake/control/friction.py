@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.errors import InputError
 
 
@@ -59,7 +60,11 @@ class BristleFriction:
         size = np.size(self.coulomb)
         for name in ("coulomb", "viscous", "presliding", "relaxation"):
             positive = name in ("presliding", "relaxation")
-            object.__setattr__(self, name, _vector(name, getattr(self, name), size, positive))
+            object.__setattr__(
+                self,
+                name,
+                checked_vector("friction", name, getattr(self, name), size, positive=positive),
+            )
 
     @property
     def dimension(self) -> int:
@@ -155,8 +160,8 @@ def bristles_for_step(
         InputError: If an argument is out of range.
     """
     size = np.size(coulomb)
-    f_c = _vector("coulomb", coulomb, size, positive=False)
-    J = _vector("inertia", inertia, size, positive=True)
+    f_c = checked_vector("friction", "coulomb", coulomb, size, positive=False)
+    J = checked_vector("friction", "inertia", inertia, size, positive=True)
     options = {"step": step, "frequency": frequency, "damping": damping, "smallest": smallest}
     for name, value in options.items():
         if not 0.0 < value < np.inf:
@@ -165,15 +170,3 @@ def bristles_for_step(
         raise InputError(f"friction: frequency = {frequency!r}; must be at most 1.5")
     delta = np.maximum(f_c * step**2 / (J * frequency**2), smallest)
     return BristleFriction(f_c, viscous, delta, np.full(size, 2.0 * damping * step / frequency))
-
-
-def _vector(name: str, value: np.ndarray, size: int, positive: bool) -> np.ndarray:
-    array = np.array(value, dtype=float)
-    if array.shape != (size,) or size == 0:
-        raise InputError(f"friction: {name} of shape {array.shape}; must be ({size},), as coulomb")
-    low = array <= 0.0 if positive else array < 0.0
-    if np.any(low | ~np.isfinite(array)):
-        allowed = "positive and finite" if positive else "finite and not negative"
-        raise InputError(f"friction: {name} = {array.tolist()}; must be {allowed}")
-    array.flags.writeable = False
-    return array

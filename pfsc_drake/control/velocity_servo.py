@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -32,7 +33,11 @@ class ServoGains:
         size = np.size(self.proportional)
         for name in ("proportional", "integral", "reference"):
             positive = name != "integral"
-            object.__setattr__(self, name, _vector(name, getattr(self, name), size, positive))
+            object.__setattr__(
+                self,
+                name,
+                checked_vector("servo", name, getattr(self, name), size, positive=positive),
+            )
         if not 0.0 < self.period < np.inf:
             raise InputError(f"servo: period = {self.period!r} s; must be positive and finite")
 
@@ -70,12 +75,14 @@ def servo_gains(
         InputError: If an argument is out of range, or ``omega T`` is above 1, where little
             is left of the margin against loads between the ticks.
     """
-    J = _vector("inertia", inertia, np.size(inertia), positive=True)
+    J = checked_vector("servo", "inertia", inertia, np.size(inertia), positive=True)
     if not 0.0 < period < np.inf:
         raise InputError(f"servo: period = {period!r} s; must be positive and finite")
-    omega = _vector("bandwidth", np.broadcast_to(bandwidth, J.shape), J.size, positive=True)
+    omega = checked_vector(
+        "servo", "bandwidth", np.broadcast_to(bandwidth, J.shape), J.size, positive=True
+    )
     rate = omega / 4.0 if integral_rate is None else np.broadcast_to(integral_rate, J.shape)
-    omega_I = _vector("integral_rate", rate, J.size, positive=False)
+    omega_I = checked_vector("servo", "integral_rate", rate, J.size, positive=False)
     if np.max(omega) * period > 1.0:
         raise InputError(
             f"servo: bandwidth = {np.max(omega):g} rad/s; must be at most 1/period = "
@@ -152,15 +159,3 @@ class VelocityServoLaw:
         tau_d = np.clip(u, -self.limits, self.limits)
         realizable = v_ref + (tau_d - u) / gains.reference
         return tau_d, x + gains.integral * gains.period * (realizable - v)
-
-
-def _vector(name: str, value: np.ndarray, size: int, positive: bool) -> np.ndarray:
-    array = np.array(value, dtype=float)
-    if array.shape != (size,) or size == 0:
-        raise InputError(f"servo: {name} of shape {array.shape}; must be ({size},)")
-    low = array <= 0.0 if positive else array < 0.0
-    if np.any(low | ~np.isfinite(array)):
-        allowed = "positive and finite" if positive else "finite and not negative"
-        raise InputError(f"servo: {name} = {array.tolist()}; must be {allowed}")
-    array.flags.writeable = False
-    return array
