@@ -14,6 +14,7 @@ from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.decoupled_force import DecoupledForce
 from pfsc_drake.systems.external_wrench import ExternalWrench
+from pfsc_drake.systems.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.systems.scripted_force import ScriptedForce
 from pfsc_drake.systems.sensor_failure import SensorFailure
 
@@ -35,14 +36,16 @@ def add_joint_state(
         scenario: The scenario.
 
     Raises:
-        InputError: If a sensor is to fail that does not exist.
+        InputError: If the encoders do not suit the robot, or a sensor is to fail that does
+            not exist.
     """
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
     builder.Connect(plant.get_state_output_port(), encoders.get_input_port())
+    measured = _add_imperfection(builder, encoders.get_output_port(), chain, scenario)
     failure = scenario.simulation.sensor_failure
     if failure.time < 0.0:
-        return encoders.get_output_port()
+        return measured
     size = 4 * chain.dimension
     if not 0 <= failure.component < size:
         raise InputError(
@@ -51,8 +54,26 @@ def add_joint_state(
     broken = builder.AddNamedSystem(
         "sensor_failure", SensorFailure(size, failure.component, failure.time)
     )
-    builder.Connect(encoders.get_output_port(), broken.GetInputPort("measured"))
+    builder.Connect(measured, broken.GetInputPort("measured"))
     return broken.GetOutputPort("delivered")
+
+
+def _add_imperfection(
+    builder: DiagramBuilder,
+    joint_state: OutputPort,
+    chain: SerialChain,
+    scenario: PathFollowingScenario,
+) -> OutputPort:
+    """Add increments and difference quotients, if there are any."""
+    options = scenario.encoders
+    if options == EncoderOptions():
+        return joint_state
+    period = scenario.controller.sampling_time
+    if scenario.controller.law == "velocity_servo":
+        period = scenario.servo.period or period
+    real = builder.AddNamedSystem("encoder_increments", JointEncoders(chain, options, period))
+    builder.Connect(joint_state, real.GetInputPort("joint_state"))
+    return real.GetOutputPort("joint_state")
 
 
 def add_forces(

@@ -37,7 +37,7 @@ from pfsc_drake.geometry import (
     zyx_to_quaternion,
     zyz_to_quaternion,
 )
-from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 
 _EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 _COORDINATES = {3: ("eta", "xi", "xi"), 6: ("eta", "xi", "xi", "phi", "phi", "phi")}
@@ -112,7 +112,7 @@ def _orientation(
     )
 
 
-def make_law(parameters: ControllerParameters, chain: SerialChain, oriented: bool) -> PathLaw:
+def make_law(parameters: ControllerParameters, chain: RobotModel, oriented: bool) -> PathLaw:
     """Return the path following law of a robot.
 
     Args:
@@ -124,11 +124,6 @@ def make_law(parameters: ControllerParameters, chain: SerialChain, oriented: boo
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
     """
     law = parameters.law
-    if law == "velocity_servo":
-        raise InputError(
-            "controller.law: 'velocity_servo' gives joint velocities; "
-            "the robot's drives take torques, and no servo is between them"
-        )
     damping = parameters.boundary_layer_damping
     linearize = linearize_path if parameters.manifold == "path" else linearize_trajectory
     linearization = linearize(

@@ -1,4 +1,4 @@
-"""Path following station: robot, projector, law, hold and log in one diagram."""
+"""Path following station: robot, projector, law, drives and log in one diagram."""
 
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -6,11 +6,9 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import (
-    MatrixGain,
-    ZeroOrderHold,
-)
 
+from diagrams.compliance import add_compliance, compliance_warnings, reference_order
+from diagrams.drives import add_drives, add_friction
 from diagrams.measurement import add_forces, add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.robot import add_robot, tool_frame
@@ -48,7 +46,9 @@ class PathFollowingStation:
         projector: Projector system.
         controller: Controller system.
         log: Log of ``joint_state``, ``tool_pose``, ``path_point``, ``reference``, ``law``,
-            with forces also ``wrench_ext``, ``tau_ext``.
+            with forces also ``wrench_ext``, ``tau_ext``; with compliance what
+            :func:`add_compliance` returns, with servos ``drive_torque``, with friction
+            ``friction_torque``.
         reference_duration: Length of the reference motion [s].
         initial_state: State of the plant at the start.
         initial_theta: Path parameter at the start.
@@ -129,36 +129,41 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     controller = builder.AddNamedSystem(
         "path_following_controller", PathFollowingController(law, period)
     )
+    order = reference_order(scenario, linearization)
     generator = builder.AddNamedSystem(
-        "reference_generator",
-        ReferenceGenerator(eta_p, relative_degree, linearization.num_outputs),
+        "reference_generator", ReferenceGenerator(eta_p, order, linearization.num_outputs)
     )
-    hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
-    drives = builder.AddNamedSystem("drives", MatrixGain(_drive_order(plant, coordinates)))
 
     tool_pose = kinematics.GetOutputPort("tool_pose")
     path_point = projector.GetOutputPort("path_point")
+    desired = generator.GetOutputPort("reference")
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
     builder.Connect(joint_state, controller.GetInputPort("joint_state"))
-    builder.Connect(generator.GetOutputPort("reference"), controller.GetInputPort("reference"))
     if linearization.time_driven:
         leader = builder.AddNamedSystem(
             "trajectory_point", TrajectoryPoint(path, relative_degree, linearization.num_outputs)
         )
-        builder.Connect(generator.GetOutputPort("reference"), leader.GetInputPort("reference"))
+        builder.Connect(desired, leader.GetInputPort("reference"))
         path_point = leader.GetOutputPort("path_point")
     builder.Connect(path_point, controller.GetInputPort("path_point"))
-    builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
-    builder.Connect(hold.get_output_port(), drives.get_input_port())
-    builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
     signals = {
         "joint_state": joint_state,
         "tool_pose": tool_pose,
         "path_point": path_point,
-        "reference": generator.GetOutputPort("reference"),
+        "reference": desired,
         "law": controller.GetOutputPort("law"),
     }
+    if scenario.compliance.is_given:
+        manifold_state = controller.GetOutputPort("manifold_state")
+        inputs = signals | {"desired_reference": desired, "manifold_state": manifold_state}
+        signals |= add_compliance(builder, plant, chain, scenario, linearization, inputs)
+    builder.Connect(signals["reference"], controller.GetInputPort("reference"))
+    drive = {"drive": controller.GetOutputPort(controller.drive_port)}
+    signals |= add_drives(
+        builder, plant, chain, coordinates, scenario, signals | drive, initial_state
+    )
+    signals |= add_friction(builder, plant, chain, coordinates, scenario, folder)
     signals |= add_forces(builder, plant, chain, scenario, linearization.layout, signals)
     log = add_log(builder, signals, period)
     diagram = builder.Build()
@@ -177,7 +182,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_state,
         initial_theta,
         on_motors,
-        _warnings(law_name, chain, coordinates.link_rows @ initial_state, period),
+        _warnings(law_name, chain, coordinates.link_rows @ initial_state, period)
+        + compliance_warnings(scenario),
     )
 
 
@@ -196,10 +202,3 @@ def _warnings(
         "law 'elastic' loses accuracy and then oscillates: sample faster or take the law "
         "'singular_perturbation'"
     ]
-
-
-def _drive_order(plant: MultibodyPlant, coordinates: PlantCoordinates) -> np.ndarray:
-    """Return the matrix from the chain's drives to the plant's actuation."""
-    order = np.zeros((plant.num_actuators(), len(coordinates.actuators)))
-    order[coordinates.actuators, np.arange(len(coordinates.actuators))] = 1.0
-    return order

@@ -63,7 +63,7 @@ def build_replay(
         "tool_pose": motion.tool_pose,
         "path_point": motion.path_point,
     }
-    sources = {name: _add_source(builder, name, motion.times, x) for name, x in signals.items()}
+    sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
     to_pose = builder.AddNamedSystem("to_pose", MultibodyPositionToGeometryPose(plant))
     builder.Connect(sources["positions"], to_pose.get_input_port())
     builder.Connect(
@@ -89,9 +89,17 @@ def _aim_camera(path: Path, meshcat: Meshcat) -> None:
     meshcat.SetCameraPose(target + reach * np.array([0.6, -0.9, 0.35]), target)
 
 
-def _add_source(
+def add_source(
     builder: DiagramBuilder, name: str, times: np.ndarray, samples: np.ndarray
 ) -> OutputPort:
+    """Add a source that plays samples, linear in between, and return its output.
+
+    Args:
+        builder: Builder of the diagram.
+        name: Name of the source.
+        times: Times of the samples [s], shape (frames,).
+        samples: Shape (frames, size).
+    """
     trajectory = PiecewisePolynomial.FirstOrderHold(times, samples.T)
     return builder.AddNamedSystem(name, TrajectorySource(trajectory)).get_output_port()
 

@@ -9,7 +9,9 @@ import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes
 
 from diagrams.checks import require, require_not_negative, require_numbers, require_positive
+from diagrams.scenario_compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario_controller import ControllerParameters, GainParameters, LawGains
+from diagrams.scenario_drives import JointFrictionParameters, ServoParameters
 from diagrams.scenario_path import (
     BentLemniscate,
     Circle,
@@ -21,14 +23,18 @@ from diagrams.scenario_path import (
 )
 from pfsc_drake.control.force_profile import ForcePulse
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
+from pfsc_drake.systems.joint_encoders import EncoderOptions
 
 __all__ = [
     "BentLemniscate",
     "Circle",
+    "ComplianceParameters",
     "ControllerParameters",
+    "EncoderOptions",
     "ForcePulse",
     "GainParameters",
     "HoldBackParameters",
+    "JointFrictionParameters",
     "Keyframe",
     "LawGains",
     "Line",
@@ -38,6 +44,8 @@ __all__ = [
     "ReferenceParameters",
     "RobotParameters",
     "SensorFailureParameters",
+    "SensorParameters",
+    "ServoParameters",
     "SimulationParameters",
     "StartParameters",
     "Target",
@@ -203,6 +211,11 @@ class PathFollowingScenario:
         simulation: How it is integrated.
         forces: Wrenches on the tool over time.
         hold_back: A wrench that only slows the robot down.
+        servo: Velocity controllers of the joints, for the law ``velocity_servo``.
+        friction: Friction of the joints.
+        encoders: What the encoders do to the joint state.
+        compliance: How the tool yields to measured forces.
+        sensor: The force/torque sensor that measures them.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -219,6 +232,11 @@ class PathFollowingScenario:
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)
     forces: list[ForcePulse] = dc.field(default_factory=list)
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
+    servo: ServoParameters = dc.field(default_factory=ServoParameters)
+    friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+    encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)
+    compliance: ComplianceParameters = dc.field(default_factory=ComplianceParameters)
+    sensor: SensorParameters = dc.field(default_factory=SensorParameters)
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)

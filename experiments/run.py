@@ -12,9 +12,9 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.block_diagram import block_diagram_svg
-from diagrams.path_following import PathFollowingStation, build_path_following
-from diagrams.replay import RecordedMotion, build_replay, record
+from diagrams.replay import RecordedMotion, record
 from diagrams.scenario import PathFollowingScenario, Waypoints
+from diagrams.stations import Station, build_station, build_station_replay, load_settings
 from experiments.figures import write_figures
 from experiments.metrics import Metrics
 from experiments.path_metrics import metric_names, path_following_metrics
@@ -27,7 +27,6 @@ from experiments.scenario_file import ScenarioFile
 from experiments.simulation import simulate
 from experiments.tick import measure_tick
 from pfsc_drake.errors import InputError
-from pfsc_drake.typed_yaml import load_typed
 
 _PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
@@ -73,9 +72,9 @@ def run_scenario(
         InputError: If the scenario is wrong; nothing has moved then.
     """
     progress(0.0, "preparing")
-    settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
+    settings = load_settings(scenario.data, str(scenario.path))
     try:
-        station = build_path_following(settings, scenario.path.parent)
+        station = build_station(settings, scenario.path.parent)
         _check_targets(settings, station)
     except InputError as error:
         raise InputError(f"{scenario.path}: {error}") from None
@@ -129,7 +128,7 @@ def run_scenario(
     return RunOutcome(result.fault, report, metrics, station.warnings)
 
 
-def _check_targets(settings: PathFollowingScenario, station: PathFollowingStation) -> None:
+def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     """Refuse a target for a metric that the run will not have."""
     linearization = station.law.linearization
     known = [
@@ -175,7 +174,7 @@ def _metrics(log: RunLog, settings: PathFollowingScenario) -> Metrics:
     )
 
 
-def _path_points(station: PathFollowingStation) -> np.ndarray:
+def _path_points(station: Station) -> np.ndarray:
     """Points of the path to draw [m], shape (k, 3)."""
     curve = station.path.position
     return curve.derivatives(np.linspace(*curve.domain, _PATH_POINTS), 0)[:, 0, :]
@@ -184,16 +183,15 @@ def _path_points(station: PathFollowingStation) -> np.ndarray:
 def _write_recording(
     settings: PathFollowingScenario,
     folder: Path,
-    station: PathFollowingStation,
+    station: Station,
     motion: RecordedMotion,
     out: Path,
 ) -> Path:
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    period = settings.simulation.frame_period
-    layout = station.law.linearization.layout
-    diagram = build_replay(settings.robot, folder, station.path, layout, motion, meshcat, period)
+    diagram = build_station_replay(settings, folder, station, motion, meshcat)
+    recording = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
     page = out / "recording.html"
-    page.write_text(record(diagram, meshcat, motion.times[-1], period), encoding="utf-8")
+    page.write_text(recording, encoding="utf-8")
     return page
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.path_following import PathFollowingStation
 from diagrams.replay import RecordedMotion
+from diagrams.stations import Station
 from experiments.run_log import RunLog
 from pfsc_drake.control.linearization import path_output_function
 from pfsc_drake.control.path_law import Fault
@@ -12,7 +12,7 @@ from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_ma
 from pfsc_drake.robot.robot_model import pose_function
 
 
-def collect_log(station: PathFollowingStation, root: Context) -> RunLog:
+def collect_log(station: Station, root: Context) -> RunLog:
     """Return the signals of a run, named and with units as scripts expect them.
 
     The tool's pose and its path coordinates are those of the links, also where the law
@@ -25,6 +25,9 @@ def collect_log(station: PathFollowingStation, root: Context) -> RunLog:
     times, raw = station.log.read(root)
     log = RunLog(times)
     _add_joints(log, station, raw["joint_state"], raw["law"])
+    if "friction_torque" in raw:
+        labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_f", raw["friction_torque"], _joint_units(station)[2], labels)
     pose = _tool_poses(station, raw["joint_state"])
     log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
     log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
@@ -52,7 +55,7 @@ def collect_log(station: PathFollowingStation, root: Context) -> RunLog:
     return log
 
 
-def _tool_poses(station: PathFollowingStation, joint_state: np.ndarray) -> np.ndarray:
+def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
     """Return ``[y_t, R_e]`` of the links, shape (samples, 12)."""
     q_J = joint_state[:, : station.chain.dimension]
     if len(q_J) == 0:
@@ -60,7 +63,7 @@ def _tool_poses(station: PathFollowingStation, joint_state: np.ndarray) -> np.nd
     return np.array(pose_function(station.chain).map(len(q_J))(q_J.T)).T
 
 
-def collect_motion(station: PathFollowingStation, root: Context, period: float) -> RecordedMotion:
+def collect_motion(station: Station, root: Context, period: float) -> RecordedMotion:
     """Return the motion of a run at the frames of a recording, as far as it is finite.
 
     Args:
@@ -77,25 +80,22 @@ def collect_motion(station: PathFollowingStation, root: Context, period: float) 
     states = [station.coordinates.plant_state(x) for x in state]
     num_states = station.coordinates.num_states
     positions = np.array(states).reshape(len(frames), num_states)
-    positions = positions[:, : station.plant.num_positions()]
+    continuous = station.plant.GetMyContextFromRoot(root).get_continuous_state()
+    positions = positions[:, : continuous.num_q()]
     return RecordedMotion(
         times[frames], positions, _tool_poses(station, state), raw["path_point"][frames]
     )
 
 
-def _add_joints(
-    log: RunLog, station: PathFollowingStation, state: np.ndarray, law: np.ndarray
-) -> None:
+def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
     chain, n = station.chain, station.chain.dimension
     q_J, v_J, q_M, v_M = np.hsplit(state, 4)
     angle, rate, effort = _joint_units(station)
     axes = [str(i + 1) for i in range(n)]
-    for name, values, unit in (
-        ("q_J", q_J, angle),
-        ("v_J", v_J, rate),
-        ("q_M", q_M, angle),
-        ("v_M", v_M, rate),
-    ):
+    moved = [("q_J", q_J, angle), ("v_J", v_J, rate)]
+    if np.isfinite(chain.K_s).any():  # motors of rigid joints move as the links do
+        moved += [("q_M", q_M, angle), ("v_M", v_M, rate)]
+    for name, values, unit in moved:
         log.add(name, values, unit, [f"{name}_{axis}" for axis in axes])
     drive = law[:, station.law.layout.drive]
     if station.law.linearization.relative_degree > 1:
@@ -106,17 +106,16 @@ def _add_joints(
         log.add("tau_J", tau_J, effort, [f"tau_J_{axis}" for axis in axes])
 
 
-def _joint_units(station: PathFollowingStation) -> tuple[str, str, str]:
-    if all(link.is_revolute for link in station.chain.links):
+def _joint_units(station: Station) -> tuple[str, str, str]:
+    is_revolute = station.chain.gather("is_revolute")
+    if is_revolute.all():
         return "rad", "rad/s", "Nm"
-    if any(link.is_revolute for link in station.chain.links):
+    if is_revolute.any():
         return "rad or m", "rad/s or m/s", "Nm or N"
     return "m", "m/s", "N"
 
 
-def _add_manifold(
-    log: RunLog, station: PathFollowingStation, raw: dict[str, np.ndarray], Y: np.ndarray
-) -> None:
+def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: np.ndarray) -> None:
     law, layout, linearization = raw["law"], station.law.layout, station.law.linearization
     m = linearization.num_outputs
     Y_p = raw["reference"].reshape(len(law), -1, m)
@@ -138,7 +137,7 @@ def _add_manifold(
     log.add("saturated_drives", status[:, 2].astype(int), "1")
 
 
-def _project(station: PathFollowingStation, pose: np.ndarray, relative_degree: int) -> np.ndarray:
+def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.ndarray:
     """Project a motion of the tool on the path, sample by sample; shape (samples, size)."""
     path = station.path
     evaluator = path.evaluator(relative_degree)
@@ -151,9 +150,7 @@ def _project(station: PathFollowingStation, pose: np.ndarray, relative_degree: i
     return points
 
 
-def _path_output(
-    station: PathFollowingStation, joint_state: np.ndarray, points: np.ndarray
-) -> np.ndarray:
+def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the virtual output of the links and its rate, shape (samples, 2, m)."""
     n, linearization = station.chain.dimension, station.law.linearization
     function = path_output_function(station.chain, linearization.layout).map(len(points))
@@ -171,9 +168,7 @@ def _rotations(
     return R_e, quaternion_to_matrix(quaternion)
 
 
-def _add_orientation(
-    log: RunLog, station: PathFollowingStation, point: np.ndarray, pose: np.ndarray
-) -> None:
+def _add_orientation(log: RunLog, station: Station, point: np.ndarray, pose: np.ndarray) -> None:
     """Add the ZYX angles of the tool and of the reference that the law compares it with."""
     layout = station.law.linearization.layout
     if not layout.oriented:

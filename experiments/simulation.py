@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
 
-from diagrams.path_following import PathFollowingStation
 from diagrams.scenario import SimulationParameters
+from diagrams.stations import Station
 from experiments.progress import ProgressListener
 from pfsc_drake.control.path_law import Fault
 
@@ -31,7 +31,7 @@ class SimulationResult:
 
 
 def simulate(
-    station: PathFollowingStation,
+    station: Station,
     parameters: SimulationParameters,
     duration: float,
     progress: ProgressListener,

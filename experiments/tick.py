@@ -5,13 +5,14 @@ import time
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.path_following import PathFollowingStation
+from diagrams.stations import Station
 from experiments.run_log import RunLog
 
 _SAMPLES = 1000
+_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
 
 
-def measure_tick(station: PathFollowingStation, root: Context, log: RunLog) -> np.ndarray:
+def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     """Evaluate the controller chain, from the joint state to the drives, at logged states.
 
     Args:
@@ -26,7 +27,8 @@ def measure_tick(station: PathFollowingStation, root: Context, log: RunLog) -> n
     controller = station.controller.GetMyContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
     plant = station.plant.GetMyMutableContextFromRoot(root)
-    states = np.hstack([log[name].values for name in ("q_J", "v_J", "q_M", "v_M")])
+    names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
+    states = np.hstack([log[name].values for name in names])
     finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
     usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
     chosen = usable[:: max(1, len(usable) // _SAMPLES)]
@@ -35,7 +37,7 @@ def measure_tick(station: PathFollowingStation, root: Context, log: RunLog) -> n
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
         station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
-        station.plant.SetPositionsAndVelocities(plant, x)
+        plant.SetContinuousState(x)
         begin = time.perf_counter()
         drive.Eval(controller)
         elapsed.append(time.perf_counter() - begin)

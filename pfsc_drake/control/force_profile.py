@@ -1,5 +1,6 @@
 """Forces over time, written down beforehand."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -34,8 +35,12 @@ def manifold_axes(slope: np.ndarray, e_perp: np.ndarray) -> np.ndarray:
         slope: ``sigma'``, in world axes, shape (3,).
         e_perp: First normal vector of the parallel transport frame, shape (3,).
     """
-    e_par = slope / np.linalg.norm(slope)
-    return np.column_stack([e_par, e_perp, np.cross(e_par, e_perp)])
+    x, y, z = slope.tolist()
+    norm = math.sqrt(x * x + y * y + z * z)
+    # a path that stands still has no direction, which is not finite rather than an error
+    x, y, z = (x / norm, y / norm, z / norm) if norm > 0.0 else (math.nan,) * 3
+    u, v, w = e_perp.tolist()
+    return np.array([[x, u, y * w - z * v], [y, v, z * u - x * w], [z, w, x * v - y * u]])
 
 
 @dataclass
@@ -106,6 +111,8 @@ class ForceProfile:
             time: [s].
             axes: See :func:`manifold_axes`, shape (3, 3).
         """
+        if not any(p.begin < time < p.end for pulses in self._by_frame.values() for p in pulses):
+            return np.zeros(6)
         sums = {
             frame: sum((pulse.at(time) for pulse in pulses), np.zeros(6)).reshape(2, 3)
             for frame, pulses in self._by_frame.items()

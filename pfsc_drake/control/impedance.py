@@ -226,12 +226,19 @@ class ImpedanceLaw:
         self._repeats = [1, 2] if num_outputs == 3 else [1, 2, 3]
         table = [[kind.mass, kind.damping, kind.stiffness] for kind in kinds[: len(self._repeats)]]
         self._profiles = [[(p.over, p.interpolant()) for p in row] for row in table]
+        self.is_constant = not any(p.at for row in table for p in row)
+        self._constant = self._at({"eta": 0.0, "xi": 0.0})
+        self._key, self._prepared = b"", (np.zeros(0),) * 4
         weights = [period**k / math.factorial(k) for k in range(self.desired_order + 1)]
         self._taylor = np.array([weights, [0.0, *weights[:-1]]])
 
     def impedance(self, y: np.ndarray) -> np.ndarray:
         """Return masses, dampings, stiffnesses, shape (3, m), at a virtual output y (m,)."""
-        x = {"eta": float(y[0]), "xi": math.hypot(y[1], y[2])}
+        if self.is_constant:
+            return self._constant
+        return self._at({"eta": float(y[0]), "xi": math.hypot(y[1], y[2])})
+
+    def _at(self, x: dict[str, float]) -> np.ndarray:
         rows = [[function(x[over]) for over, function in row] for row in self._profiles]
         return np.repeat(np.array(rows).T, self._repeats, axis=1)
 
@@ -264,13 +271,21 @@ class ImpedanceLaw:
         if not math.isfinite(desired.sum()):
             still = np.vstack([state[0], np.zeros_like(force), force, impedance])
             return still, status | ImpedanceStatus.REFERENCE_NOT_FINITE
-        damping, stiffness, compliant = _rates(impedance)
-        rates = zip(damping.tolist(), stiffness.tolist(), strict=True)
-        a, b, c, d, p = np.array([transition(*rate, self.period) for rate in rates]).T
+        _, _, compliant, (a, b, c, d, p) = self._prepare(impedance)
         (e, e_1), f = state[:2] - desired[:2], force / impedance[MASS]
         response = np.array([a * e + b * e_1 + p * f, c * e + d * e_1 + b * f])
         motion = self._taylor @ desired + np.where(compliant, response, 0.0)
         return np.vstack([motion, force, impedance]), status
+
+    def _prepare(self, impedance: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return what follows from an impedance alone; remembered, for it rarely changes."""
+        key = impedance.tobytes()
+        if key != self._key:
+            damping, stiffness, compliant = _rates(impedance)
+            rates = zip(damping.tolist(), stiffness.tolist(), strict=True)
+            solution = np.array([transition(*rate, self.period) for rate in rates]).T
+            self._key, self._prepared = key, (damping, stiffness, compliant, solution)
+        return self._prepared
 
     def reference(self, state: np.ndarray, desired: np.ndarray) -> np.ndarray:
         """Return derivatives 0..r of y_p, one row each, shape (r + 1, m).
@@ -278,7 +293,7 @@ class ImpedanceLaw:
         From the second on they are those at the last interval's end, with its force and
         parameters. For the arguments see :meth:`update`.
         """
-        damping, stiffness, compliant = _rates(state[3:])
+        damping, stiffness, compliant, _ = self._prepare(state[3:])
         rows = list(state[:2] - desired[:2])
         force = state[2] / state[3 + MASS]
         for _ in range(2, self._response_order + 1):

@@ -45,11 +45,14 @@ def translational_force(
     Returns:
         Generalized forces [N], shape (3,).
     """
-    slope = point[layout.position][3:6]
-    e_par = slope / math.sqrt(slope @ slope)
-    e_perp = point[layout.normal]
-    axes = np.array([e_par * (1.0 - point[layout.alpha][0]), e_perp, _cross(e_par, e_perp)])
-    return axes @ force
+    x, y, z = point[layout.position][3:6].tolist()
+    u, v, w = point[layout.normal].tolist()
+    f, g, h = force.tolist()
+    norm = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / norm, y / norm, z / norm
+    along = (x * f + y * g + z * h) * (1.0 - float(point[layout.alpha][0]))
+    across = (y * w - z * v) * f + (z * u - x * w) * g + (x * v - y * u) * h
+    return np.array([along, u * f + v * g + w * h, across])
 
 
 def rotational_force(
@@ -66,11 +69,18 @@ def rotational_force(
     Returns:
         Generalized forces along the three angles [Nm], shape (3,).
     """
-    w, *v = point[layout.quaternion][:4]
+    w, a, b, c = point[layout.quaternion][:4].tolist()
+    x, y, z = torque.tolist()
     # R' mu of a quaternion of any norm
-    turned = _cross(v, torque)
-    torque_d = torque + (_cross(v, turned) - w * turned) * (2.0 / (w * w + np.dot(v, v)))
-    return euler_rate_matrix(phi).T @ torque_d
+    tx, ty, tz = b * z - c * y, c * x - a * z, a * y - b * x
+    scale = 2.0 / (w * w + a * a + b * b + c * c)
+    x += (b * tz - c * ty - w * tx) * scale
+    y += (c * tx - a * tz - w * ty) * scale
+    z += (a * ty - b * tx - w * tz) * scale
+    sin_1, cos_1 = math.sin(phi[0]), math.cos(phi[0])
+    sin_2, cos_2 = math.sin(phi[1]), math.cos(phi[1])
+    about_y = cos_1 * x + sin_1 * y
+    return np.array([z, cos_1 * y - sin_1 * x, cos_2 * about_y - sin_2 * z])
 
 
 def turning_force(torque: np.ndarray, point: np.ndarray, layout: PathPointLayout) -> float:

@@ -1,5 +1,6 @@
 """A six-axis force/torque sensor in a fixed joint of a MultibodyPlant."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -124,11 +125,16 @@ class ForceTorqueSensor(LeafSystem):
 
     def _filter_state(self, context: Context, load: np.ndarray) -> np.ndarray:
         state = context.get_discrete_state(self._filter).value()
+        # NaN where it has not started; a sum is NaN if one of its terms is
+        if not math.isnan(state.sum()):
+            return state
         return np.where(np.isnan(state), self._low_pass.rest(load), state)
 
     def _calc_load(self, context: Context, output: BasicVector) -> None:
         reaction = self._reactions.Eval(context)[self._joint]
-        output.SetFromVector(-np.append(reaction.translational(), reaction.rotational()))
+        load = np.empty(6)
+        load[:3], load[3:] = reaction.translational(), reaction.rotational()
+        output.SetFromVector(-load)
 
     def _calc_measured_wrench(self, context: Context, output: BasicVector) -> None:
         load, limit = self._load.Eval(context), self._parameters.measurement_range

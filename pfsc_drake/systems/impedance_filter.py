@@ -155,4 +155,6 @@ class ImpedanceFilter(LeafSystem):
     def _parameters(self, context: Context) -> np.ndarray:
         if self._impedance.HasValue(context):
             return self._impedance.Eval(context).reshape(self._shape)
+        if self._law.is_constant:
+            return self._law.impedance(np.empty(0))
         return self._law.impedance(self._measured.Eval(context)[: self._law.num_outputs])

@@ -1,6 +1,7 @@
 """An operator who does what was written down beforehand."""
 
-import numpy as np
+import math
+
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from pfsc_drake.control.force_profile import ForceProfile, manifold_axes
@@ -52,6 +53,7 @@ class ScriptedForce(LeafSystem):
     def _look(self, context: Context, state: DiscreteValues) -> EventStatus:
         point = self._path_point.Eval(context)
         axes = manifold_axes(point[self._layout.position][3:6], point[self._layout.normal])
-        if np.isfinite(axes).all():
+        # a sum is finite only if all its terms are
+        if math.isfinite(axes.sum()):
             state.set_value(axes.ravel())
         return EventStatus.Succeeded()

@@ -1,5 +1,7 @@
 """Taking weight and inertia of the tool off a force/torque measurement, and taring it."""
 
+import math
+
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, JointIndex, RigidBody, SpatialInertia, WeldJoint
@@ -20,6 +22,9 @@ from pfsc_drake.robot.robot_model import RobotModel
 _WRENCH, _TARED, _FAULT, _RESIDUAL, _NEXT = slice(0, 6), 6, 7, slice(8, 14), slice(14, None)
 # parts of the state; tared and fault stand where they stand in the output
 _BIAS, _KNOWN, _WINDOW, _FILTER = slice(0, 6), 8, slice(9, 28), slice(28, None)
+
+# attributes of an enumeration are looked up slowly
+_NOT_FINITE, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
 
 
 class ToolCompensation(LeafSystem):
@@ -152,21 +157,22 @@ class ToolCompensation(LeafSystem):
         self._evaluate()
         result = self._result
         result[_TARED], result[_FAULT] = tared, fault = memory[_TARED], memory[_FAULT]
-        if not np.isfinite(result).all():
-            result[_FAULT] = fault = SensorFault.NOT_FINITE
+        # a sum is finite only if all its terms are
+        if not math.isfinite(result.sum()):
+            result[_FAULT] = fault = _NOT_FINITE
         elif not fault and (np.abs(measured) >= self._range).any():
-            result[_FAULT] = SensorFault.SATURATED
-        if fault == SensorFault.NOT_FINITE:
+            result[_FAULT] = _SATURATED
+        if fault == _NOT_FINITE:
             result[_RESIDUAL], result[_NEXT] = 0.0, memory[_FILTER]
-        if not tared or fault == SensorFault.NOT_FINITE:
+        if not tared or fault == _NOT_FINITE:
             result[_WRENCH] = 0.0
         output.SetFromVector(result)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         result = self._output.Eval(context)
         memory = state.get_mutable_value()
-        if result[_FAULT] == SensorFault.NOT_FINITE:
-            memory[_FAULT] = SensorFault.NOT_FINITE
+        if result[_FAULT] == _NOT_FINITE:
+            memory[_FAULT] = _NOT_FINITE
             return
         memory[_FILTER] = result[_NEXT]
         memory[_KNOWN] = 1.0

@@ -187,13 +187,14 @@ def test_a_joint_without_drive(settings, tmp_path):
         build_path_following(settings, tmp_path)
 
 
-def test_a_velocity_servo_is_not_driven_by_torques(settings):
-    """The plant's drives take torques, not velocities."""
-    poles = GainParameters(poles=[-3.0])
+def test_a_law_for_velocity_servos_needs_its_own_gains(settings):
     settings.controller.law = "velocity_servo"
-    settings.controller.gains["velocity_servo"] = LawGains(poles, poles)
-    with pytest.raises(InputError, match=r"controller\.law.*velocity_servo"):
+    with pytest.raises(InputError, match=r"controller\.gains.*velocity_servo"):
         build_path_following(settings, Path())
+    poles = GainParameters(poles=[-3.0])
+    settings.controller.gains["velocity_servo"] = LawGains(poles, poles)
+    station = build_path_following(settings, Path())
+    assert station.diagram.HasSubsystemNamed("velocity_servo")
 
 
 def test_drives_go_to_their_joints_in_any_order(settings, tmp_path):

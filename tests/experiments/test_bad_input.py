@@ -299,10 +299,13 @@ def test_as_many_outputs_as_joints(refused, mine):
     refused(mine(), *parts, changes=["path.orientation.keyframes=[{theta: 0}]"])
 
 
-def test_a_velocity_servo_is_not_driven_by_torques(refused, mine):
+def test_a_servo_that_does_not_fit_the_controller(refused, mine):
     gains = "{eta: {poles: [-10]}, xi: {poles: [-10]}}"
     changes = ["controller.law=velocity_servo", f"controller.gains.velocity_servo={gains}"]
-    refused(mine(), "controller.law", "velocity_servo", changes=changes)
+    parts = ("servo.period", "0.0003", "controller.sampling_time", "0.001")
+    refused(mine(), *parts, changes=[*changes, "servo.period=0.0003"])
+    parts = ("delay", "0.0015", "multiple of the period")
+    refused(mine(), *parts, changes=[*changes, "servo.bus_delay=0.0015"])
 
 
 def test_start_outside_the_feasible_neighbourhood(refused, mine):

@@ -1,0 +1,266 @@
+"""Path following station of the DELTA robot: friction in front of its plant, the same law."""
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
+
+from diagrams.parts import make_law, make_path
+from diagrams.scenario import RobotParameters
+from diagrams.scenario_delta import DeltaFollowingScenario
+from diagrams.signal_log import SignalLog, add_log
+from diagrams.start import check_points, start_point
+from pfsc_drake.control.friction import bristles_for_step
+from pfsc_drake.control.path_law import PathLaw
+from pfsc_drake.control.reference import rest_to_rest
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import Path
+from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.delta import DeltaRobot
+from pfsc_drake.robot.delta_parameters import load_delta_parameters
+from pfsc_drake.systems.delta_plant import DeltaPlant
+from pfsc_drake.systems.joint_friction import JointFriction
+from pfsc_drake.systems.path_following_controller import PathFollowingController
+from pfsc_drake.systems.path_projector import PathProjector
+from pfsc_drake.systems.reference_generator import ReferenceGenerator
+from pfsc_drake.systems.sensor_failure import SensorFailure
+from pfsc_drake.systems.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.trajectory_point import TrajectoryPoint
+
+# m, between the points of the way along the path that are checked for reach
+_REACH_SPACING = 2e-3
+
+
+@dataclass
+class DeltaFollowingStation:
+    """A built station and what is needed to run it, see :class:`PathFollowingStation`.
+
+    Attributes:
+        diagram: The diagram.
+        plant: The robot in it.
+        chain: The robot as the laws know it.
+        coordinates: Where its coordinates stand in the plant's state ``[q, v]``.
+        path: The path, axes of the inertial frame (z_0 down).
+        law: The path following law.
+        projector: Projector system.
+        controller: Controller system.
+        log: Log of ``joint_state`` (``[q, v, q, v]``: drives and slides are one),
+            ``tool_pose``, ``path_point``, ``reference``, ``law``, with friction also
+            ``friction_torque``.
+        reference_duration: Length of the reference motion [s].
+        initial_state: State of the plant at the start, shape (6,).
+        initial_theta: Path parameter at the start.
+        on_motors: Whether the law acts on motor coordinates; it does not.
+        warnings: What may not go as well as hoped, one sentence each.
+    """
+
+    diagram: Diagram
+    plant: DeltaPlant
+    chain: DeltaRobot
+    coordinates: PlantCoordinates
+    path: Path
+    law: PathLaw
+    projector: PathProjector
+    controller: PathFollowingController
+    log: SignalLog
+    reference_duration: float
+    initial_state: np.ndarray
+    initial_theta: float
+    on_motors: bool
+    warnings: list[str]
+
+    def set_start(self, root: Context) -> None:
+        """Put the robot at the start of the scenario.
+
+        Args:
+            root: Context of the diagram.
+        """
+        q, v = np.split(self.initial_state, 2)
+        self.plant.set_state(self.plant.GetMyMutableContextFromRoot(root), q, v)
+        self.projector.set_parameter(
+            self.projector.GetMyMutableContextFromRoot(root), self.initial_theta
+        )
+
+
+def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobot:
+    """Return the DELTA robot of a scenario.
+
+    Args:
+        parameters: Which robot.
+        folder: Where relative file names start.
+
+    Raises:
+        InputError: If its parameters cannot be read.
+    """
+    model = parameters.model
+    return DeltaRobot(load_delta_parameters(folder / model if FilePath(model).suffix else model))
+
+
+def build_delta_following(
+    scenario: DeltaFollowingScenario, folder: FilePath
+) -> DeltaFollowingStation:
+    """Build the station of a path following scenario of a DELTA robot.
+
+    Args:
+        scenario: The scenario.
+        folder: Where the scenario's relative file names start.
+
+    Returns:
+        The station; everything in the scenario that can be wrong has been checked.
+
+    Raises:
+        InputError: If the scenario cannot be built.
+    """
+    robot = load_delta_robot(scenario.robot, folder)
+    period, reference = scenario.controller.sampling_time, scenario.reference
+    path = make_path(scenario.path, scenario.controller.law, folder)
+    if path.orientation is not None:
+        raise InputError("path: has an orientation; a DELTA robot only translates")
+    law = make_law(scenario.controller, robot, oriented=False)
+    linearization = law.linearization
+    initial_state, initial_theta = _start_state(scenario, path, robot)
+    eta_p = rest_to_rest(
+        reference.points,
+        velocity=reference.velocity,
+        acceleration=reference.acceleration,
+        dwell=reference.dwell,
+    )
+
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("plant", DeltaPlant(robot))
+    coordinates = _coordinates(robot)
+    joint_state = _add_joint_state(builder, plant, coordinates, scenario)
+    kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(robot))
+    degree, num_outputs = linearization.relative_degree, linearization.num_outputs
+    projector = builder.AddNamedSystem("path_projector", PathProjector(path, degree, period))
+    controller = builder.AddNamedSystem(
+        "path_following_controller", PathFollowingController(law, period)
+    )
+    generator = builder.AddNamedSystem(
+        "reference_generator", ReferenceGenerator(eta_p, degree, num_outputs)
+    )
+    tool_pose = kinematics.GetOutputPort("tool_pose")
+    path_point = projector.GetOutputPort("path_point")
+    progress = generator.GetOutputPort("reference")
+    builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
+    builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+    if linearization.time_driven:
+        leader = builder.AddNamedSystem(
+            "trajectory_point", TrajectoryPoint(path, degree, num_outputs)
+        )
+        builder.Connect(progress, leader.GetInputPort("reference"))
+        path_point = leader.GetOutputPort("path_point")
+    builder.Connect(joint_state, controller.GetInputPort("joint_state"))
+    builder.Connect(path_point, controller.GetInputPort("path_point"))
+    builder.Connect(progress, controller.GetInputPort("reference"))
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, robot.dimension))
+    builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
+    signals = {
+        "joint_state": joint_state,
+        "tool_pose": tool_pose,
+        "path_point": path_point,
+        "reference": progress,
+        "law": controller.GetOutputPort("law"),
+    }
+    signals |= _add_drives(builder, plant, robot, hold.get_output_port(), scenario)
+    log = add_log(builder, signals, period)
+    diagram = builder.Build()
+    diagram.set_name(scenario.name or "delta_following")
+    return DeltaFollowingStation(
+        diagram,
+        plant,
+        robot,
+        coordinates,
+        path,
+        law,
+        projector,
+        controller,
+        log,
+        eta_p.domain[1],
+        initial_state,
+        initial_theta,
+        on_motors=False,
+        warnings=[],
+    )
+
+
+def _coordinates(robot: DeltaRobot) -> PlantCoordinates:
+    """Slides and drives are one."""
+    size = 2 * robot.dimension
+    return PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(robot.dimension))
+
+
+def _add_joint_state(
+    builder: DiagramBuilder,
+    plant: DeltaPlant,
+    coordinates: PlantCoordinates,
+    scenario: DeltaFollowingScenario,
+) -> OutputPort:
+    """Add the encoders, and return ``[q, v, q, v]`` as measured."""
+    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
+    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
+    builder.Connect(plant.GetOutputPort("state"), encoders.get_input_port())
+    failure = scenario.simulation.sensor_failure
+    if failure.time < 0.0:
+        return encoders.get_output_port()
+    if not 0 <= failure.component < len(rows):
+        raise InputError(
+            f"simulation.sensor_failure.component: {failure.component}; "
+            f"allowed: 0 to {len(rows) - 1}"
+        )
+    broken = builder.AddNamedSystem(
+        "sensor_failure", SensorFailure(len(rows), failure.component, failure.time)
+    )
+    builder.Connect(encoders.get_output_port(), broken.GetInputPort("measured"))
+    return broken.GetOutputPort("delivered")
+
+
+def _add_drives(
+    builder: DiagramBuilder,
+    plant: DeltaPlant,
+    robot: DeltaRobot,
+    drive_force: OutputPort,
+    scenario: DeltaFollowingScenario,
+) -> dict[str, OutputPort]:
+    """Connect the drive forces with the plant, less friction; return the signal for the log."""
+    actuation = plant.GetInputPort("actuation")
+    if not scenario.drive_friction:
+        builder.Connect(drive_force, actuation)
+        return {}
+    n, friction = robot.dimension, robot.parameters.friction
+    slides = np.full(n, robot.parameters.masses.effective_slide)
+    bristles = bristles_for_step(
+        friction.coulomb, friction.viscous, slides, scenario.simulation.max_step
+    )
+    drives = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+    # the true velocity, whatever the encoders say
+    velocity = builder.AddNamedSystem(
+        "slide_velocity", MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)]))
+    )
+    builder.Connect(plant.GetOutputPort("state"), velocity.get_input_port())
+    builder.Connect(velocity.get_output_port(), drives.GetInputPort("velocity"))
+    builder.Connect(drive_force, drives.GetInputPort("drive_torque"))
+    builder.Connect(drives.GetOutputPort("net_torque"), actuation)
+    return {"friction_torque": drives.GetOutputPort("friction_torque")}
+
+
+def _start_state(
+    scenario: DeltaFollowingScenario, path: Path, robot: DeltaRobot
+) -> tuple[np.ndarray, float]:
+    """Return the plant's state at rest beside the path, and the path parameter there.
+
+    Raises:
+        InputError: If the start or the way along the path is out of the robot's reach.
+    """
+    points = scenario.reference.points
+    check_points(points, path)
+    start = start_point(scenario, path)
+    q = robot.joint_coordinates(start.y_t, "start")
+    begin, end = min(points), max(points)
+    for eta in np.linspace(begin, end, 2 + int((end - begin) / _REACH_SPACING)):
+        theta = np.array([path.arc_length.parameter(eta)])
+        y_t = path.position.derivatives(theta, 0)[0, 0]
+        robot.joint_coordinates(y_t, f"path at eta = {eta:.4g} m")
+    return np.concatenate([q, np.zeros(robot.dimension)]), start.theta

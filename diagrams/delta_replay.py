@@ -1,0 +1,56 @@
+"""A logged run of a DELTA robot in Meshcat, base on top as it hangs."""
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from diagrams.replay import RecordedMotion, add_source
+from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.robot.delta import DeltaRobot
+from pfsc_drake.systems.delta_visualizer import DeltaVisualizer, turn_scene_over
+from pfsc_drake.systems.path_visualizer import PathVisualizer
+
+# m, of the inertial frame above the grid, for a path that reaches as far down as others
+_CLEARANCE = 0.15
+
+
+def build_delta_replay(
+    robot: DeltaRobot,
+    path: Path,
+    layout: PathPointLayout,
+    motion: RecordedMotion,
+    meshcat: Meshcat,
+    period: float,
+) -> Diagram:
+    """Return a diagram that draws a recorded motion while its time advances.
+
+    Args:
+        robot: The robot.
+        path: The path, axes of the inertial frame (z_0 down).
+        layout: Layout of the path points.
+        motion: What to draw; its positions are those of the slides.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+    """
+    _arrange_scene(path, meshcat)
+    builder = DiagramBuilder()
+    slides = add_source(builder, "positions", motion.times, motion.positions)
+    tool_pose = add_source(builder, "tool_pose", motion.times, motion.tool_pose)
+    path_point = add_source(builder, "path_point", motion.times, motion.path_point)
+    body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
+    builder.Connect(slides, body.GetInputPort("slide_positions"))
+    drawing = builder.AddNamedSystem(
+        "path_visualizer", PathVisualizer(path, layout, meshcat, period)
+    )
+    builder.Connect(tool_pose, drawing.GetInputPort("tool_pose"))
+    builder.Connect(path_point, drawing.GetInputPort("path_point"))
+    return builder.Build()
+
+
+def _arrange_scene(path: Path, meshcat: Meshcat) -> None:
+    """Hang the robot above the grid, and look at it from the side, a little from below."""
+    depth = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, 2]
+    height = float(depth.max()) + _CLEARANCE
+    turn_scene_over(meshcat, height)
+    target = np.array([0.0, 0.0, height - 0.7 * depth.mean()])
+    meshcat.SetCameraPose(target + depth.max() * np.array([1.5, -1.1, 0.15]), target)

@@ -1,0 +1,177 @@
+"""What is between the law's output and the plant's joints: hold, servo, bus, friction."""
+
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
+
+from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
+from pfsc_drake.control.friction import bristles_for_step
+from pfsc_drake.control.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.parameters import load_parameters
+from pfsc_drake.robot.serial_chain import SerialChain
+from pfsc_drake.systems.bus_delay import add_bus_delay
+from pfsc_drake.systems.joint_friction import JointFriction
+from pfsc_drake.systems.velocity_servo import VelocityServo
+
+# integration schemes of fixed step that the bristles of friction are made for
+_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
+_ROUNDING = 1e-6
+
+
+def add_drives(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    chain: SerialChain,
+    coordinates: PlantCoordinates,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+    initial_state: np.ndarray,
+) -> dict[str, OutputPort]:
+    """Connect the law to the plant's actuation, and return further signals for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        chain: The robot.
+        coordinates: Where its coordinates stand in the plant's state.
+        scenario: The scenario.
+        ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
+        initial_state: State of the plant at the start, for which servos are designed.
+
+    Returns:
+        With servos ``drive_torque``, within its limits [Nm or N], shape (N,).
+
+    Raises:
+        InputError: If the servos do not suit the robot or the controller.
+    """
+    period, torque = scenario.controller.sampling_time, ports["drive"]
+    signals = {}
+    if scenario.controller.law == "velocity_servo":
+        q_J = (coordinates.link_rows @ initial_state)[: chain.dimension]
+        torque, period = _add_servo(builder, chain, scenario, ports, q_J)
+        signals["drive_torque"] = torque
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
+    drives = builder.AddNamedSystem("drives", MatrixGain(_drive_order(plant, coordinates)))
+    builder.Connect(torque, hold.get_input_port())
+    builder.Connect(hold.get_output_port(), drives.get_input_port())
+    builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
+    return signals
+
+
+def _add_servo(
+    builder: DiagramBuilder,
+    chain: SerialChain,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+    q_J: np.ndarray,
+) -> tuple[OutputPort, float]:
+    """Add velocity servos, and return their torques and sampling time."""
+    servo, tick = scenario.servo, scenario.controller.sampling_time
+    period = servo.period or tick
+    ratio = tick / period
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > _ROUNDING:
+        raise InputError(
+            f"servo.period = {period:g} s; must be a whole fraction of "
+            f"controller.sampling_time = {tick:g} s"
+        )
+    rate = None if servo.integral_rate < 0.0 else servo.integral_rate
+    gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
+    effort = chain.gather("effort_limit") * scenario.controller.effort_scale
+    system = builder.AddNamedSystem(
+        "velocity_servo", VelocityServo(chain, VelocityServoLaw(gains, effort))
+    )
+    velocity = ports["drive"]
+    if servo.bus_delay > 0.0:
+        bus = add_bus_delay(builder, velocity, servo.bus_delay, tick)
+        velocity = bus.GetOutputPort("delivered")
+    elif round(ratio) > 1:
+        # the law must not be evaluated between its own ticks
+        keep = builder.AddNamedSystem("velocity_hold", ZeroOrderHold(tick, chain.dimension))
+        builder.Connect(velocity, keep.get_input_port())
+        velocity = keep.get_output_port()
+    builder.Connect(velocity, system.GetInputPort("velocity_reference"))
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    return system.GetOutputPort("drive_torque"), period
+
+
+def add_friction(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    chain: SerialChain,
+    coordinates: PlantCoordinates,
+    scenario: PathFollowingScenario,
+    folder: FilePath,
+) -> dict[str, OutputPort]:
+    """Add the scenario's friction, and return its signal for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        chain: The robot.
+        coordinates: Where its coordinates stand in the plant's state.
+        scenario: The scenario.
+        folder: Where relative file names start.
+
+    Returns:
+        ``friction_torque``, positive against positive velocities [Nm or N], shape (N,).
+
+    Raises:
+        InputError: If the friction does not suit the robot or the integration.
+    """
+    if not scenario.friction.is_given:
+        return {}
+    simulation = scenario.simulation
+    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+        raise InputError(
+            f"simulation.integrator = {simulation.integrator} with friction; allowed: "
+            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+        )
+    if not np.all(chain.D_M > 0.0):
+        raise InputError("friction: needs a robot with rotor inertia in every drive")
+    f_c, f_v = _coefficients(scenario.friction, chain, folder)
+    # stiff enough for the step of the integration, or of the hold if that is shorter
+    step = min(simulation.max_step, scenario.controller.sampling_time)
+    bristles = bristles_for_step(f_c, f_v, chain.D_M, step)
+    friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+    n, num_positions = chain.dimension, plant.num_positions()
+    rows = coordinates.motor_rows[n:]
+    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(rows))
+    resistance = builder.AddNamedSystem("resistance", MatrixGain(rows[:, num_positions:].T))
+    builder.Connect(plant.get_state_output_port(), velocity.get_input_port())
+    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+    builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
+    builder.Connect(resistance.get_output_port(), plant.get_applied_generalized_force_input_port())
+    return {"friction_torque": friction.GetOutputPort("friction_torque")}
+
+
+def _coefficients(
+    parameters: JointFrictionParameters, chain: SerialChain, folder: FilePath
+) -> tuple[np.ndarray, np.ndarray]:
+    n = chain.dimension
+    if parameters.file:
+        file = parameters.file
+        known = load_parameters(folder / file if FilePath(file).suffix else file).friction
+        if known.coulomb.size < n:
+            raise InputError(
+                f"friction.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
+            )
+        return known.coulomb[:n], known.viscous[:n]
+    values = []
+    for key in ("f_c", "f_v"):
+        given = getattr(parameters, key) or [0.0] * n
+        if len(given) != n:
+            raise InputError(f"friction.{key}: {len(given)} values; the robot has {n} joints")
+        values.append(np.array(given, dtype=float))
+    return values[0], values[1]
+
+
+def _drive_order(plant: MultibodyPlant, coordinates: PlantCoordinates) -> np.ndarray:
+    """Return the matrix from the chain's drives to the plant's actuation."""
+    order = np.zeros((plant.num_actuators(), len(coordinates.actuators)))
+    order[coordinates.actuators, np.arange(len(coordinates.actuators))] = 1.0
+    return order
