@@ -10,7 +10,7 @@ from pfsc_drake.robot.delta import DeltaRobot
 from pfsc_drake.systems.delta_visualizer import DeltaVisualizer, turn_scene_over
 from pfsc_drake.systems.path_visualizer import PathVisualizer
 
-# m, of the inertial frame above the grid, for a path that reaches as far down as others
+# m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
 
 
@@ -48,9 +48,9 @@ def build_delta_replay(
 
 
 def _arrange_scene(path: Path, meshcat: Meshcat) -> None:
-    """Hang the robot above the grid, and look at it from the side, a little from below."""
+    """Hang the robot above the grid, and look at it from the side, level with the rods."""
     depth = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, 2]
     height = float(depth.max()) + _CLEARANCE
     turn_scene_over(meshcat, height)
-    target = np.array([0.0, 0.0, height - 0.7 * depth.mean()])
-    meshcat.SetCameraPose(target + depth.max() * np.array([1.5, -1.1, 0.15]), target)
+    target = np.array([0.0, 0.0, height - 0.55 * depth.max()])
+    meshcat.SetCameraPose(target + depth.max() * np.array([1.35, -1.0, 0.1]), target)

@@ -189,6 +189,10 @@ def path_following_metrics(
             metrics.add("max_path_deviation_while_moving", moving, "m")
         metrics.add("rms_path_deviation", rms_path_deviation(log, converged_after), "m")
         metrics.add("static_path_deviation", static_path_deviation(log), "m")
+    if "xi_d" in log:
+        off = np.linalg.norm(log["xi"].values - log["xi_p"].values, axis=1)
+        largest = _max(off[log.time >= converged_after])
+        metrics.add("max_error_from_compliant_reference", largest, "m")
     if "xi_M" in log:
         distance = np.linalg.norm(log["xi_M"].values, axis=1)[log.time >= converged_after]
         metrics.add("max_path_deviation_of_motors", _max(distance), "m")
@@ -206,13 +210,16 @@ def path_following_metrics(
     return metrics
 
 
-def metric_names(num_joints: int, oriented: bool, on_motors: bool = False) -> list[str]:
+def metric_names(
+    num_joints: int, oriented: bool, on_motors: bool = False, compliant: bool = False
+) -> list[str]:
     """Return the names of the metrics that :func:`path_following_metrics` gives.
 
     Args:
         num_joints: Number of drives.
         oriented: Whether the log has orientation errors.
         on_motors: Whether it has the path coordinates of the motors too.
+        compliant: Whether it has a reference that yields to forces.
     """
     return [
         "settling_time",
@@ -220,6 +227,7 @@ def metric_names(num_joints: int, oriented: bool, on_motors: bool = False) -> li
         "max_path_deviation_while_moving",
         "rms_path_deviation",
         "static_path_deviation",
+        *(["max_error_from_compliant_reference"] if compliant else []),
         *(["max_path_deviation_of_motors"] if on_motors else []),
         *(["max_orientation_error"] if oriented else []),
         "max_tangential_error",

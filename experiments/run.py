@@ -132,7 +132,12 @@ def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     """Refuse a target for a metric that the run will not have."""
     linearization = station.law.linearization
     known = [
-        *metric_names(linearization.num_joints, linearization.num_outputs > 3, station.on_motors),
+        *metric_names(
+            linearization.num_joints,
+            linearization.num_outputs > 3,
+            station.on_motors,
+            settings.compliance.is_given,
+        ),
         "real_time_factor",
         "controller_tick_us",
         "controller_tick_us_p99",
@@ -147,6 +152,8 @@ def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
 
 def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
     """Make file names independent of the scenario's folder, so that the copy runs too."""
+    if settings.friction.file and Path(settings.friction.file).suffix:
+        settings.friction.file = str((folder / settings.friction.file).resolve())
     shape, model = settings.path.shape, settings.robot.model
     if isinstance(shape, Waypoints):
         shape.file = str((folder / shape.file).resolve())

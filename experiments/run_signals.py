@@ -25,9 +25,6 @@ def collect_log(station: Station, root: Context) -> RunLog:
     times, raw = station.log.read(root)
     log = RunLog(times)
     _add_joints(log, station, raw["joint_state"], raw["law"])
-    if "friction_torque" in raw:
-        labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
-        log.add("tau_f", raw["friction_torque"], _joint_units(station)[2], labels)
     pose = _tool_poses(station, raw["joint_state"])
     log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
     log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
@@ -51,7 +48,8 @@ def collect_log(station: Station, root: Context) -> RunLog:
     _add_manifold(log, station, raw, Y)
     orientation_from = raw["path_point"] if linearization.time_driven else points
     _add_orientation(log, station, orientation_from, pose)
-    _add_forces(log, raw)
+    _add_forces(log, station, raw)
+    _add_drives(log, station, raw)
     return log
 
 
@@ -178,8 +176,37 @@ def _add_orientation(log: RunLog, station: Station, point: np.ndarray, pose: np.
         log.add(name, np.unwrap(matrix_to_zyx(R), axis=0), "rad", ["z", "y", "x"])
 
 
-def _add_forces(log: RunLog, raw: dict[str, np.ndarray]) -> None:
-    if "wrench_ext" in raw:
-        labels = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
-        log.add("wrench_ext", raw["wrench_ext"], "N, Nm", labels)
-        log.add("tau_ext", raw["tau_ext"], "Nm")
+def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add what acts on the tool, what the sensor makes of it, and what the compliance asks for."""
+    m, effort = station.law.linearization.num_outputs, _joint_units(station)[2]
+    wrench = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
+    manifold = ["tau_par", "tau_perp", "tau_cross", "tau_z", "tau_y", "tau_x"][:m]
+    known = {
+        "wrench_ext": ("N, Nm", wrench),
+        "tau_ext": (effort, None),
+        "wrench_measured": ("N, Nm", wrench),
+        "manifold_force": ("N, Nm", manifold),
+        "tared": ("1", None),
+        "sensor_fault": ("1", None),
+    }
+    for name, (unit, labels) in known.items():
+        if name in raw:
+            log.add(name, raw[name], unit, labels)
+    if "desired_reference" in raw:
+        desired = raw["desired_reference"][:, :m]
+        log.add("eta_d", desired[:, 0], "m")
+        log.add("xi_d", desired[:, 1:3], "m", ["xi_d_1", "xi_d_2"])
+        if m > 3:
+            log.add("phi_d", desired[:, 3:], "rad", ["phi_d_z", "phi_d_y", "phi_d_x"])
+
+
+def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add the torques that a velocity servo gives, and what friction takes."""
+    effort = _joint_units(station)[2]
+    if "drive_torque" in raw:
+        limits = station.chain.gather("effort_limit")
+        labels = [f"tau_d_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_d", raw["drive_torque"], effort, labels, limits)
+    if "friction_torque" in raw:
+        labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_f", raw["friction_torque"], _joint_units(station)[2], labels)
