@@ -12,7 +12,7 @@ from diagrams.drives import add_drives, add_friction
 from diagrams.measurement import add_forces, add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.robot import add_robot, tool_frame
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import ControllerParameters, PathFollowingScenario
 from diagrams.signal_log import SignalLog, add_log
 from diagrams.start import start_state
 from pfsc_drake.control.path_law import PathLaw
@@ -30,6 +30,8 @@ from pfsc_drake.systems.trajectory_point import TrajectoryPoint
 
 # rad per sampling interval, up to which the exact elastic law keeps its accuracy
 _FASTEST_RESONANCE = 1.0
+# K_s epsilon D_b T_s / D_M, up to which the sampled damping (3.71) is stable with some margin
+_FASTEST_DAMPING = 1.8
 
 
 @dataclass
@@ -182,23 +184,32 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_state,
         initial_theta,
         on_motors,
-        _warnings(law_name, chain, coordinates.link_rows @ initial_state, period)
+        _warnings(scenario.controller, chain, coordinates.link_rows @ initial_state)
         + compliance_warnings(scenario),
     )
 
 
 def _warnings(
-    law_name: str, chain: SerialChain, link_state: np.ndarray, period: float
+    parameters: ControllerParameters, chain: SerialChain, link_state: np.ndarray
 ) -> list[str]:
     """Return what a sampled controller will not do well on this robot."""
-    if law_name != "elastic":
-        return []
-    resonance = joint_resonances(chain, link_state[: chain.dimension])[-1]
-    if resonance * period <= _FASTEST_RESONANCE:
-        return []
-    return [
-        f"the joints resonate at up to {resonance / (2.0 * np.pi):.0f} Hz, "
-        f"{resonance * period:.2f} rad per sampling interval; above {_FASTEST_RESONANCE:g} rad the "
-        "law 'elastic' loses accuracy and then oscillates: sample faster or take the law "
-        "'singular_perturbation'"
-    ]
+    period = parameters.sampling_time
+    if parameters.law == "elastic":
+        resonance = joint_resonances(chain, link_state[: chain.dimension])[-1]
+        if resonance * period > _FASTEST_RESONANCE:
+            return [
+                f"the joints resonate at up to {resonance / (2.0 * np.pi):.0f} Hz, "
+                f"{resonance * period:.2f} rad per sampling interval; above "
+                f"{_FASTEST_RESONANCE:g} rad the law 'elastic' loses accuracy and then "
+                "oscillates: sample faster or take the law 'singular_perturbation'"
+            ]
+    if parameters.law == "singular_perturbation":
+        damping = np.array(parameters.boundary_layer_damping)
+        rate = float(np.max(chain.K_s * damping * period / chain.D_M))
+        if rate > _FASTEST_DAMPING:
+            return [
+                f"K_s epsilon D_b T_s / D_M is up to {rate:.2f}; above {_FASTEST_DAMPING:g} the "
+                "sampled damping of the joint torques oscillates: lower "
+                "controller.boundary_layer_damping or sample faster"
+            ]
+    return []
