@@ -29,6 +29,8 @@ from pfsc_drake.systems.sensor_failure import SensorFailure
 from pfsc_drake.systems.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.trajectory_point import TrajectoryPoint
 
+# integration schemes of fixed step that the bristles of friction are made for
+_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # m, between the points of the way along the path that are checked for reach
 _REACH_SPACING = 2e-3
 
@@ -113,6 +115,11 @@ def build_delta_following(
     Raises:
         InputError: If the scenario cannot be built.
     """
+    if scenario.controller.law != "rigid":
+        raise InputError(
+            f"controller.law: {scenario.controller.law}; allowed: rigid, the drives of a DELTA "
+            "robot are stiff and take forces"
+        )
     robot = load_delta_robot(scenario.robot, folder)
     period, reference = scenario.controller.sampling_time, scenario.reference
     path = make_path(scenario.path, scenario.controller.law, folder)
@@ -229,11 +236,17 @@ def _add_drives(
     if not scenario.drive_friction:
         builder.Connect(drive_force, actuation)
         return {}
+    simulation = scenario.simulation
+    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+        raise InputError(
+            f"simulation.integrator = {simulation.integrator} with drive_friction; allowed: "
+            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+        )
     n, friction = robot.dimension, robot.parameters.friction
     slides = np.full(n, robot.parameters.masses.effective_slide)
-    bristles = bristles_for_step(
-        friction.coulomb, friction.viscous, slides, scenario.simulation.max_step
-    )
+    # stiff enough for the step of the integration, or of the hold if that is shorter
+    step = min(simulation.max_step, scenario.controller.sampling_time)
+    bristles = bristles_for_step(friction.coulomb, friction.viscous, slides, step)
     drives = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
     # the true velocity, whatever the encoders say
     velocity = builder.AddNamedSystem(

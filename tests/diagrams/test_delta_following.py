@@ -1,0 +1,153 @@
+"""The DELTA station: what is connected to what, where it starts, and what it refuses."""
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.systems.analysis import Simulator
+
+from diagrams.delta_replay import build_delta_replay
+from diagrams.replay import RecordedMotion, record
+from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario_delta import DeltaFollowingScenario
+from diagrams.stations import build_station, load_settings
+from experiments.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import load_scenario_data
+from pfsc_drake.errors import InputError
+
+FILE = SCENARIO_DIRECTORY / "pfc_delta.yaml"
+PERIOD = 0.04
+
+
+def load(*changes):
+    return load_settings(load_scenario_data(FILE, list(changes)), str(FILE))
+
+
+def build(*changes):
+    return build_station(load(*changes), SCENARIO_DIRECTORY)
+
+
+def sources(diagram):
+    """Return the output port behind each input port, by names."""
+    return {
+        (system.get_name(), system.get_input_port(index).get_name()): (
+            source.get_name(),
+            source.get_output_port(port).get_name(),
+        )
+        for (system, index), (source, port) in diagram.connection_map().items()
+    }
+
+
+def test_the_robot_decides_the_schema():
+    assert isinstance(load(), DeltaFollowingScenario)
+    settings = load_settings({"robot": {"model": "comau_racer_1_4"}}, "mine.yaml")
+    assert type(settings) is PathFollowingScenario
+
+
+def test_friction_is_between_hold_and_plant():
+    behind = sources(build().diagram)
+    assert behind["plant", "actuation"] == ("joint_friction", "net_torque")
+    assert behind["joint_friction", "drive_torque"] == ("hold", "y")
+    assert behind["joint_friction", "velocity"] == ("slide_velocity", "y0")
+    assert behind["slide_velocity", "u0"] == ("plant", "state")
+
+
+def test_without_friction_the_held_force_drives_the_plant():
+    station = build("drive_friction=false")
+    assert sources(station.diagram)["plant", "actuation"] == ("hold", "y")
+    assert "friction_torque" not in station.log.rows
+
+
+def test_starts_at_rest_beside_the_path():
+    station = build()
+    root = station.diagram.CreateDefaultContext()
+    station.set_start(root)
+    plant = station.plant.GetMyContextFromRoot(root)
+    q, v = np.split(station.plant.GetOutputPort("state").Eval(plant), 2)
+    y_t = station.plant.GetOutputPort("tool_position").Eval(plant)
+    np.testing.assert_array_equal(v, 0.0)
+    # rods of 0.5 m reach from the slides to the plate: the constraint (2.30), by itself
+    geometry = station.chain.parameters.geometry
+    slides = geometry.offsets - q[:, None] * geometry.rails
+    np.testing.assert_allclose(np.linalg.norm(y_t - slides, axis=1), 0.5, atol=1e-12)
+    # the nearest point of the path, on a fine grid
+    theta = np.linspace(*station.path.position.domain, 40_001)
+    distance = np.linalg.norm(station.path.position.derivatives(theta, 0)[:, 0] - y_t, axis=1)
+    nearest = int(np.argmin(distance))
+    assert distance[nearest] == pytest.approx(0.010, abs=1e-7)
+    assert station.initial_theta == pytest.approx(theta[nearest], abs=theta[1] - theta[0])
+
+
+def test_the_first_force_is_weight_and_proportional_part():
+    """D q'' = tau - g with J q'' = -a_xi1 xi: at rest, against the robot's own matrices."""
+    station = build()
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    controller = station.controller
+    tau = controller.GetOutputPort("drive_torque").Eval(controller.GetMyContextFromRoot(root))
+    q = station.initial_state[:3]
+    y_t = station.chain.tool_position(q)
+    theta = np.array([station.initial_theta])
+    offset = y_t - station.path.position.derivatives(theta, 0)[0, 0]
+    J, masses = station.chain.jacobian_at(q), station.chain.parameters.masses
+    D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
+    gravity = np.array([0.0, 0.0, 9.81])
+    rails = station.chain.parameters.geometry.rails  # a slide moves along -c_i
+    weight = masses.effective_slide * rails @ gravity - masses.effective_plate * J.T @ gravity
+    expected = D @ np.linalg.solve(J, -7500.0 * offset) + weight
+    np.testing.assert_allclose(tau, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        ("start.posture_deg=[0, 0, 0]", ["start.posture_deg", "none"]),
+        ("start.rotation_deg=[1, 0, 0]", ["start.rotation_deg", "only translates"]),
+        ("path.orientation.keyframes=[{theta: 0}]", ["keyframes", "only translates"]),
+        ("forces=[{begin: 0, end: 1, force: [1, 0, 0]}]", ["forces", "none for a DELTA"]),
+        ("hold_back={force: -5}", ["hold_back.force", "-5"]),
+        ("friction={f_c: [1, 1, 1]}", ["friction", "drive_friction"]),
+        ("encoders.difference_quotient=true", ["encoders", "none for a DELTA"]),
+        (
+            "compliance.transversal="
+            "{mass: {value: 1}, damping: {value: 10}, stiffness: {value: 500}}",
+            ["compliance", "none for a DELTA"],
+        ),
+        ("controller.law=velocity_servo", ["controller.law", "velocity_servo", "rigid"]),
+        ("controller.law=elastic", ["controller.law", "elastic", "rigid"]),
+        ("simulation.integrator=implicit_euler", ["simulation.integrator", "runge_kutta3"]),
+        ("simulation.sensor_failure={time: 1, component: 12}", ["component", "0 to 11"]),
+        ("reference.points=[0.022, 0.5]", ["reference.points", "0.5 m"]),
+        ("start.offset=[0, 1]", ["start: [", "outside the workspace"]),
+        ("robot.model=nowhere.yaml", ["nowhere.yaml"]),
+        # a path that leaves the workspace on the way is refused before anything moves
+        (
+            "path.shape=!Line {start: [0, 0, 0.6], end: [0, 0, 1.0]}",
+            ["path at eta = 0.", "outside the workspace"],
+        ),
+    ],
+)
+def test_refused(change, parts):
+    with pytest.raises(InputError) as caught:
+        build(change)
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def test_replay_draws_robot_and_path_upside_down():
+    station = build()
+    evaluator, q = station.path.evaluator(2), station.initial_state[:3]
+    y_t = station.chain.tool_position(q)
+    pose = np.concatenate([y_t, np.eye(3).ravel()])
+    point = evaluator(y_t.tolist(), station.initial_theta)
+    motion = RecordedMotion(
+        PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
+    )
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    layout = station.law.linearization.layout
+    diagram = build_delta_replay(station.chain, station.path, layout, motion, meshcat, PERIOD)
+    page = record(diagram, meshcat, motion.times[-1], PERIOD)
+    assert "</html>" in page
+    for name in ("delta_robot/slide_1", "delta_robot/rod_6", "path_following/path"):
+        assert meshcat.HasPath(f"/drake/{name}")
