@@ -1,19 +1,18 @@
 """Path following station of the DELTA robot: friction in front of its plant, the same law."""
 
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.parts import make_law, make_path
 from diagrams.scenario import RobotParameters
 from diagrams.scenario_delta import DeltaFollowingScenario
-from diagrams.signal_log import SignalLog, add_log
+from diagrams.signal_log import add_log
 from diagrams.start import check_points, start_point
+from diagrams.station import Station
 from pfsc_drake.control.friction import bristles_for_step
-from pfsc_drake.control.path_law import PathLaw
 from pfsc_drake.control.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
@@ -35,55 +34,17 @@ _FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 _REACH_SPACING = 2e-3
 
 
-@dataclass
-class DeltaFollowingStation:
-    """A built station and what is needed to run it, see :class:`PathFollowingStation`.
+class DeltaFollowingStation(Station[DeltaPlant, DeltaRobot]):
+    """Station of a DELTA robot; the path is in the axes of the inertial frame (z_0 down).
 
-    Attributes:
-        diagram: The diagram.
-        plant: The robot in it.
-        chain: The robot as the laws know it.
-        coordinates: Where its coordinates stand in the plant's state ``[q, v]``.
-        path: The path, axes of the inertial frame (z_0 down).
-        law: The path following law.
-        projector: Projector system.
-        controller: Controller system.
-        log: Log of ``joint_state`` (``[q, v, q, v]``: drives and slides are one),
-            ``tool_pose``, ``path_point``, ``reference``, ``law``, with friction also
-            ``friction_torque``.
-        reference_duration: Length of the reference motion [s].
-        initial_state: State of the plant at the start, shape (6,).
-        initial_theta: Path parameter at the start.
-        on_motors: Whether the law acts on motor coordinates; it does not.
-        warnings: What may not go as well as hoped, one sentence each.
+    Drives and slides are one, ``joint_state = [q, v, q, v]``. With friction its log also
+    holds ``friction_torque``.
     """
 
-    diagram: Diagram
-    plant: DeltaPlant
-    chain: DeltaRobot
-    coordinates: PlantCoordinates
-    path: Path
-    law: PathLaw
-    projector: PathProjector
-    controller: PathFollowingController
-    log: SignalLog
-    reference_duration: float
-    initial_state: np.ndarray
-    initial_theta: float
-    on_motors: bool
-    warnings: list[str]
-
-    def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario.
-
-        Args:
-            root: Context of the diagram.
-        """
+    def place_robot(self, context: Context) -> None:
+        """See :meth:`Station.place_robot`."""
         q, v = np.split(self.initial_state, 2)
-        self.plant.set_state(self.plant.GetMyMutableContextFromRoot(root), q, v)
-        self.projector.set_parameter(
-            self.projector.GetMyMutableContextFromRoot(root), self.initial_theta
-        )
+        self.plant.set_state(context, q, v)
 
 
 def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobot:

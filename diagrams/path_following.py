@@ -1,11 +1,10 @@
 """Path following station: robot, projector, law, drives and log in one diagram."""
 
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from diagrams.compliance import add_compliance, compliance_warnings, reference_order
 from diagrams.drives import add_drives, add_friction
@@ -13,13 +12,12 @@ from diagrams.measurement import add_forces, add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.robot import add_robot, tool_frame
 from diagrams.scenario import ControllerParameters, PathFollowingScenario
-from diagrams.signal_log import SignalLog, add_log
+from diagrams.signal_log import add_log
 from diagrams.start import start_state
-from pfsc_drake.control.path_law import PathLaw
+from diagrams.station import Station
 from pfsc_drake.control.reference import rest_to_rest
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import Path
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates, chain_from_plant
+from pfsc_drake.robot.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.path_following_controller import PathFollowingController
@@ -34,57 +32,17 @@ _FASTEST_RESONANCE = 1.0
 _FASTEST_DAMPING = 1.8
 
 
-@dataclass
-class PathFollowingStation:
-    """A built station and what is needed to run it.
+class PathFollowingStation(Station[MultibodyPlant, SerialChain]):
+    """Station of a serial arm.
 
-    Attributes:
-        diagram: The diagram.
-        plant: The robot in it.
-        chain: The robot as a serial chain.
-        coordinates: Where the chain's coordinates stand in the plant's state.
-        path: The path.
-        law: The path following law.
-        projector: Projector system.
-        controller: Controller system.
-        log: Log of ``joint_state``, ``tool_pose``, ``path_point``, ``reference``, ``law``,
-            with forces also ``wrench_ext``, ``tau_ext``; with compliance what
-            :func:`add_compliance` returns, with servos ``drive_torque``, with friction
-            ``friction_torque``.
-        reference_duration: Length of the reference motion [s].
-        initial_state: State of the plant at the start.
-        initial_theta: Path parameter at the start.
-        on_motors: Whether the law acts on the tool pose of the motors, not of the links.
-        warnings: What may not go as well as hoped, one sentence each.
+    Its log also holds, with forces ``wrench_ext``, ``tau_ext``, with compliance what
+    :func:`add_compliance` returns, with servos ``drive_torque``, with friction
+    ``friction_torque``.
     """
 
-    diagram: Diagram
-    plant: MultibodyPlant
-    chain: SerialChain
-    coordinates: PlantCoordinates
-    path: Path
-    law: PathLaw
-    projector: PathProjector
-    controller: PathFollowingController
-    log: SignalLog
-    reference_duration: float
-    initial_state: np.ndarray
-    initial_theta: float
-    on_motors: bool
-    warnings: list[str]
-
-    def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario.
-
-        Args:
-            root: Context of the diagram.
-        """
-        self.plant.SetPositionsAndVelocities(
-            self.plant.GetMyMutableContextFromRoot(root), self.initial_state
-        )
-        self.projector.set_parameter(
-            self.projector.GetMyMutableContextFromRoot(root), self.initial_theta
-        )
+    def place_robot(self, context: Context) -> None:
+        """See :meth:`Station.place_robot`."""
+        self.plant.SetPositionsAndVelocities(context, self.initial_state)
 
 
 def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> PathFollowingStation:

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path as FilePath
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.systems.framework import Context, Diagram, System
+from pydrake.systems.framework import Diagram
 
 from diagrams.delta_following import build_delta_following, load_delta_robot
 from diagrams.delta_replay import build_delta_replay
@@ -14,82 +13,9 @@ from diagrams.path_following import build_path_following
 from diagrams.replay import RecordedMotion, build_replay
 from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario_delta import DeltaFollowingScenario
-from diagrams.signal_log import SignalLog
-from pfsc_drake.control.path_law import PathLaw
-from pfsc_drake.geometry import Path
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from diagrams.station import Station
 from pfsc_drake.robot.delta_parameters import SHIPPED_ROBOTS as DELTA_ROBOTS
-from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.path_following_controller import PathFollowingController
-from pfsc_drake.systems.path_projector import PathProjector
 from pfsc_drake.typed_yaml import load_typed
-
-
-class Station(Protocol):
-    """What running, logging and measuring need to know of a station, whatever its robot.
-
-    See :class:`~diagrams.path_following.PathFollowingStation` for the attributes. The plant's
-    continuous state is ``[q, v]``.
-    """
-
-    @property
-    def diagram(self) -> Diagram:
-        """The diagram."""
-
-    @property
-    def plant(self) -> System:
-        """The robot in it."""
-
-    @property
-    def chain(self) -> RobotModel:
-        """The robot as the laws know it."""
-
-    @property
-    def coordinates(self) -> PlantCoordinates:
-        """Where its coordinates stand in the plant's state."""
-
-    @property
-    def path(self) -> Path:
-        """The path."""
-
-    @property
-    def law(self) -> PathLaw:
-        """The path following law."""
-
-    @property
-    def projector(self) -> PathProjector:
-        """Projector system."""
-
-    @property
-    def controller(self) -> PathFollowingController:
-        """Controller system."""
-
-    @property
-    def log(self) -> SignalLog:
-        """Log of the run."""
-
-    @property
-    def reference_duration(self) -> float:
-        """Length of the reference motion [s]."""
-
-    @property
-    def initial_state(self) -> np.ndarray:
-        """State of the plant at the start."""
-
-    @property
-    def initial_theta(self) -> float:
-        """Path parameter at the start."""
-
-    @property
-    def on_motors(self) -> bool:
-        """Whether the law acts on the tool pose of the motors, not of the links."""
-
-    @property
-    def warnings(self) -> list[str]:
-        """What may not go as well as hoped, one sentence each."""
-
-    def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario."""
 
 
 def is_delta(model: str) -> bool:

@@ -14,7 +14,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.block_diagram import block_diagram_svg
 from diagrams.replay import RecordedMotion, record
 from diagrams.scenario import PathFollowingScenario, Waypoints
-from diagrams.stations import Station, build_station, build_station_replay, load_settings
+from diagrams.station import Station
+from diagrams.stations import build_station, build_station_replay, load_settings
 from experiments.figures import write_figures
 from experiments.metrics import Metrics
 from experiments.path_metrics import metric_names, path_following_metrics

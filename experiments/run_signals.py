@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.replay import RecordedMotion
-from diagrams.stations import Station
+from diagrams.station import Station
 from experiments.run_log import RunLog
 from pfsc_drake.control.linearization import path_output_function
 from pfsc_drake.control.path_law import Fault

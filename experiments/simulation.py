@@ -7,7 +7,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context
 
 from diagrams.scenario import SimulationParameters
-from diagrams.stations import Station
+from diagrams.station import Station
 from experiments.progress import ProgressListener
 from pfsc_drake.control.path_law import Fault
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.stations import Station
+from diagrams.station import Station
 from experiments.run_log import RunLog
 
 _SAMPLES = 1000

@@ -12,10 +12,11 @@ from pfsc_drake.jets import Jet
 from pfsc_drake.robot.delta_kinematics import RodMotion, rod_motion
 from pfsc_drake.robot.delta_parameters import NUM_ARMS, DeltaParameters
 from pfsc_drake.robot.delta_workspace import joint_coordinates
+from pfsc_drake.robot.robot_model import RobotModel
 
 
 @dataclass(frozen=True)
-class DeltaRobot:
+class DeltaRobot(RobotModel):
     """Kinematics and dynamics (2.72) of the DELTA robot, rigid and without friction.
 
     A :class:`~pfsc_drake.robot.robot_model.RobotModel`, so that the laws serve it.
@@ -39,31 +40,6 @@ class DeltaRobot:
         return NUM_ARMS
 
     @property
-    def is_elastic(self) -> bool:
-        """Whether the joints are elastic; they are not."""
-        return False
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the joints, shape (3,)."""
-        return [f"slide_{i + 1}" for i in range(NUM_ARMS)]
-
-    @property
-    def D_M(self) -> np.ndarray:
-        """Drive inertias besides the links', zero: the slides' masses hold them, shape (3,)."""
-        return self.gather("reflected_inertia")
-
-    @property
-    def K_s(self) -> np.ndarray:
-        """Joint stiffnesses, infinite, shape (3,)."""
-        return self.gather("stiffness")
-
-    @property
-    def K_d(self) -> np.ndarray:
-        """Joint dampings, zero, shape (3,)."""
-        return self.gather("damping")
-
-    @property
     def gravity(self) -> np.ndarray:
         """Gravitational acceleration in the inertial frame [m/s^2], shape (3,)."""
         return self.parameters.gravity
@@ -84,7 +60,7 @@ class DeltaRobot:
         """
         drives = self.parameters.drives
         values = {
-            "name": np.array(self.names),
+            "name": np.array([f"slide_{i + 1}" for i in range(NUM_ARMS)]),
             "kind": np.full(NUM_ARMS, "prismatic"),
             "is_revolute": np.full(NUM_ARMS, False),
             "reflected_inertia": np.zeros(NUM_ARMS),

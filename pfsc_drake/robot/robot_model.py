@@ -13,8 +13,8 @@ from pfsc_drake.jets import Jet
 class RobotModel(Protocol):
     """Kinematics and dynamics of a fully actuated robot on jets.
 
-    Serial chains and the DELTA robot are such models; a robot of another kind needs
-    no more than this to be path controlled.
+    Serial chains and the DELTA robot are such models; a robot of another kind needs no
+    more than ``dimension``, ``gather`` and the three maps below to be path controlled.
     """
 
     @property
@@ -24,22 +24,27 @@ class RobotModel(Protocol):
     @property
     def is_elastic(self) -> bool:
         """Whether every joint has a finite stiffness."""
+        return bool(np.isfinite(self.K_s).all())
 
     @property
     def D_M(self) -> np.ndarray:
         """Rotor inertias reflected to the joint side, shape (N,)."""
+        return self.gather("reflected_inertia")
 
     @property
     def K_s(self) -> np.ndarray:
         """Joint stiffnesses, shape (N,); infinite when rigid."""
+        return self.gather("stiffness")
 
     @property
     def K_d(self) -> np.ndarray:
         """Joint dampings, shape (N,)."""
+        return self.gather("damping")
 
     @property
     def names(self) -> Sequence[str]:
         """Names of the joints."""
+        return self.gather("name").tolist()
 
     def gather(self, attribute: str) -> np.ndarray:
         """Return ``effort_limit``, ``velocity_limit`` (N,), ``position_limits`` (N, 2), ..."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot import newton_euler
+from pfsc_drake.robot.robot_model import RobotModel
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class ChainLink:
 
 
 @dataclass(frozen=True)
-class SerialChain:
+class SerialChain(RobotModel):
     """A chain from the world to a tool point.
 
     Attributes:
@@ -83,34 +84,9 @@ class SerialChain:
         """Number of joints N."""
         return len(self.links)
 
-    @property
-    def is_elastic(self) -> bool:
-        """Whether every joint has a finite stiffness."""
-        return all(np.isfinite(link.stiffness) for link in self.links)
-
     def gather(self, attribute: str) -> np.ndarray:
         """Return one attribute of all links as an array, shape (N,) or (N, ...)."""
         return np.array([getattr(link, attribute) for link in self.links])
-
-    @property
-    def D_M(self) -> np.ndarray:
-        """Rotor inertias reflected to the joint side, shape (N,)."""
-        return self.gather("reflected_inertia")
-
-    @property
-    def K_s(self) -> np.ndarray:
-        """Joint stiffnesses, shape (N,)."""
-        return self.gather("stiffness")
-
-    @property
-    def K_d(self) -> np.ndarray:
-        """Joint dampings, shape (N,)."""
-        return self.gather("damping")
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the joints."""
-        return [link.name for link in self.links]
 
     def tool_pose(self, q: Sequence[Jet]) -> tuple[Jet, Jet]:
         """Return tool point [m] and orientation, see :func:`newton_euler.tool_pose`."""
