@@ -6,13 +6,14 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
+from diagrams.drives import friction_bristles
+from diagrams.measurement import add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.scenario import RobotParameters
 from diagrams.scenario_delta import DeltaFollowingScenario
 from diagrams.signal_log import add_log
 from diagrams.start import check_points, start_point
 from diagrams.station import Station
-from pfsc_drake.control.friction import bristles_for_step
 from pfsc_drake.control.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
@@ -24,12 +25,9 @@ from pfsc_drake.systems.joint_friction import JointFriction
 from pfsc_drake.systems.path_following_controller import PathFollowingController
 from pfsc_drake.systems.path_projector import PathProjector
 from pfsc_drake.systems.reference_generator import ReferenceGenerator
-from pfsc_drake.systems.sensor_failure import SensorFailure
 from pfsc_drake.systems.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.trajectory_point import TrajectoryPoint
 
-# integration schemes of fixed step that the bristles of friction are made for
-_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # m, between the points of the way along the path that are checked for reach
 _REACH_SPACING = 2e-3
 
@@ -99,7 +97,9 @@ def build_delta_following(
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", DeltaPlant(robot))
     coordinates = _coordinates(robot)
-    joint_state = _add_joint_state(builder, plant, coordinates, scenario)
+    joint_state = add_joint_state(
+        builder, plant.GetOutputPort("state"), robot, coordinates, scenario
+    )
     kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(robot))
     degree, num_outputs = linearization.relative_degree, linearization.num_outputs
     projector = builder.AddNamedSystem("path_projector", PathProjector(path, degree, period))
@@ -160,31 +160,6 @@ def _coordinates(robot: DeltaRobot) -> PlantCoordinates:
     return PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(robot.dimension))
 
 
-def _add_joint_state(
-    builder: DiagramBuilder,
-    plant: DeltaPlant,
-    coordinates: PlantCoordinates,
-    scenario: DeltaFollowingScenario,
-) -> OutputPort:
-    """Add the encoders, and return ``[q, v, q, v]`` as measured."""
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
-    builder.Connect(plant.GetOutputPort("state"), encoders.get_input_port())
-    failure = scenario.simulation.sensor_failure
-    if failure.time < 0.0:
-        return encoders.get_output_port()
-    if not 0 <= failure.component < len(rows):
-        raise InputError(
-            f"simulation.sensor_failure.component: {failure.component}; "
-            f"allowed: 0 to {len(rows) - 1}"
-        )
-    broken = builder.AddNamedSystem(
-        "sensor_failure", SensorFailure(len(rows), failure.component, failure.time)
-    )
-    builder.Connect(encoders.get_output_port(), broken.GetInputPort("measured"))
-    return broken.GetOutputPort("delivered")
-
-
 def _add_drives(
     builder: DiagramBuilder,
     plant: DeltaPlant,
@@ -197,17 +172,11 @@ def _add_drives(
     if not scenario.drive_friction:
         builder.Connect(drive_force, actuation)
         return {}
-    simulation = scenario.simulation
-    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
-        raise InputError(
-            f"simulation.integrator = {simulation.integrator} with drive_friction; allowed: "
-            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
-        )
     n, friction = robot.dimension, robot.parameters.friction
     slides = np.full(n, robot.parameters.masses.effective_slide)
-    # stiff enough for the step of the integration, or of the hold if that is shorter
-    step = min(simulation.max_step, scenario.controller.sampling_time)
-    bristles = bristles_for_step(friction.coulomb, friction.viscous, slides, step)
+    bristles = friction_bristles(
+        scenario, friction.coulomb, friction.viscous, slides, "drive_friction"
+    )
     drives = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
     # the true velocity, whatever the encoders say
     velocity = builder.AddNamedSystem(

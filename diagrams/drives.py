@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
-from pfsc_drake.control.friction import bristles_for_step
+from pfsc_drake.control.friction import BristleFriction, bristles_for_step
 from pfsc_drake.control.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
@@ -125,18 +125,10 @@ def add_friction(
     """
     if not scenario.friction.is_given:
         return {}
-    simulation = scenario.simulation
-    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
-        raise InputError(
-            f"simulation.integrator = {simulation.integrator} with friction; allowed: "
-            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
-        )
     if not np.all(chain.D_M > 0.0):
         raise InputError("friction: needs a robot with rotor inertia in every drive")
     f_c, f_v = _coefficients(scenario.friction, chain, folder)
-    # stiff enough for the step of the integration, or of the hold if that is shorter
-    step = min(simulation.max_step, scenario.controller.sampling_time)
-    bristles = bristles_for_step(f_c, f_v, chain.D_M, step)
+    bristles = friction_bristles(scenario, f_c, f_v, chain.D_M, "friction")
     friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
     n, num_positions = chain.dimension, plant.num_positions()
     rows = coordinates.motor_rows[n:]
@@ -147,6 +139,36 @@ def add_friction(
     builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
     builder.Connect(resistance.get_output_port(), plant.get_applied_generalized_force_input_port())
     return {"friction_torque": friction.GetOutputPort("friction_torque")}
+
+
+def friction_bristles(
+    scenario: PathFollowingScenario,
+    f_c: np.ndarray,
+    f_v: np.ndarray,
+    inertia: np.ndarray,
+    key: str,
+) -> BristleFriction:
+    """Return friction whose bristles suit the integration.
+
+    Args:
+        scenario: The scenario.
+        f_c: Coulomb friction [Nm or N], shape (N,).
+        f_v: Viscous friction [Nm s/rad or N s/m], shape (N,).
+        inertia: Least inertia behind each drive, shape (N,).
+        key: Key of the scenario that asks for friction, for the message.
+
+    Raises:
+        InputError: If the bristles are not made for the integration.
+    """
+    simulation = scenario.simulation
+    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+        raise InputError(
+            f"simulation.integrator = {simulation.integrator} with {key}; allowed: "
+            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+        )
+    # stiff enough for the step of the integration, or of the hold if that is shorter
+    step = min(simulation.max_step, scenario.controller.sampling_time)
+    return bristles_for_step(f_c, f_v, inertia, step)
 
 
 def _coefficients(

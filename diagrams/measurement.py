@@ -11,6 +11,7 @@ from pfsc_drake.control.force_profile import ForceProfile
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.decoupled_force import DecoupledForce
 from pfsc_drake.systems.external_wrench import ExternalWrench
@@ -21,8 +22,8 @@ from pfsc_drake.systems.sensor_failure import SensorFailure
 
 def add_joint_state(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    chain: SerialChain,
+    plant_state: OutputPort,
+    robot: RobotModel,
     coordinates: PlantCoordinates,
     scenario: PathFollowingScenario,
 ) -> OutputPort:
@@ -30,8 +31,8 @@ def add_joint_state(
 
     Args:
         builder: Builder of the diagram.
-        plant: Plant with the robot.
-        chain: The robot.
+        plant_state: State of the plant.
+        robot: The robot.
         coordinates: Where its coordinates stand in the plant's state.
         scenario: The scenario.
 
@@ -41,12 +42,12 @@ def add_joint_state(
     """
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
-    builder.Connect(plant.get_state_output_port(), encoders.get_input_port())
-    measured = _add_imperfection(builder, encoders.get_output_port(), chain, scenario)
+    builder.Connect(plant_state, encoders.get_input_port())
+    measured = _add_imperfection(builder, encoders.get_output_port(), robot, scenario)
     failure = scenario.simulation.sensor_failure
     if failure.time < 0.0:
         return measured
-    size = 4 * chain.dimension
+    size = 4 * robot.dimension
     if not 0 <= failure.component < size:
         raise InputError(
             f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
@@ -61,7 +62,7 @@ def add_joint_state(
 def _add_imperfection(
     builder: DiagramBuilder,
     joint_state: OutputPort,
-    chain: SerialChain,
+    robot: RobotModel,
     scenario: PathFollowingScenario,
 ) -> OutputPort:
     """Add increments and difference quotients, if there are any."""
@@ -71,7 +72,7 @@ def _add_imperfection(
     period = scenario.controller.sampling_time
     if scenario.controller.law == "velocity_servo":
         period = scenario.servo.period or period
-    real = builder.AddNamedSystem("encoder_increments", JointEncoders(chain, options, period))
+    real = builder.AddNamedSystem("encoder_increments", JointEncoders(robot, options, period))
     builder.Connect(joint_state, real.GetInputPort("joint_state"))
     return real.GetOutputPort("joint_state")
 

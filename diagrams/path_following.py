@@ -80,7 +80,9 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         dwell=reference.dwell,
     )
 
-    joint_state = add_joint_state(builder, plant, chain, coordinates, scenario)
+    joint_state = add_joint_state(
+        builder, plant.get_state_output_port(), chain, coordinates, scenario
+    )
     on_motors = law_name == "rigid" and chain.is_elastic
     kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(chain, on_motors))
     projector = builder.AddNamedSystem(

@@ -209,4 +209,4 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
     if "friction_torque" in raw:
         labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
-        log.add("tau_f", raw["friction_torque"], _joint_units(station)[2], labels)
+        log.add("tau_f", raw["friction_torque"], effort, labels)

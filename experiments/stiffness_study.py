@@ -84,8 +84,11 @@ def write_study(
     points = []
     with TemporaryDirectory() as folder:
         for stiffness in stiffnesses:
+            resonance = None
             for law in laws:
-                point = _run(law, float(stiffness), Path(folder))
+                scenario = _scenario(law, float(stiffness), Path(folder))
+                resonance = resonance or _resonance(scenario)
+                point = _run(scenario, law, float(stiffness), resonance, Path(folder))
                 points.append(point)
                 result = point.fault or f"{point.deviation * 1e3:.3g} mm"
                 progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
@@ -112,8 +115,8 @@ def write_study(
     )
 
 
-def _run(law: str, stiffness: float, folder: Path) -> StudyPoint:
-    """Run one law on one stiffness."""
+def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:
+    """Return the scenario of one law on one stiffness, with a model file of its own."""
     parameters = load_parameters("comau_racer_1_4")
     variant = next(v for v in parameters.variants if v.name == _MODEL)
     elasticity = parameters.elasticities[variant.elasticity]
@@ -133,11 +136,21 @@ def _run(law: str, stiffness: float, folder: Path) -> StudyPoint:
     data["targets"] = {}
     if stiffness > _STIFF:
         data["simulation"] = {**data.get("simulation", {}), "max_step": _STIFF_STEP}
-    scenario = ScenarioFile(shipped.path, data)
-    station = build_path_following(
-        load_typed(PathFollowingScenario, data, _SCENARIO), shipped.path.parent
-    )
+    return ScenarioFile(shipped.path, data)
+
+
+def _resonance(scenario: ScenarioFile) -> float:
+    """Return the fastest joint resonance at the start [rad/s]."""
+    settings = load_typed(PathFollowingScenario, scenario.data, _SCENARIO)
+    station = build_path_following(settings, scenario.path.parent)
     q_J = (station.coordinates.link_rows @ station.initial_state)[: station.chain.dimension]
+    return float(joint_resonances(station.chain, q_J)[-1])
+
+
+def _run(
+    scenario: ScenarioFile, law: str, stiffness: float, resonance: float, folder: Path
+) -> StudyPoint:
+    """Run one law on one stiffness."""
     outcome = run_scenario(
         scenario,
         out=folder / "run",
@@ -147,7 +160,6 @@ def _run(law: str, stiffness: float, folder: Path) -> StudyPoint:
         progress=_Quiet(),
     )
     deviation = np.nan if outcome.fault else outcome.metrics["max_path_deviation"].value
-    resonance = float(joint_resonances(station.chain, q_J)[-1])
     return StudyPoint(law, stiffness, resonance, deviation, outcome.fault)
 
 
