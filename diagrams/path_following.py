@@ -6,8 +6,9 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from diagrams.compliance import add_compliance, compliance_warnings, reference_order
+from diagrams.compliance import add_compliance, reference_order
 from diagrams.drives import add_drives, add_friction
+from diagrams.force_sensor import add_sensor, sensor_warnings
 from diagrams.measurement import add_forces, add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.robot import add_robot, tool_frame
@@ -117,9 +118,11 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         "law": controller.GetOutputPort("law"),
     }
     if scenario.compliance.is_given:
+        tool = tool_frame(plant, scenario.robot)
+        signals |= add_sensor(builder, plant, chain, tool, scenario, joint_state)
         manifold_state = controller.GetOutputPort("manifold_state")
         inputs = signals | {"desired_reference": desired, "manifold_state": manifold_state}
-        signals |= add_compliance(builder, plant, chain, scenario, linearization, inputs)
+        signals |= add_compliance(builder, scenario, linearization, inputs)
     builder.Connect(signals["reference"], controller.GetInputPort("reference"))
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     signals |= add_drives(
@@ -145,7 +148,7 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_theta,
         on_motors,
         _warnings(scenario.controller, chain, coordinates.link_rows @ initial_state)
-        + compliance_warnings(scenario),
+        + sensor_warnings(scenario),
     )
 
 

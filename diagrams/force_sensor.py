@@ -1,0 +1,78 @@
+"""The force/torque sensor between robot and tool."""
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Demultiplexer
+
+from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.force_torque_sensor import ForceTorqueSensor
+from pfsc_drake.systems.tool_compensation import ToolCompensation, tool_load_from_plant
+
+
+def add_sensor(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    robot: RobotModel,
+    tool: Frame,
+    scenario: PathFollowingScenario,
+    joint_state: OutputPort,
+) -> dict[str, OutputPort]:
+    """Add a force/torque sensor with taring and compensation of the tool behind it.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        robot: The robot.
+        tool: Frame at the tool point, in the plant.
+        scenario: The scenario.
+        joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
+
+    Returns:
+        ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``.
+
+    Raises:
+        InputError: If the sensor does not suit the robot or the sampling time.
+    """
+    parameters, period = scenario.sensor, scenario.controller.sampling_time
+    if not plant.HasJointNamed(parameters.joint):
+        raise InputError(
+            f"sensor.joint: the model {scenario.robot.model} has no joint '{parameters.joint}'"
+        )
+    joint = plant.GetJointByName(parameters.joint)
+    sensor = builder.AddNamedSystem(
+        "force_torque_sensor", ForceTorqueSensor(plant, joint, parameters.transducer(), period)
+    )
+    load = tool_load_from_plant(plant, joint, tool)
+    compensation = builder.AddNamedSystem(
+        "tool_compensation",
+        ToolCompensation(
+            robot, load, parameters.measurement_range, parameters.compensation(), period
+        ),
+    )
+    builder.Connect(plant.get_reaction_forces_output_port(), sensor.GetInputPort("reaction_forces"))
+    builder.Connect(
+        sensor.GetOutputPort("measured_wrench"), compensation.GetInputPort("measured_wrench")
+    )
+    builder.Connect(joint_state, compensation.GetInputPort("joint_state"))
+    # one port, split without Python, costs less time per tick than its parts one by one
+    whole = compensation.GetOutputPort("compensation")
+    sizes = [6, 1, 1, whole.size() - 8]
+    split = builder.AddNamedSystem("sensor_signals", Demultiplexer(sizes))
+    builder.Connect(whole, split.get_input_port())
+    names = ("wrench_measured", "tared", "sensor_fault")
+    return {name: split.get_output_port(i) for i, name in enumerate(names)}
+
+
+def sensor_warnings(scenario: PathFollowingScenario) -> list[str]:
+    """Return what may keep a scenario's sensor from being tared."""
+    noisy = scenario.encoders.difference_quotient and scenario.sensor.inertia != "none"
+    if not (scenario.compliance.is_given and noisy):
+        return []
+    return [
+        "the tool's inertial load comes from the second difference of encoder positions; if that "
+        "is noisier than sensor.taring_spread, the sensor is never tared and the tool does not "
+        "yield: filter the velocities (encoders.filter_time) or take sensor.inertia 'none'"
+    ]
