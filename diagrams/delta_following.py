@@ -7,6 +7,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.drives import friction_bristles
+from diagrams.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.measurement import add_joint_state
 from diagrams.parts import make_law, make_path
 from diagrams.scenario import RobotParameters
@@ -14,7 +15,6 @@ from diagrams.scenario_delta import DeltaFollowingScenario
 from diagrams.signal_log import add_log
 from diagrams.start import check_points, start_point
 from diagrams.station import Station
-from pfsc_drake.control.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
@@ -22,11 +22,6 @@ from pfsc_drake.robot.delta import DeltaRobot
 from pfsc_drake.robot.delta_parameters import load_delta_parameters
 from pfsc_drake.systems.delta_plant import DeltaPlant
 from pfsc_drake.systems.joint_friction import JointFriction
-from pfsc_drake.systems.path_following_controller import PathFollowingController
-from pfsc_drake.systems.path_projector import PathProjector
-from pfsc_drake.systems.reference_generator import ReferenceGenerator
-from pfsc_drake.systems.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.trajectory_point import TrajectoryPoint
 
 # m, between the points of the way along the path that are checked for reach
 _REACH_SPACING = 2e-3
@@ -80,19 +75,13 @@ def build_delta_following(
             "robot are stiff and take forces"
         )
     robot = load_delta_robot(scenario.robot, folder)
-    period, reference = scenario.controller.sampling_time, scenario.reference
+    period = scenario.controller.sampling_time
     path = make_path(scenario.path, scenario.controller.law, folder)
     if path.orientation is not None:
         raise InputError("path: has an orientation; a DELTA robot only translates")
     law = make_law(scenario.controller, robot, oriented=False)
-    linearization = law.linearization
     initial_state, initial_theta = _start_state(scenario, path, robot)
-    eta_p = rest_to_rest(
-        reference.points,
-        velocity=reference.velocity,
-        acceleration=reference.acceleration,
-        dwell=reference.dwell,
-    )
+    task = Task(scenario, robot, path, law, reference_progress(scenario))
 
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", DeltaPlant(robot))
@@ -100,38 +89,11 @@ def build_delta_following(
     joint_state = add_joint_state(
         builder, plant.GetOutputPort("state"), robot, coordinates, scenario
     )
-    kinematics = builder.AddNamedSystem("tool_kinematics", ToolKinematics(robot))
-    degree, num_outputs = linearization.relative_degree, linearization.num_outputs
-    projector = builder.AddNamedSystem("path_projector", PathProjector(path, degree, period))
-    controller = builder.AddNamedSystem(
-        "path_following_controller", PathFollowingController(law, period)
-    )
-    generator = builder.AddNamedSystem(
-        "reference_generator", ReferenceGenerator(eta_p, degree, num_outputs)
-    )
-    tool_pose = kinematics.GetOutputPort("tool_pose")
-    path_point = projector.GetOutputPort("path_point")
-    progress = generator.GetOutputPort("reference")
-    builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-    builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-    if linearization.time_driven:
-        leader = builder.AddNamedSystem(
-            "trajectory_point", TrajectoryPoint(path, degree, num_outputs)
-        )
-        builder.Connect(progress, leader.GetInputPort("reference"))
-        path_point = leader.GetOutputPort("path_point")
-    builder.Connect(joint_state, controller.GetInputPort("joint_state"))
-    builder.Connect(path_point, controller.GetInputPort("path_point"))
-    builder.Connect(progress, controller.GetInputPort("reference"))
+    place = add_place_on_path(builder, task, joint_state)
+    controller, made = add_law(builder, task, place, {})
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, robot.dimension))
     builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
-    signals = {
-        "joint_state": joint_state,
-        "tool_pose": tool_pose,
-        "path_point": path_point,
-        "reference": progress,
-        "law": controller.GetOutputPort("law"),
-    }
+    signals = place.signals | made
     signals |= _add_drives(builder, plant, robot, hold.get_output_port(), scenario)
     log = add_log(builder, signals, period)
     diagram = builder.Build()
@@ -143,10 +105,10 @@ def build_delta_following(
         coordinates,
         path,
         law,
-        projector,
+        place.projector,
         controller,
         log,
-        eta_p.domain[1],
+        task.progress.domain[1],
         initial_state,
         initial_theta,
         on_motors=False,

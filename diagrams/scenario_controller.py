@@ -6,6 +6,7 @@ from diagrams.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
 
 MANIFOLDS = ("path", "trajectory")
+_TORQUE_SOURCES = ("none", "known", "measured")
 
 
 @dc.dataclass
@@ -47,6 +48,26 @@ class LawGains:
 
 
 @dc.dataclass
+class ExternalTorqueParameters:
+    """What the law knows of the external torques in the joints.
+
+    Attributes:
+        source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
+            ``measured``: from the force/torque sensor.
+        bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
+            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives.
+    """
+
+    source: str = "none"
+    bandwidth: float = 0.0
+
+    def __post_init__(self) -> None:
+        known = self.source in _TORQUE_SOURCES
+        require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
+        require_not_negative("bandwidth", self.bandwidth)
+
+
+@dc.dataclass
 class ControllerParameters:
     """The path following controller.
 
@@ -62,6 +83,7 @@ class ControllerParameters:
         effort_scale: Fraction of the model's effort limits that the law may use.
         manifold: ``path``: path following; ``trajectory``: classical tracking of a point
             that moves along the path with time, for comparison.
+        external_torque: What it knows of forces on the tool.
     """
 
     law: str = "elastic"
@@ -73,6 +95,7 @@ class ControllerParameters:
     brake_damping: float = 0.1
     effort_scale: float = 1.0
     manifold: str = "path"
+    external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))

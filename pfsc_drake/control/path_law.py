@@ -217,12 +217,13 @@ class PathLaw:
     def _judge(self, solution: DecouplingSolution, result: np.ndarray) -> Fault:
         """Return what forbids the use of a result, the root cause first."""
         alpha, status = self._point[self._alpha_index], self._point[self._status_index]
-        # written so that NaN is a fault; a sum is finite only if all its terms are
+        # written so that NaN is a fault; a sum is finite only if all its terms are, and the
+        # limits of the drives turn NaN into numbers
         if (
             self._inverse.accepts(solution)
             and alpha < self._max_alpha
             and status != PathStatus.NOT_CONVERGED
-            and math.isfinite(result.sum() + self._state.sum())
+            and math.isfinite(result.sum() + self._state.sum() + self._tau_ext.sum())
         ):
             return Fault.NONE
         inputs = (self._state, self._reference, self._integral, self._tau_ext)

@@ -29,6 +29,9 @@ class PathFollowingController(LeafSystem):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         path_point (input): From :class:`PathProjector`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
+        tau_ext (input, optional): External joint torques and their derivatives up to order
+            r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
+            Only for r > 1.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
             m/s]; the attribute ``drive_port`` holds the name.
@@ -53,7 +56,7 @@ class PathFollowingController(LeafSystem):
         self._law, self.period, self.layout = law, period, law.layout
         linearization = law.linearization
         n, m = linearization.num_joints, linearization.num_outputs
-        r = linearization.relative_degree
+        r = self.relative_degree = linearization.relative_degree
         self._integral, self._fault, self._known = slice(0, m), m, m + 1
         self._held, self._last_good = slice(m + 2, m + 2 + n), slice(m + 2 + n, m + 2 + 5 * n)
         memory = self.DeclareDiscreteState(self._last_good.stop)
@@ -62,12 +65,16 @@ class PathFollowingController(LeafSystem):
             "path_point", linearization.layout.size
         )
         self._reference: InputPort = self.DeclareVectorInputPort("reference", (r + 1) * m)
+        self._tau_ext: InputPort | None = None
         sources = {
             self._joint_state.ticket(),
             self._path_point.ticket(),
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
+        if r > 1:
+            self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
+            sources.add(self._tau_ext.ticket())
         self._output: OutputPort = self.DeclareVectorOutputPort(
             "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
@@ -95,13 +102,16 @@ class PathFollowingController(LeafSystem):
 
     def _calc_law(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
-        state = self._joint_state.Eval(context)
+        state, tau_ext = self._joint_state.Eval(context), None
+        if self._tau_ext is not None and self._tau_ext.HasValue(context):
+            tau_ext = self._tau_ext.Eval(context)
         result = self._law.evaluate(
             state,
             self._path_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
             memory[self._held] if memory[self._known] else None,
+            tau_ext,
         )
         status = self.layout.status.start
         fault = memory[self._fault] or result[status]

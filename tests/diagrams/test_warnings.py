@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import ForcePulse, PathFollowingScenario
 from pfsc_drake.typed_yaml import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -35,3 +35,14 @@ def test_damping_too_strong_for_the_sampling(scenario):
     scenario.controller.boundary_layer_damping = [0.3, 0.04, 0.02]
     (warning,) = build_path_following(scenario, SCENARIOS).warnings
     assert "2.12" in warning and "boundary_layer_damping" in warning
+
+
+def test_forces_that_the_elastic_law_does_not_know_of(scenario):
+    scenario.forces = [ForcePulse(begin=0.1, end=0.5, force=[5.0, 0.0, 0.0])]
+    (warning,) = build_path_following(scenario, SCENARIOS).warnings
+    assert "external_torque" in warning
+    scenario.controller.external_torque.source = "known"
+    assert build_path_following(scenario, SCENARIOS).warnings == []
+    scenario.controller.external_torque.source = "none"
+    scenario.controller.law = "singular_perturbation"
+    assert build_path_following(scenario, SCENARIOS).warnings == []

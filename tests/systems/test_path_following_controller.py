@@ -246,3 +246,24 @@ def test_a_loop_from_the_drives_to_the_measurement_is_refused(bench):
     builder.Connect(gain.get_output_port(), controller.GetInputPort("joint_state"))
     with pytest.raises(RuntimeError, match="algebraic loop"):
         builder.Build()
+
+
+def test_external_torques_reach_the_law(bench):
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, [3.0, -2.0, 1.0])
+    expected = bench.law.evaluate(
+        bench.state,
+        bench.point,
+        bench.reference,
+        np.zeros(3),
+        tau_ext=np.array([3.0, -2.0, 1.0]),
+    )
+    assert np.array_equal(bench.output("law"), expected)
+    # a rigid joint's drive bears the torque itself (3.29)
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, np.zeros(3))
+    difference = expected[bench.law.layout.drive] - bench.output("drive_torque")
+    assert np.allclose(difference, [-3.0, 2.0, -1.0], rtol=0, atol=1e-9)
+
+
+def test_external_torque_that_is_not_finite_is_a_fault(bench):
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, [0.0, np.nan, 0.0])
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
