@@ -43,11 +43,10 @@ class DecouplingInverse:
             A: Decoupling matrix, shape (N, N).
             rhs: Right-hand side, shape (N,).
         """
-        lu, pivots, info = lapack.dgetrf(A)
+        lu, _, x, info = lapack.dgesv(A, rhs)
         if info != 0:
             return DecouplingSolution(np.full(len(rhs), np.nan), 0.0)
         rcond, _ = lapack.dgecon(lu, lapack.dlange("1", A))
-        x, _ = lapack.dgetrs(lu, pivots, rhs)
         return DecouplingSolution(x, float(rcond))
 
     def accepts(self, solution: DecouplingSolution) -> bool:

@@ -98,11 +98,16 @@ class ForceProfile:
         self._by_frame = {
             frame: [pulse for pulse in pulses if pulse.frame == frame] for frame in FRAMES
         }
+        self._spans = [(pulse.begin, pulse.end) for pulse in pulses]
 
     @property
     def needs_path(self) -> bool:
         """Whether a pulse is given in manifold coordinates."""
         return bool(self._by_frame["manifold"])
+
+    def is_active(self, begin: float, end: float) -> bool:
+        """Return whether a pulse acts between two times, both included [s]."""
+        return any(first <= end and begin <= last for first, last in self._spans)
 
     def at(self, time: float, axes: np.ndarray) -> np.ndarray:
         """Return the wrench at the tool point in world axes, shape (6,) [N, Nm].
@@ -111,7 +116,7 @@ class ForceProfile:
             time: [s].
             axes: See :func:`manifold_axes`, shape (3, 3).
         """
-        if not any(p.begin < time < p.end for pulses in self._by_frame.values() for p in pulses):
+        if not self.is_active(time, time):
             return np.zeros(6)
         sums = {
             frame: sum((pulse.at(time) for pulse in pulses), np.zeros(6)).reshape(2, 3)

@@ -1,7 +1,6 @@
 """Impedance filters: how the reference of the virtual output yields to forces."""
 
 import enum
-import functools
 import math
 from bisect import bisect_right
 from collections.abc import Callable
@@ -10,12 +9,29 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
+from pfsc_drake.control.bound_function import BoundFunction
+from pfsc_drake.control.impedance_functions import (
+    coefficients,
+    reference_function,
+    transition,
+    update_function,
+)
 from pfsc_drake.errors import InputError
 from pfsc_drake.schema_check import REQUIRED
 
+__all__ = [
+    "DAMPING",
+    "MASS",
+    "STIFFNESS",
+    "CoordinateImpedance",
+    "ImpedanceLaw",
+    "ImpedanceParameters",
+    "ImpedanceStatus",
+    "Profile",
+    "transition",
+]
+
 MASS, DAMPING, STIFFNESS = range(3)
-# below these the roots of the characteristic polynomial lose digits that the series keeps
-_SERIES_DAMPING, _SERIES_STIFFNESS, _SERIES_TERMS = 0.5, 0.25, 20
 
 
 class ImpedanceStatus(enum.IntFlag):
@@ -25,6 +41,10 @@ class ImpedanceStatus(enum.IntFlag):
     FORCE_NOT_FINITE = 1
     IMPEDANCE_NOT_VALID = 2
     REFERENCE_NOT_FINITE = 4
+
+
+# attributes of an enumeration are looked up slowly
+_OK = ImpedanceStatus.OK
 
 
 @dataclass
@@ -115,52 +135,6 @@ class ImpedanceParameters:
     rotational: CoordinateImpedance = field(default_factory=CoordinateImpedance)
 
 
-@functools.lru_cache(maxsize=64)
-def transition(damping: float, stiffness: float, time: float) -> tuple[float, ...]:
-    """Return the solution of ``e'' + damping e' + stiffness e = f``, f held, in closed form.
-
-    Args:
-        damping: ``d / m`` >= 0 [1/s].
-        stiffness: ``k / m`` >= 0 [1/s^2].
-        time: ``T`` > 0 [s].
-
-    Returns:
-        ``(a, b, c, d, p)`` with ``e(T) = a e + b e' + p f``, ``e'(T) = c e + d e' + b f``;
-        accurate to rounding for any damping ratio, and for zero stiffness and damping.
-    """
-    h = 0.5 * damping
-    square = h * h - stiffness
-    if square >= 0.0:
-        w = math.sqrt(square)
-        slow = -stiffness / (h + w) if h > 0.0 else 0.0
-        p = math.exp(slow * time)
-        b = p * (-math.expm1(-2.0 * w * time) / (2.0 * w) if w > 0.0 else time)
-        a, d = p - slow * b, p - (h + w) * b
-    else:
-        w = math.sqrt(-square)
-        decay = math.exp(-h * time)
-        b = decay * math.sin(w * time) / w
-        cosine = decay * math.cos(w * time)
-        a, d = cosine + h * b, cosine - h * b
-    if h * time < _SERIES_DAMPING and stiffness * time**2 < _SERIES_STIFFNESS:
-        deflection = _series(damping * time, stiffness * time**2) * time**2
-    elif square >= 0.0:
-        x = slow * time
-        deflection = (time * (math.expm1(x) / x if x else 1.0) - b) / (h + w)
-    else:
-        deflection = (1.0 - a) / stiffness
-    return a, b, -stiffness * b, d, deflection
-
-
-def _series(damping: float, stiffness: float) -> float:
-    """Return e(1) from rest for f = 1, as a Taylor series."""
-    c_0, c_1, total = 0.0, 0.5, 0.5
-    for n in range(1, _SERIES_TERMS):
-        c_0, c_1 = c_1, -(damping * (n + 1) * c_1 + stiffness * c_0) / ((n + 1) * (n + 2))
-        total += c_1
-    return total
-
-
 class ImpedanceLaw:
     """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, of every coordinate, sampled.
 
@@ -228,9 +202,32 @@ class ImpedanceLaw:
         self._profiles = [[(p.over, p.interpolant()) for p in row] for row in table]
         self.is_constant = not any(p.at for row in table for p in row)
         self._constant = self._at({"eta": 0.0, "xi": 0.0})
-        self._key, self._prepared = b"", (np.zeros(0),) * 4
-        weights = [period**k / math.factorial(k) for k in range(self.desired_order + 1)]
-        self._taylor = np.array([weights, [0.0, *weights[:-1]]])
+        # the impedance that the coefficients belong to
+        self._key, self._coefficients = b"", np.zeros((8, num_outputs))
+        self._bind_functions()
+
+    def _bind_functions(self) -> None:
+        """Give both functions one set of arrays for what they have in common."""
+        m, p = self.num_outputs, self.desired_order
+        # of the state before they need y_p, y_p', force; the impedance is that of the next
+        self._before, self._desired = np.zeros((3, m)), np.zeros((p + 1, m))
+        self._after = np.zeros((6, m))
+        self._used = self._after[3:]
+        shared = {
+            "motion": self._before[:2],
+            "desired": self._desired,
+            "last_force": self._before[2],
+            "mass": self._used[MASS],
+            "coefficients": self._coefficients,
+        }
+        step = BoundFunction(update_function(m, p, self.period), next=self._after[:3], **shared)
+        self._force, self._step = step.arguments["force"], step.evaluate
+        self._unusable = step.results["unusable"]
+        respond = BoundFunction(
+            reference_function(m, p, self.relative_degree, self._response_order), **shared
+        )
+        self._reference = respond.results["reference"].reshape(-1, m)
+        self._respond, self._functions = respond.evaluate, (step, respond)
 
     def impedance(self, y: np.ndarray) -> np.ndarray:
         """Return masses, dampings, stiffnesses, shape (3, m), at a virtual output y (m,)."""
@@ -261,31 +258,37 @@ class ImpedanceLaw:
             force: Manifold forces [N, Nm], shape (m,); unless all are finite, zero.
             impedance: Rows mass, damping, stiffness, shape (3, m); unless valid, the last.
         """
-        status = ImpedanceStatus.OK
+        valid = self._prepare(impedance)
+        if not valid:
+            self._prepare(state[3:])
+        self._before[:], self._desired[:], self._force[:] = state[:3], desired, force
+        self._step()
+        force_lost, desired_lost = self._unusable.tolist()
+        status = _OK
+        if force_lost or desired_lost or not valid:
+            status = ImpedanceStatus(
+                int(force_lost) * ImpedanceStatus.FORCE_NOT_FINITE
+                | int(not valid) * ImpedanceStatus.IMPEDANCE_NOT_VALID
+                | int(desired_lost) * ImpedanceStatus.REFERENCE_NOT_FINITE
+            )
+        return self._after.copy(), status
+
+    def _prepare(self, impedance: np.ndarray) -> bool:
+        """Put what follows from an impedance in place, and return whether it is valid.
+
+        It rarely changes, and is remembered.
+        """
+        key = impedance.tobytes()
+        if key == self._key:
+            return True
         # a sum is finite only if all its terms are; NaN fails every comparison
-        if not math.isfinite(force.sum()):
-            force, status = np.zeros_like(force), status | ImpedanceStatus.FORCE_NOT_FINITE
         finite, positive = math.isfinite(impedance[:STIFFNESS].sum()), impedance[MASS].min() > 0.0
         if not (finite and positive and impedance.min() >= 0.0):
-            impedance, status = state[3:], status | ImpedanceStatus.IMPEDANCE_NOT_VALID
-        if not math.isfinite(desired.sum()):
-            still = np.vstack([state[0], np.zeros_like(force), force, impedance])
-            return still, status | ImpedanceStatus.REFERENCE_NOT_FINITE
-        _, _, compliant, (a, b, c, d, p) = self._prepare(impedance)
-        (e, e_1), f = state[:2] - desired[:2], force / impedance[MASS]
-        response = np.array([a * e + b * e_1 + p * f, c * e + d * e_1 + b * f])
-        motion = self._taylor @ desired + np.where(compliant, response, 0.0)
-        return np.vstack([motion, force, impedance]), status
-
-    def _prepare(self, impedance: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return what follows from an impedance alone; remembered, for it rarely changes."""
-        key = impedance.tobytes()
-        if key != self._key:
-            damping, stiffness, compliant = _rates(impedance)
-            rates = zip(damping.tolist(), stiffness.tolist(), strict=True)
-            solution = np.array([transition(*rate, self.period) for rate in rates]).T
-            self._key, self._prepared = key, (damping, stiffness, compliant, solution)
-        return self._prepared
+            return False
+        self._coefficients[:] = coefficients(impedance, self.period)
+        self._used[:] = impedance
+        self._key = key
+        return True
 
     def reference(self, state: np.ndarray, desired: np.ndarray) -> np.ndarray:
         """Return derivatives 0..r of y_p, one row each, shape (r + 1, m).
@@ -293,22 +296,7 @@ class ImpedanceLaw:
         From the second on they are those at the last interval's end, with its force and
         parameters. For the arguments see :meth:`update`.
         """
-        damping, stiffness, compliant, _ = self._prepare(state[3:])
-        rows = list(state[:2] - desired[:2])
-        force = state[2] / state[3 + MASS]
-        for _ in range(2, self._response_order + 1):
-            rows.append(force - damping * rows[-1] - stiffness * rows[-2])
-            force = np.zeros_like(force)
-        reference = desired[: self.relative_degree + 1].copy()
-        count = self._response_order + 1
-        reference[:count] += np.where(compliant, rows[:count], 0.0)
-        # no rounding of a difference and a sum
-        reference[:2] = np.where(compliant, state[:2], reference[:2])
-        return reference
-
-
-def _rates(impedance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return ``d / m``, ``k / m`` (zero where rigid), and where the coordinate is compliant."""
-    compliant = np.isfinite(impedance[STIFFNESS])
-    stiffness = np.where(compliant, impedance[STIFFNESS], 0.0)
-    return impedance[DAMPING] / impedance[MASS], stiffness / impedance[MASS], compliant
+        self._prepare(state[3:])
+        self._before[:], self._desired[:] = state[:3], desired
+        self._respond()
+        return self._reference.copy()

@@ -1,6 +1,5 @@
 """A six-axis force/torque sensor in a fixed joint of a MultibodyPlant."""
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,11 +9,17 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, WeldJoint
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
+from pfsc_drake.control.force_sensing import transducer_function
 from pfsc_drake.control.tool_load import LowPass
 from pfsc_drake.errors import InputError
 
 # ticks whose noise is drawn at once
 _BLOCK = 64
+# parts of the state
+_FILTER, _TICK, _NOISE = slice(0, 6), 6, 7
+# parts of the measurement
+_READING, _LOAD, _NEXT = slice(0, 6), slice(6, 12), slice(12, 18)
 
 
 @dataclass
@@ -69,10 +74,12 @@ class ForceTorqueSensor(LeafSystem):
         reaction_forces (input): The plant's reaction forces, abstract.
         measured_wrench (output): ``[force, torque]`` in S, shape (6,) [N, Nm].
         load (output): ``-F``, what an ideal sensor would read, shape (6,) [N, Nm].
+        measurement (output): ``[measured_wrench, load]`` and the filter's next state, shape
+            (18,); computed once per tick, the others are parts of it.
 
     State:
-        Discrete: state of the filter, shape (6,), NaN before the first tick; noise of a
-        block of ticks, shape (64, 6) by rows; number of the tick, shape (1,). The noise of
+        Discrete: state of the filter, shape (6,), NaN before the first tick; number of the
+        tick, shape (1,); noise of a block of ticks, shape (64, 6) by rows. The noise of
         tick k depends on seed and k alone.
 
     Args:
@@ -97,61 +104,64 @@ class ForceTorqueSensor(LeafSystem):
         # reactions are numbered without gaps, also where joints were removed
         self._joint = list(plant.GetJointIndices()).index(joint.index())
         self._parameters = parameters
-        self._low_pass = LowPass(parameters.bandwidth, period)
-        self._filter = self.DeclareDiscreteState(np.full(6, np.nan))
-        self._noise = self.DeclareDiscreteState(self._draw(0))
-        self._tick = self.DeclareDiscreteState(1)
+        self._result = np.zeros(18)
+        low_pass = LowPass(parameters.bandwidth, period)
+        transducer = BoundFunction(
+            transducer_function(low_pass, parameters.bias, parameters.measurement_range),
+            reading=self._result[_READING],
+            load=self._result[_LOAD],
+            next_state=self._result[_NEXT],
+        )
+        self._transducer, self._evaluate = transducer, transducer.evaluate
+        self._reaction, self._state, self._sample = transducer.arguments.values()
+        memory = np.concatenate([np.full(6, np.nan), [0.0], self._draw(0)])
+        state = self.discrete_state_ticket(self.DeclareDiscreteState(memory))
         self._reactions = self.DeclareAbstractInputPort(
             "reaction_forces", Value[list[SpatialForce]]()
         )
-        states = (self._filter, self._noise, self._tick)
+        reactions = self._reactions.ticket()
+        self._measurement = self.DeclareVectorOutputPort(
+            "measurement", 18, self._calc_measurement, prerequisites_of_calc={reactions, state}
+        )
         self.DeclareVectorOutputPort(
             "measured_wrench",
             6,
             self._calc_measured_wrench,
-            prerequisites_of_calc={
-                self._reactions.ticket(),
-                *(self.discrete_state_ticket(state) for state in states),
-            },
+            prerequisites_of_calc={reactions, state},
         )
-        self._load = self.DeclareVectorOutputPort(
-            "load", 6, self._calc_load, prerequisites_of_calc={self._reactions.ticket()}
-        )
+        self.DeclareVectorOutputPort("load", 6, self._calc_load, prerequisites_of_calc={reactions})
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
     def _draw(self, block: int) -> np.ndarray:
         random = np.random.default_rng((self._parameters.seed, block))
         return (self._parameters.noise * random.standard_normal((_BLOCK, 6))).ravel()
 
-    def _filter_state(self, context: Context, load: np.ndarray) -> np.ndarray:
-        state = context.get_discrete_state(self._filter).value()
-        # NaN where it has not started; a sum is NaN if one of its terms is
-        if not math.isnan(state.sum()):
-            return state
-        return np.where(np.isnan(state), self._low_pass.rest(load), state)
+    def _read_reaction(self, context: Context) -> np.ndarray:
+        """Return ``[torque, force]`` on the tool."""
+        return self._reactions.Eval(context)[self._joint].get_coeffs()
 
-    def _calc_load(self, context: Context, output: BasicVector) -> None:
-        reaction = self._reactions.Eval(context)[self._joint]
-        load = np.empty(6)
-        load[:3], load[3:] = reaction.translational(), reaction.rotational()
-        output.SetFromVector(-load)
+    def _calc_measurement(self, context: Context, output: BasicVector) -> None:
+        memory = context.get_discrete_state_vector().value()
+        row = _NOISE + 6 * (int(memory[_TICK]) % _BLOCK)
+        self._sample[:] = memory[row : row + 6]
+        self._state[:] = memory[_FILTER]
+        self._reaction[:] = self._read_reaction(context)
+        self._evaluate()
+        output.SetFromVector(self._result)
 
     def _calc_measured_wrench(self, context: Context, output: BasicVector) -> None:
-        load, limit = self._load.Eval(context), self._parameters.measurement_range
-        row = 6 * (int(context.get_discrete_state(self._tick)[0]) % _BLOCK)
-        noise = context.get_discrete_state(self._noise).value()[row : row + 6]
-        filtered = self._low_pass.output(self._filter_state(context, load), load)
-        reading = filtered + self._parameters.bias + noise
-        output.SetFromVector(np.minimum(np.maximum(reading, -limit), limit))
+        output.SetFromVector(self._measurement.Eval(context)[_READING])
+
+    def _calc_load(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(-np.roll(self._read_reaction(context), 3))
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        load = self._load.Eval(context)
-        tick = int(context.get_discrete_state(self._tick)[0]) + 1
-        filtered = self._low_pass.update(self._filter_state(context, load), load)
-        state.get_mutable_value(self._filter)[:] = filtered
-        state.get_mutable_value(self._tick)[0] = tick
+        memory = state.get_mutable_value()
+        tick = int(memory[_TICK]) + 1
+        memory[_FILTER] = self._measurement.Eval(context)[_NEXT]
+        memory[_TICK] = tick
         if tick % _BLOCK == 0:
-            state.get_mutable_value(self._noise)[:] = self._draw(tick // _BLOCK)
+            memory[_NOISE:] = self._draw(tick // _BLOCK)
 
 
 def _check(key: str, value: np.ndarray, *, positive: bool) -> None:

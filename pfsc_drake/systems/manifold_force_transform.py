@@ -1,8 +1,9 @@
 """Measured wrench to forces along the virtual output."""
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, InputPort, LeafSystem
 
-from pfsc_drake.control.manifold_force import manifold_force
+from pfsc_drake.control.bound_function import BoundFunction
+from pfsc_drake.control.manifold_force import manifold_force_function
 from pfsc_drake.geometry import PathPointLayout
 
 
@@ -32,11 +33,13 @@ class ManifoldForceTransform(LeafSystem):
 
     def __init__(self, layout: PathPointLayout, *, with_turning: bool = False) -> None:
         super().__init__()
-        self._layout, self._with_turning = layout, with_turning
+        self._function = BoundFunction(manifold_force_function(layout, with_turning=with_turning))
+        self._evaluate, self._result = self._function.evaluate, self._function.results["force"]
         m = 6 if layout.oriented else 3
         self._wrench = self.DeclareVectorInputPort("wrench", 6)
         self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
         sources = {self._wrench.ticket(), self._path_point.ticket()}
+        self._reference: InputPort | None = None
         if layout.oriented:
             self._reference = self.DeclareVectorInputPort("reference", (layout.order + 1) * m)
             sources.add(self._reference.ticket())
@@ -45,12 +48,10 @@ class ManifoldForceTransform(LeafSystem):
         )
 
     def _calc_manifold_force(self, context: Context, output: BasicVector) -> None:
-        phi = self._reference.Eval(context)[3:6] if self._layout.oriented else None
-        forces = manifold_force(
-            self._wrench.Eval(context),
-            self._path_point.Eval(context),
-            self._layout,
-            phi,
-            with_turning=self._with_turning,
-        )
-        output.SetFromVector(forces)
+        arguments = self._function.arguments
+        arguments["wrench"][:] = self._wrench.Eval(context)
+        arguments["path_point"][:] = self._path_point.Eval(context)
+        if self._reference is not None:
+            arguments["phi"][:] = self._reference.Eval(context)[3:6]
+        self._evaluate()
+        output.SetFromVector(self._result)

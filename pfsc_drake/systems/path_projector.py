@@ -1,5 +1,7 @@
 """Projection of the tool point onto the path, with the moving frame."""
 
+import math
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
@@ -67,5 +69,5 @@ class PathProjector(LeafSystem):
     def _remember(self, context: Context, state: DiscreteValues) -> None:
         theta = self._path_point.Eval(context)[self.layout.theta]
         # a tool that is nowhere must not make the path's parameter forgotten
-        if np.isfinite(theta[0]):
+        if math.isfinite(theta[0]):
             state.set_value(theta)

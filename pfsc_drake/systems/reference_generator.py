@@ -24,19 +24,18 @@ class ReferenceGenerator(LeafSystem):
         super().__init__()
         self._begin, self._end = eta_p.domain
         self._sample = eta_p.flat_sampler(relative_degree)
-        self._num_outputs = num_outputs
-        self._size = (relative_degree + 1) * num_outputs
+        self._reference = np.zeros(((relative_degree + 1), num_outputs))
         self.DeclareVectorOutputPort(
             "reference",
-            self._size,
+            self._reference.size,
             self._calc_reference,
             prerequisites_of_calc={self.time_ticket()},
         )
 
     def _calc_reference(self, context: Context, output: BasicVector) -> None:
         time = context.get_time()
-        reference = np.zeros(self._size)
-        reference[:: self._num_outputs] = self._sample(min(max(time, self._begin), self._end))
+        # only its first column is ever other than zero
+        self._reference[:, 0] = self._sample(min(max(time, self._begin), self._end))
         if not self._begin <= time <= self._end:
-            reference[self._num_outputs :] = 0.0
-        output.SetFromVector(reference)
+            self._reference[1:, 0] = 0.0
+        output.SetFromVector(self._reference.ravel())

@@ -7,13 +7,16 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from pfsc_drake.control.force_profile import ForceProfile, manifold_axes
 from pfsc_drake.geometry import PathPointLayout
 
+# how long before a force the path is looked at
+_TICKS_AHEAD = 100
+
 
 class ScriptedForce(LeafSystem):
     """Force and torque at the tool point over time, see :class:`ForcePulse`.
 
     The value follows the time continuously. Directions in manifold coordinates are
     those of the path point at the last tick; a path point that is not finite leaves
-    them as they were.
+    them as they were. The path is looked at while there is a force or will be soon.
 
     Ports:
         path_point (input): From :class:`PathProjector`; only if a pulse is given in
@@ -33,7 +36,7 @@ class ScriptedForce(LeafSystem):
 
     def __init__(self, profile: ForceProfile, layout: PathPointLayout, period: float) -> None:
         super().__init__()
-        self._profile, self._layout = profile, layout
+        self._profile, self._layout, self._ahead = profile, layout, _TICKS_AHEAD * period
         axes = self.DeclareDiscreteState(9)
         self.DeclareVectorOutputPort(
             "wrench",
@@ -47,10 +50,17 @@ class ScriptedForce(LeafSystem):
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
+        time = context.get_time()
+        if not self._profile.is_active(time, time):
+            output.SetZero()
+            return
         axes = context.get_discrete_state_vector().value().reshape(3, 3)
-        output.SetFromVector(self._profile.at(context.get_time(), axes))
+        output.SetFromVector(self._profile.at(time, axes))
 
     def _look(self, context: Context, state: DiscreteValues) -> EventStatus:
+        time = context.get_time()
+        if not self._profile.is_active(time, time + self._ahead):
+            return EventStatus.DidNothing()
         point = self._path_point.Eval(context)
         axes = manifold_axes(point[self._layout.position][3:6], point[self._layout.normal])
         # a sum is finite only if all its terms are

@@ -1,8 +1,8 @@
 """Where the tool is."""
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 
@@ -31,10 +31,9 @@ class ToolKinematics(LeafSystem):
             self._calc_tool_pose,
             prerequisites_of_calc={self._joint_state.ticket()},
         )
-        self._q, self._pose = np.zeros(n), np.zeros(12)
-        self._buffer, self._evaluate = pose_function(robot).buffer()
-        self._buffer.set_arg(0, self._q.data)
-        self._buffer.set_res(0, self._pose.data)
+        self._function = BoundFunction(pose_function(robot))
+        self._q, self._pose = self._function.arguments["q"], self._function.results["pose"]
+        self._evaluate = self._function.evaluate
 
     def _calc_tool_pose(self, context: Context, output: BasicVector) -> None:
         self._q[:] = self._joint_state.Eval(context)[self._part]

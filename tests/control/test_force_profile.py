@@ -82,6 +82,21 @@ def test_pulses_add_up_over_frames():
     assert not np.any(ForceProfile([]).at(0.0, axes))
 
 
+def test_when_it_acts():
+    profile = ForceProfile([ForcePulse(1.0, 2.0), ForcePulse(4.0, 5.0, frame="manifold")])
+    for begin, end, expected in [
+        (0.0, 0.9, False),
+        (0.9, 1.1, True),
+        (1.5, 1.5, True),
+        (0.0, 9.0, True),
+        (2.1, 3.9, False),
+        (4.5, 9.0, True),
+        (5.1, 9.0, False),
+    ]:
+        assert profile.is_active(begin, end) is expected
+    assert not ForceProfile([]).is_active(0.0, 9.0)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

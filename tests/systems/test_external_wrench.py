@@ -100,3 +100,25 @@ def test_the_plant_gets_it_without_the_joint_state():
     assert applied.p_BoBq_B == pytest.approx([0.0, 0.0, 0.12])
     assert applied.F_Bq_W.translational() == pytest.approx(WRENCH[:3])
     assert applied.F_Bq_W.rotational() == pytest.approx(WRENCH[3:])
+
+
+def test_no_force_is_an_empty_list_and_nan_is_not():
+    station = Station("comau_racer_1_4")
+    context = station.system.CreateDefaultContext()
+    fixed = station.system.GetInputPort("wrench").FixValue(context, np.zeros(6))
+    station.system.GetInputPort("joint_state").FixValue(context, np.ones(24))
+    applied, tau_ext = (
+        station.system.GetOutputPort(name) for name in ("applied_spatial_force", "tau_ext")
+    )
+    assert applied.Eval(context) == []
+    assert not np.any(tau_ext.Eval(context))
+    for wrench in (np.where(np.arange(6) == 4, np.nan, 0.0), -WRENCH):
+        fixed.GetMutableData().get_mutable_value().SetFromVector(wrench)
+        (force,) = applied.Eval(context)
+        np.testing.assert_array_equal(force.F_Bq_W.rotational(), wrench[3:])
+        np.testing.assert_array_equal(force.F_Bq_W.translational(), wrench[:3])
+        assert np.isnan(wrench).any() == np.isnan(tau_ext.Eval(context)).any()
+    # what was delivered before is not changed by what came later
+    fixed.GetMutableData().get_mutable_value().SetFromVector(np.zeros(6))
+    assert applied.Eval(context) == []
+    np.testing.assert_array_equal(force.F_Bq_W.rotational(), -WRENCH[3:])

@@ -244,3 +244,22 @@ def test_a_moving_joint_is_refused(rigid):
 def test_parameters_out_of_range(key, value):
     with pytest.raises(InputError, match=f"^{key} = .*: must be "):
         ForceTorqueParameters(**{key: value})
+
+
+def test_the_measurement_holds_its_parts(rigid):
+    """Reading and load are the ports of that name; the filter takes over the rest."""
+    joint = rigid.GetJointByName("weld_tool")
+    sensor = ForceTorqueSensor(rigid, joint, ForceTorqueParameters(seed=4), PERIOD)
+    context, random = sensor.CreateDefaultContext(), np.random.default_rng(2)
+    for _ in range(3):
+        load = random.uniform(-5.0, 5.0, 6)
+        forces = [SpatialForce(tau=-load[3:], f=-load[:3])] * rigid.num_joints()
+        sensor.get_input_port().FixValue(context, forces)
+        whole = sensor.GetOutputPort("measurement").Eval(context)
+        np.testing.assert_array_equal(whole[6:12], load)
+        for name, part in (("measured_wrench", whole[:6]), ("load", whole[6:12])):
+            np.testing.assert_array_equal(sensor.GetOutputPort(name).Eval(context), part)
+        following = sensor.EvalUniquePeriodicDiscreteUpdate(context)
+        np.testing.assert_array_equal(following.value()[:6], whole[12:])
+        assert following.value()[6] == context.get_discrete_state_vector()[6] + 1.0
+        context.SetDiscreteState(following.value())

@@ -77,3 +77,23 @@ def test_a_lost_path_point_leaves_the_direction():
 def test_it_does_not_feed_through():
     profile = ForceProfile([ForcePulse(frame="manifold")])
     assert not ScriptedForce(profile, LAYOUT, PERIOD).HasAnyDirectFeedthrough()
+
+
+def test_the_path_is_looked_at_in_time():
+    """Well before a force the direction is not kept up to date, from 100 ticks before it is."""
+    builder = DiagramBuilder()
+    profile = ForceProfile([ForcePulse(0.3, 0.5, [5.0, 0, 0], frame="manifold")])
+    script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
+    point = np.zeros(LAYOUT.size)
+    point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
+    path_point = builder.AddSystem(ConstantVectorSource(point))
+    builder.Connect(path_point.get_output_port(), script.get_input_port())
+    simulator = Simulator(builder.Build())
+    context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.19)
+    assert not np.any(context.get_discrete_state_vector().value())
+    simulator.AdvanceTo(0.21)
+    axes = context.get_discrete_state_vector().value().reshape(3, 3)
+    np.testing.assert_allclose(axes[:, 0], [0.0, 1.0, 0.0], atol=1e-15)
+    simulator.AdvanceTo(0.4)
+    assert script.get_output_port().Eval(context) == pytest.approx([0, 5.0, 0, 0, 0, 0])
