@@ -156,12 +156,22 @@ def compensation_function(
     """
     n = robot.dimension
     size = 3 * n if inertia == "given" else 2 * n
-    motion, memory, known = ca.SX.sym("motion", size), ca.SX.sym("state", size), ca.SX.sym("known")
+    differentiated = inertia == "differentiated"
+    # rigid joints accelerate in steps, as the drives are held, and their acceleration is the
+    # difference of the velocity over the last interval; the trapezoidal rule would ring
+    stepwise = differentiated and not robot.is_elastic
+    memory = ca.SX.sym("state", size + n * stepwise)
+    motion, known = ca.SX.sym("motion", size), ca.SX.sym("known")
     measured, bias = ca.SX.sym("measured", 6), ca.SX.sym("bias", 6)
-    state = ca.if_else(known, memory, low_pass.rest(motion))
+    state = ca.if_else(known, memory[:size], low_pass.rest(motion))
     q, v, a = ca.vertsplit(ca.vertcat(low_pass.output(state, motion), ca.SX(3 * n - size, 1)), n)
-    if inertia == "differentiated":
+    next_state = low_pass.update(state, motion)
+    if differentiated:
         a = low_pass.derivative(state[n:], motion[n:])
+    if stepwise:
+        # the mean of two trapezoidal derivatives is the filtered difference
+        next_state = ca.vertcat(next_state, a)
+        a = (a + ca.if_else(known, memory[size:], 0.0)) / 2.0
     elif inertia == "none":
         v = ca.SX(n, 1)
     joints = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(n)]
@@ -171,7 +181,7 @@ def compensation_function(
     force = R_WS @ external[:3]
     torque = R_WS @ (external[3:] - ca.cross(ca.SX(load.p_ST), external[:3]))
     wrench = ca.vertcat(dead_band(force, dead_bands[0]), dead_band(torque, dead_bands[1]))
-    results = [wrench, residual, low_pass.update(state, motion)]
+    results = [wrench, residual, next_state]
     return ca.Function(
         "tool_compensation",
         [motion, memory, known, measured, bias],

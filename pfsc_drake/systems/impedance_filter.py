@@ -12,10 +12,12 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from pfsc_drake.control.impedance import ImpedanceLaw, ImpedanceStatus
+from pfsc_drake.control.impedance import STIFFNESS, ImpedanceLaw, ImpedanceStatus
 from pfsc_drake.errors import InputError
 
-_NOT_STARTED, _RUNNING, _PRESET = 0.0, 1.0, 2.0
+_NOT_STARTED, _RUNNING, _PRESET, _WAITING = 0.0, 1.0, 2.0, 3.0
+# a constant impedance does not ask where
+_NOWHERE = np.empty(0)
 
 
 class ImpedanceFilter(LeafSystem):
@@ -38,6 +40,9 @@ class ImpedanceFilter(LeafSystem):
             parameters that depend on eta or xi, and for ``start="actual"``.
         engaged (input, optional): Above 0.5, the default, forces count; else they are
             taken as zero, and y_p goes back to y_d as the springs pull it. Shape (1,).
+        ready (input, optional): Until it first rises above 0.5, what yields rests where it
+            started, whatever y_d and forces do: so that no coordinate is led by a sensor that is
+            not tared. Then it goes on to y_d as its impedance does. Shape (1,).
         impedance (input, optional): Rows mass, damping, stiffness of every coordinate,
             shape (3 m,), in place of the law's own.
         reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
@@ -45,7 +50,8 @@ class ImpedanceFilter(LeafSystem):
 
     State:
         Discrete: y_p, y_p', and force, mass, damping, stiffness of the last interval, each
-        (m,); whether started, engaged, status, each (1,). Until it has started, y_p = y_d.
+        (m,); whether started or waiting, engaged, status, each (1,). Until it has started,
+        y_p = y_d.
 
     Args:
         law: The law.
@@ -78,6 +84,7 @@ class ImpedanceFilter(LeafSystem):
         self._force: InputPort = self.DeclareVectorInputPort("manifold_force", m)
         self._measured: InputPort = self.DeclareVectorInputPort("manifold_state", r * m)
         self._engaged: InputPort = self.DeclareVectorInputPort("engaged", 1)
+        self._ready: InputPort = self.DeclareVectorInputPort("ready", 1)
         self._impedance: InputPort = self.DeclareVectorInputPort("impedance", 3 * m)
         self.DeclareVectorOutputPort(
             "reference",
@@ -108,8 +115,19 @@ class ImpedanceFilter(LeafSystem):
         if memory[self._started] == _NOT_STARTED:
             output.SetFromVector(desired.ravel()[: output.size()])
             return
+        if memory[self._started] == _WAITING:
+            output.SetFromVector(self._resting(memory, desired)[: output.size()])
+            return
         reference = self._law.reference(memory[self._filter].reshape(self._shape), desired)
         output.SetFromVector(reference.ravel())
+
+    def _resting(self, memory: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Return y_d, in coordinates that yield y_p at rest; flat."""
+        state = memory[self._filter].reshape(self._shape)
+        yields, reference = np.isfinite(state[3 + STIFFNESS]), desired.copy()
+        reference[:, yields] = 0.0
+        reference[0, yields] = state[0, yields]
+        return reference.ravel()
 
     def _calc_status(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector([context.get_discrete_state_vector().value()[self._status]])
@@ -118,7 +136,7 @@ class ImpedanceFilter(LeafSystem):
         memory = state.get_mutable_value()
         memory[self._status], memory[self._engaged_before] = ImpedanceStatus.OK, 1.0
         if memory[self._started] == _PRESET:
-            memory[self._started] = _RUNNING
+            memory[self._started] = self._after_start(context)
             return EventStatus.Succeeded()
         memory[self._started] = _NOT_STARTED
         self._start(context, memory)
@@ -132,6 +150,16 @@ class ImpedanceFilter(LeafSystem):
             motion[: len(measured)] = measured
         if np.isfinite(motion).all():
             memory[self._filter] = self._law.start(motion).ravel()
+            memory[self._started] = self._after_start(context)
+
+    def _after_start(self, context: Context) -> float:
+        return _WAITING if self._ready.HasValue(context) else _RUNNING
+
+    def _wait(self, context: Context, memory: np.ndarray) -> None:
+        """Go on if all is ready, from rest."""
+        m = self._law.num_outputs
+        memory[m : 2 * m] = 0.0
+        if self._ready.Eval(context)[0] > 0.5:
             memory[self._started] = _RUNNING
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
@@ -145,6 +173,10 @@ class ImpedanceFilter(LeafSystem):
         if memory[self._started] == _NOT_STARTED:
             memory[self._status] = ImpedanceStatus.REFERENCE_NOT_FINITE
             return
+        if memory[self._started] == _WAITING:
+            self._wait(context, memory)
+        if memory[self._started] == _WAITING:
+            return
         desired = self._desired.Eval(context).reshape(self._shape)
         force = self._force.Eval(context) if engaged else np.zeros(self._law.num_outputs)
         filter_state, status = self._law.update(
@@ -156,5 +188,5 @@ class ImpedanceFilter(LeafSystem):
         if self._impedance.HasValue(context):
             return self._impedance.Eval(context).reshape(self._shape)
         if self._law.is_constant:
-            return self._law.impedance(np.empty(0))
+            return self._law.impedance(_NOWHERE)
         return self._law.impedance(self._measured.Eval(context)[: self._law.num_outputs])

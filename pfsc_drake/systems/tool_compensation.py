@@ -1,12 +1,12 @@
 """Taking weight and inertia of the tool off a force/torque measurement, and taring it."""
 
-import math
-
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, JointIndex, RigidBody, SpatialInertia, WeldJoint
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
+from pfsc_drake.control.force_sensing import guarded_compensation
 from pfsc_drake.control.tool_load import (
     LowPass,
     SensorFault,
@@ -22,9 +22,16 @@ from pfsc_drake.robot.robot_model import RobotModel
 _WRENCH, _TARED, _FAULT, _RESIDUAL, _NEXT = slice(0, 6), 6, 7, slice(8, 14), slice(14, None)
 # parts of the state; tared and fault stand where they stand in the output
 _BIAS, _KNOWN, _WINDOW, _FILTER = slice(0, 6), 8, slice(9, 28), slice(28, None)
+_MEMORY = {
+    "bias": _BIAS,
+    "tared": slice(_TARED, _TARED + 1),
+    "fault": slice(_FAULT, _FAULT + 1),
+    "known": slice(_KNOWN, _KNOWN + 1),
+    "state": _FILTER,
+}
 
 # attributes of an enumeration are looked up slowly
-_NOT_FINITE, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
+_NOT_FINITE = float(SensorFault.NOT_FINITE)
 
 
 class ToolCompensation(LeafSystem):
@@ -83,7 +90,6 @@ class ToolCompensation(LeafSystem):
     ) -> None:
         super().__init__()
         n = robot.dimension
-        self._range = np.asarray(measurement_range)
         samples = max(1, round(parameters.taring_time / period))
         self._taring = Taring(samples, parameters.taring_spread, parameters.taring_bias)
         function = compensation_function(
@@ -93,18 +99,18 @@ class ToolCompensation(LeafSystem):
             parameters.inertia,
             (parameters.force_dead_band, parameters.torque_dead_band),
         )
-        size = self._num_samples = function.numel_in("motion")
-        self._arguments = [np.zeros(k) for k in (size, size, 1, 6, 6)]
-        self._result = np.zeros(14 + size)
-        self._buffer, self._evaluate = function.buffer()
-        for i, argument in enumerate(self._arguments):
-            self._buffer.set_arg(i, argument.data)
-        for i, part in enumerate((_WRENCH, _RESIDUAL, _NEXT)):
-            self._buffer.set_res(i, self._result[part].data)
-
+        self._num_samples, size = function.numel_in("motion"), function.numel_in("state")
         blank = np.zeros(_FILTER.start + size)
         blank[_WINDOW] = self._taring.empty()
         self.DeclareDiscreteState(blank)
+        # the function reads the state where one copy puts it
+        self._memory = blank.copy()
+        step = BoundFunction(
+            guarded_compensation(function, np.asarray(measurement_range)),
+            **{name: self._memory[part] for name, part in _MEMORY.items()},
+        )
+        self._step, self._evaluate, self._result = step, step.evaluate, step.results["result"]
+        self._motion, self._reading = step.arguments["motion"], step.arguments["measured"]
         self._measured = self.DeclareVectorInputPort("measured_wrench", 6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         sources = {self._measured.ticket(), self._joint_state.ticket(), self.xd_ticket()}
@@ -139,34 +145,17 @@ class ToolCompensation(LeafSystem):
         return context.get_discrete_state_vector().value()[_BIAS].copy()
 
     def _calc_compensation(self, context: Context, output: BasicVector) -> None:
-        memory = context.get_discrete_state_vector().value()
-        motion, state, known, measured, bias = self._arguments
         joint_state = self._joint_state.Eval(context)
         if self._acceleration is None:
-            motion[:] = joint_state[: self._num_samples]
+            self._motion[:] = joint_state[: self._num_samples]
         else:
-            n = self._num_samples // 3
-            motion[: 2 * n], motion[2 * n :] = (
-                joint_state[: 2 * n],
-                self._acceleration.Eval(context),
-            )
-        state[:] = memory[_FILTER]
-        known[0] = memory[_KNOWN]
-        measured[:] = self._measured.Eval(context)
-        bias[:] = memory[_BIAS]
+            acceleration = self._acceleration.Eval(context)
+            self._motion[: -len(acceleration)] = joint_state[: 2 * len(acceleration)]
+            self._motion[-len(acceleration) :] = acceleration
+        self._reading[:] = self._measured.Eval(context)
+        self._memory[:] = context.get_discrete_state_vector().value()
         self._evaluate()
-        result = self._result
-        result[_TARED], result[_FAULT] = tared, fault = memory[_TARED], memory[_FAULT]
-        # a sum is finite only if all its terms are
-        if not math.isfinite(result.sum()):
-            result[_FAULT] = fault = _NOT_FINITE
-        elif not fault and (np.abs(measured) >= self._range).any():
-            result[_FAULT] = _SATURATED
-        if fault == _NOT_FINITE:
-            result[_RESIDUAL], result[_NEXT] = 0.0, memory[_FILTER]
-        if not tared or fault == _NOT_FINITE:
-            result[_WRENCH] = 0.0
-        output.SetFromVector(result)
+        output.SetFromVector(self._result)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         result = self._output.Eval(context)

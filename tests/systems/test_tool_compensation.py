@@ -7,7 +7,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import LogVectorOutput, MatrixGain
+from pydrake.systems.primitives import LogVectorOutput, MatrixGain, ZeroOrderHold
 
 from pfsc_drake.control.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.control.tool_load import SensorFault, ToolCompensationParameters
@@ -107,7 +107,9 @@ def run(
     connect(plant.get_state_output_port(), encoders.get_input_port())
     joint_state = encoders.get_output_port()
     connect(joint_state, mover.get_input_port())
-    connect(mover.get_output_port(), plant.get_actuation_input_port())
+    hold = builder.AddSystem(ZeroOrderHold(PERIOD, 6))
+    connect(mover.get_output_port(), hold.get_input_port())
+    connect(hold.get_output_port(), plant.get_actuation_input_port())
     connect(plant.get_reaction_forces_output_port(), ft.GetInputPort("reaction_forces"))
     connect(ft.GetOutputPort("measured_wrench"), tool_compensation.GetInputPort("measured_wrench"))
     connect(joint_state, tool_compensation.GetInputPort("joint_state"))
@@ -136,6 +138,7 @@ def run(
     plant.SetPositionsAndVelocities(
         plant.GetMyMutableContextFromRoot(root), coordinates.plant_state(start)
     )
+    hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), weight)
     simulator.AdvanceTo(duration)
     return {name: log.FindLog(root).data().T for name, log in logs.items()}
 
