@@ -103,6 +103,11 @@ def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) ->
 
         a_M = (tau_J' - K_s (v_M - v_J) + (K_d + K_s T_s) a_J) / (K_d + K_s T_s)
 
+    As in :func:`elastic`, ``tau_J`` and ``a_J`` enter by their means over the interval,
+    ``tau_J + T_s/2 tau_J'`` and ``a_J + T_s/2 q'''``, and ``tau_J'`` should be that of the
+    interval's end: ``gain q''' + drift`` is to be extrapolated by ``T_s``. Else the error
+    is of first order in T_s, 25 times as large on the bent lemniscate at 1.5 m/s.
+
     ``T_s = 0`` gives (3.58) as printed, whose zero dynamics (3.60) decay with
     K_s / K_d, often too fast for a sampled controller.
 
@@ -120,9 +125,13 @@ def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) ->
     known = _link_torque(robot, [state.q_J, state.v_J, a_J, ca.SX(*a_J.shape)], 1)
     known = known - state.tau_ext[1]
     K = K_d + K_s * sampling_time
-    drift = D_M / K * (known - K_s * (state.v_M - state.v_J))
+    half = sampling_time / 2.0
+    per_rate = D_M / K + half
     return DrivenMotion(
-        [state.q_J, state.v_J, a_J], ca.diag(D_M / K) @ D_E, drift, D_M * a_J + tau_J
+        [state.q_J, state.v_J, a_J],
+        ca.diag(per_rate) @ D_E + half * ca.diag(D_M),
+        per_rate * known,
+        D_M * a_J + tau_J - D_M / K * K_s * (state.v_M - state.v_J),
     )
 
 

@@ -21,6 +21,8 @@ RELATIVE_DEGREE = {
     "visco_elastic": 3,
     "elastic": 4,
 }
+# sampling intervals by which the held part of the drive input is extrapolated
+_LEAD = {"visco_elastic": 1.0, "elastic": 0.5}
 
 
 @dataclass
@@ -56,8 +58,8 @@ class Linearization:
         layout: Layout of the path point.
         num_joints: ``N``.
         num_outputs: ``m``, 3 (position) or 6 (position and orientation).
-        extrapolated: Whether ``gain q^(r) + drift`` is to be extrapolated to the middle
-            of the sampling interval.
+        lead: By how many sampling intervals ``gain q^(r) + drift`` is to be extrapolated:
+            to the middle of the interval (``elastic``) or to its end (``visco_elastic``).
         time_driven: Whether the virtual output is the error from a reference point that
             moves with time, instead of the path coordinates.
     """
@@ -67,7 +69,7 @@ class Linearization:
     layout: PathPointLayout
     num_joints: int
     num_outputs: int
-    extrapolated: bool
+    lead: float
     time_driven: bool = False
 
 
@@ -77,48 +79,25 @@ def linearize_path(
     *,
     oriented: bool,
     options: ActuationOptions | None = None,
+    time_driven: bool = False,
 ) -> Linearization:
     """Derive the path following law of a robot, see (3.28), (3.50), (3.57), (3.64).
 
-    Args:
-        robot: The robot.
-        law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
-        oriented: Whether the tool's orientation follows the path too.
-        options: What the actuation model needs besides.
-
-    Raises:
-        InputError: If the law is unknown, or does not suit the robot or the path.
-    """
-    return _linearize(robot, law, oriented, options or ActuationOptions(), time_driven=False)
-
-
-def linearize_trajectory(
-    robot: RobotModel,
-    law: str,
-    *,
-    oriented: bool,
-    options: ActuationOptions | None = None,
-) -> Linearization:
-    """Derive the computed torque law for a point that moves along a path with time (Sec. 3.8.4).
-
-    The same law on the same drives, with the errors of :func:`trajectory_errors` in place
-    of the path coordinates.
+    Or, for a point that moves along the path with time, the computed torque law
+    (Sec. 3.8.4): the same on the same drives, with the errors of
+    :func:`trajectory_errors` in place of the path coordinates.
 
     Args:
         robot: The robot.
         law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
         oriented: Whether the tool's orientation follows the path too.
         options: What the actuation model needs besides.
+        time_driven: Whether a point that moves with time is followed.
 
     Raises:
         InputError: If the law is unknown, or does not suit the robot or the path.
     """
-    return _linearize(robot, law, oriented, options or ActuationOptions(), time_driven=True)
-
-
-def _linearize(
-    robot: RobotModel, law: str, oriented: bool, options: ActuationOptions, *, time_driven: bool
-) -> Linearization:
+    options = options or ActuationOptions()
     if law not in RELATIVE_DEGREE:
         raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
     r, n, m = RELATIVE_DEGREE[law], robot.dimension, 6 if oriented else 3
@@ -157,8 +136,8 @@ def _linearize(
         ["state", "tau_ext", "path_point", *(["progress"] if time_driven else [])],
         ["Y", "A", "b", "gain", "drift", "offset"],
     )
-    extrapolated = law == "elastic" and options.sampling_time > 0.0
-    return Linearization(function, r, layout, n, m, extrapolated, time_driven)
+    lead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
+    return Linearization(function, r, layout, n, m, lead, time_driven)
 
 
 def path_output_function(robot: RobotModel, layout: PathPointLayout) -> ca.Function:

@@ -39,6 +39,10 @@ _EXPLANATIONS = {
 }
 
 
+# attributes of an enumeration are looked up slowly
+_NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(PathStatus.NOT_CONVERGED)
+
+
 class LawLayout:
     """Where the results of a law lie in a flat array.
 
@@ -137,7 +141,6 @@ class PathLaw:
         self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
         self.function = _law_function(linearization, stabilization)
         self._completion = _completion_function(linearization, self.limits)
-        self._half_hold = 0.5 if linearization.extrapolated else 0.0
         self._fault_index = self.layout.status.start
         self._alpha_index = linearization.layout.alpha.start
         self._status_index = linearization.layout.status.start
@@ -158,8 +161,9 @@ class PathLaw:
             name = self._completion.name_in(i)
             arrays.setdefault(name, np.zeros(self._completion.numel_in(i)))
             second.set_arg(i, arrays[name].data)
-        arrays["result"] = np.zeros(self.layout.size)
+        arrays["result"], arrays["check"] = np.zeros(self.layout.size), np.zeros(1)
         second.set_res(0, arrays["result"].data)
+        second.set_res(1, arrays["check"].data)
         # the buffers know addresses only
         self._arrays = arrays
         self._state, self._point = arrays["state"], arrays["path_point"]
@@ -169,7 +173,7 @@ class PathLaw:
         # CasADi stores by columns
         self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
         self._solution, self._rcond = arrays["solution"], arrays["rcond"]
-        self._result = arrays["result"]
+        self._result, self._check = arrays["result"], arrays["check"]
 
     def evaluate(
         self,
@@ -207,29 +211,28 @@ class PathLaw:
         if last_held is None:
             self._lead[0] = 0.0
         else:
-            self._lead[0] = self._half_hold
+            self._lead[0] = self.linearization.lead
             self._last_held[:] = last_held
         self._complete()
         result = self._result.copy()
-        result[self._fault_index] = self._judge(solution, result)
+        result[self._fault_index] = self._judge(solution)
         return result
 
-    def _judge(self, solution: DecouplingSolution, result: np.ndarray) -> Fault:
+    def _judge(self, solution: DecouplingSolution) -> Fault:
         """Return what forbids the use of a result, the root cause first."""
         alpha, status = self._point[self._alpha_index], self._point[self._status_index]
-        # written so that NaN is a fault; a sum is finite only if all its terms are, and the
-        # limits of the drives turn NaN into numbers
+        # written so that NaN is a fault
         if (
             self._inverse.accepts(solution)
             and alpha < self._max_alpha
-            and status != PathStatus.NOT_CONVERGED
-            and math.isfinite(result.sum() + self._state.sum() + self._tau_ext.sum())
+            and status != _NOT_CONVERGED
+            and math.isfinite(self._check[0])
         ):
-            return Fault.NONE
+            return _NO_FAULT
         inputs = (self._state, self._reference, self._integral, self._tau_ext)
         if not all(np.isfinite(values).all() for values in inputs):
             return Fault.INPUT_NOT_FINITE
-        if status == PathStatus.NOT_CONVERGED:
+        if status == _NOT_CONVERGED:
             return Fault.PROJECTION_FAILED
         return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
 
@@ -276,10 +279,16 @@ def _law_function(linearization: Linearization, stabilization: Stabilization) ->
 
 
 def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:
-    """Return everything after the decoupling matrix's inverse as one function."""
+    """Return everything after the decoupling matrix's inverse as one function.
+
+    Its second result is finite only if all that went in and came out is: a sum is finite only if
+    all its terms are, and the limits of the drives turn NaN into numbers.
+    """
     n, m = linearization.num_joints, linearization.num_outputs
+    r = linearization.relative_degree
+    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     solution, drift, offset, last_held = (ca.SX.sym(name, n) for name in "xdol")
-    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, linearization.relative_degree)
+    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
     v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
     held = gain @ solution + drift
     wanted = held + lead * (held - last_held) + offset
@@ -287,10 +296,24 @@ def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca
     saturated = ca.sum1(ca.fabs(wanted) > limits)
     # the fault is judged outside
     result = ca.vertcat(drive, ca.vec(Y), v, 0.0, rcond, saturated, held)
+    check = sum(ca.sum1(part) for part in (wanted, result, state, tau_ext))
+    arguments = {
+        "solution": solution,
+        "gain": gain,
+        "drift": drift,
+        "offset": offset,
+        "last_held": last_held,
+        "lead": lead,
+        "Y": Y,
+        "v": v,
+        "rcond": rcond,
+        "state": state,
+        "tau_ext": tau_ext,
+    }
     return ca.Function(
         "completion",
-        [solution, gain, drift, offset, last_held, lead, Y, v, rcond],
-        [ca.densify(result)],
-        ["solution", "gain", "drift", "offset", "last_held", "lead", "Y", "v", "rcond"],
-        ["result"],
+        list(arguments.values()),
+        [ca.densify(result), ca.densify(check)],
+        list(arguments),
+        ["result", "check"],
     )

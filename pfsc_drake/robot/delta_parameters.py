@@ -12,6 +12,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_files import models_directory
+from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.parameters import FrictionParameters
 from pfsc_drake.typed_yaml import REQUIRED, load_file
 
@@ -46,8 +47,8 @@ class DeltaGeometry:
 
     def __post_init__(self) -> None:
         for key in ("l_BC", "l_A", "l_EC", "h_P"):
-            _require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
-        _require(self.l_EC < self.l_A, "l_EC", self.l_EC, f"less than l_A = {self.l_A!r}")
+            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+        require(self.l_EC < self.l_A, "l_EC", self.l_EC, f"less than l_A = {self.l_A!r}")
 
     @property
     def rail_length(self) -> float:
@@ -97,10 +98,10 @@ class DeltaMasses:
 
     def __post_init__(self) -> None:
         for key in ("slide", "plate"):
-            _require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
         for key in ("rod_pair", "load"):
             allowed = "zero or positive"
-            _require(0.0 <= getattr(self, key) < np.inf, key, getattr(self, key), allowed)
+            require(0.0 <= getattr(self, key) < np.inf, key, getattr(self, key), allowed)
 
     @property
     def effective_slide(self) -> float:
@@ -132,14 +133,14 @@ class DeltaDrives:
 
     def __post_init__(self) -> None:
         for key in ("position_lower", "position_upper", "velocity", "effort"):
-            _check_vector(key, getattr(self, key))
+            check_vector(key, getattr(self, key), NUM_ARMS)
         for key in ("velocity", "effort"):
             value = getattr(self, key)
-            _require(bool(np.all(value > 0.0)), key, value, "positive")
+            require(bool(np.all(value > 0.0)), key, value, "positive")
         lower, upper = self.position_lower, self.position_upper
-        _require(bool(np.all(lower >= 0.0)), "position_lower", lower, "zero or positive")
+        require(bool(np.all(lower >= 0.0)), "position_lower", lower, "zero or positive")
         allowed = f"less than position_upper = {upper.tolist()}"
-        _require(bool(np.all(lower < upper)), "position_lower", lower, allowed)
+        require(bool(np.all(lower < upper)), "position_lower", lower, allowed)
 
 
 @dataclass
@@ -156,7 +157,7 @@ class DeltaWorkspace:
 
     def __post_init__(self) -> None:
         value = self.min_rod_independence
-        _require(0.0 < value < 1.0, "min_rod_independence", value, "between 0 and 1")
+        require(0.0 < value < 1.0, "min_rod_independence", value, "between 0 and 1")
 
 
 @dataclass
@@ -184,13 +185,13 @@ class DeltaParameters:
     workspace: DeltaWorkspace = field(default_factory=DeltaWorkspace, metadata=REQUIRED)
 
     def __post_init__(self) -> None:
-        _require(bool(self.name), "name", self.name, "a name")
-        _check_vector("gravity", self.gravity)
+        require(bool(self.name), "name", self.name, "a name")
+        check_vector("gravity", self.gravity, NUM_ARMS)
         for key in ("coulomb", "viscous"):
-            _check_vector(f"friction.{key}", getattr(self.friction, key))
+            check_vector(f"friction.{key}", getattr(self.friction, key), NUM_ARMS)
         upper, end = self.drives.position_upper, self.geometry.rail_length
         allowed = f"less than the rails' length to P, {end:.6g} m"
-        _require(bool(np.all(upper < end)), "drives.position_upper", upper, allowed)
+        require(bool(np.all(upper < end)), "drives.position_upper", upper, allowed)
 
 
 def load_delta_parameters(robot: str | Path = "festo_expt_45") -> DeltaParameters:
@@ -209,14 +210,3 @@ def load_delta_parameters(robot: str | Path = "festo_expt_45") -> DeltaParameter
             raise InputError(f"DELTA robot {str(robot)!r}: must be a file or one of {known}")
         path = models_directory() / path / "parameters.yaml"
     return load_file(DeltaParameters, path)
-
-
-def _check_vector(key: str, value: np.ndarray) -> None:
-    fits = value.shape == (NUM_ARMS,) and bool(np.all(np.isfinite(value)))
-    _require(fits, key, value, f"{NUM_ARMS} finite numbers")
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        shown = value.tolist() if isinstance(value, np.ndarray) else value
-        raise InputError(f"{key} = {shown!r}: must be {allowed}")

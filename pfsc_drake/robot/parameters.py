@@ -13,12 +13,16 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.denavit_hartenberg import DenavitHartenberg
 from pfsc_drake.robot.model_files import models_directory
+from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.typed_yaml import REQUIRED, load_file
 
 # Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
 _PLACEHOLDER_NAME = "unnamed"
 _POSITIVE = {**REQUIRED, "sign": "positive"}
 _NOT_NEGATIVE = {**REQUIRED, "sign": "not negative"}
+
+# by which the length of a unit vector may be off
+_UNIT_LENGTH = 1e-6
 
 
 def _zero() -> np.ndarray:
@@ -79,7 +83,7 @@ class JointLimitParameters:
         lower, upper = self.position_lower_deg, self.position_upper_deg
         _check_entries(self, axes=lower.size)
         allowed = f"less than position_upper_deg = {upper.tolist()}"
-        _require(bool(np.all(lower < upper)), "position_lower_deg", lower, allowed)
+        require(bool(np.all(lower < upper)), "position_lower_deg", lower, allowed)
 
     @property
     def position_lower(self) -> np.ndarray:
@@ -120,14 +124,14 @@ class BodyParameters:
     source: str = ""
 
     def __post_init__(self) -> None:
-        _require(bool(self.name), "name", self.name, "a name")
-        _require(0 < self.mass < np.inf, "mass", self.mass, "positive and finite")
-        _check_vector("center_of_mass", self.center_of_mass, 3)
-        _check_vector("inertia", self.inertia, 6)
+        require(bool(self.name), "name", self.name, "a name")
+        require(0 < self.mass < np.inf, "mass", self.mass, "positive and finite")
+        check_vector("center_of_mass", self.center_of_mass, 3)
+        check_vector("inertia", self.inertia, 6)
         principal = np.linalg.eigvalsh(self.inertia_matrix())
         physical = principal[0] >= 0 and 2 * principal[2] <= principal.sum() * (1 + 1e-6)
         allowed = "physical (no principal moment negative or above the sum of the other two)"
-        _require(bool(physical), "inertia", self.inertia, allowed)
+        require(bool(physical), "inertia", self.inertia, allowed)
 
     def inertia_matrix(self) -> np.ndarray:
         """Returns the inertia about the center of mass, ``[3, 3]`` [kg m^2]."""
@@ -147,7 +151,7 @@ class ToolParameters(BodyParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_vector("tool_point", self.tool_point, 3)
+        check_vector("tool_point", self.tool_point, 3)
 
 
 @dataclass
@@ -158,16 +162,31 @@ class RotorParameters:
         inertia: ``[N]`` I_M,zz about the spin axis, at the motor side [kg m^2].
         gear_ratio: ``[N]`` 1/k_r, motor revolutions per joint revolution.
         body_mass: of each rotor body in elastic models [kg]; a part of the carrying link's mass.
+        fixed_to_link: link that carries each rotor, 0 for the base (Tab. 2.3); or empty.
+        spin_axes: unit vector of each rotor's spin axis in the DH frame of that link, the last
+            column of R_i^{M,j} (Tab. 2.3); or empty.
     """
 
     inertia: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
     gear_ratio: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
     body_mass: float = 0.0
+    fixed_to_link: list[int] = field(default_factory=list)
+    spin_axes: list[list[float]] = field(default_factory=list)
     source: str = ""
 
     def __post_init__(self) -> None:
-        _check_entries(self, axes=self.inertia.size)
-        _require(0 <= self.body_mass < np.inf, "body_mass", self.body_mass, "at least 0 and finite")
+        axes = self.inertia.size
+        _check_entries(self, axes)
+        require(0 <= self.body_mass < np.inf, "body_mass", self.body_mass, "at least 0 and finite")
+        links, spin_axes = self.fixed_to_link, self.spin_axes
+        for key, value in (("fixed_to_link", links), ("spin_axes", spin_axes)):
+            fits = len(value) == (axes if links or spin_axes else 0)
+            require(fits, key, value, f"one per rotor, {axes}, or both keys empty")
+        in_range = all(0 <= link <= axes for link in links)
+        require(in_range, "fixed_to_link", links, f"numbers from 0 (base) to {axes}")
+        for axis in spin_axes:
+            is_unit = len(axis) == 3 and abs(np.linalg.norm(axis) - 1.0) < _UNIT_LENGTH
+            require(bool(is_unit), "spin_axes", axis, "unit vectors, 3 numbers each")
 
     @property
     def reflected_inertia(self) -> np.ndarray:
@@ -224,8 +243,8 @@ class VariantParameters:
     fixed_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        _require(bool(self.name), "name", self.name, "a name")
-        _check_vector("fixed_deg", self.fixed_deg, self.fixed_deg.size)
+        require(bool(self.name), "name", self.name, "a name")
+        check_vector("fixed_deg", self.fixed_deg, self.fixed_deg.size)
 
 
 @dataclass
@@ -260,22 +279,22 @@ class RobotParameters:
 
     def __post_init__(self) -> None:
         axes = self.denavit_hartenberg.d.size
-        _require(bool(self.name), "name", self.name, "a name")
+        require(bool(self.name), "name", self.name, "a name")
         for key in ("joint_limits", "rotors", "friction"):
             _check_entries(getattr(self, key), axes, prefix=f"{key}.")
-        _require(len(self.links) == axes, "links", len(self.links), f"{axes} links")
+        require(len(self.links) == axes, "links", len(self.links), f"{axes} links")
         light = self.rotors.body_mass < min(link.mass for link in self.links)
-        _require(light, "rotors.body_mass", self.rotors.body_mass, "below every link's mass")
+        require(light, "rotors.body_mass", self.rotors.body_mass, "below every link's mass")
         for i, variant in enumerate(self.variants):
             self._check_variant(f"variants[{i}]", variant, axes)
 
     def _check_variant(self, key: str, variant: VariantParameters, axes: int) -> None:
         moving = axes - variant.fixed_deg.size
-        _require(moving > 0, f"{key}.fixed_deg", variant.fixed_deg, f"less than {axes} angles")
+        require(moving > 0, f"{key}.fixed_deg", variant.fixed_deg, f"less than {axes} angles")
         if variant.elasticity:
             sets = [n for n, e in self.elasticities.items() if e.stiffness.size == moving]
             allowed = f"empty or a set for {moving} joints: {', '.join(sets) or 'none'}"
-            _require(variant.elasticity in sets, f"{key}.elasticity", variant.elasticity, allowed)
+            require(variant.elasticity in sets, f"{key}.elasticity", variant.elasticity, allowed)
 
 
 def load_parameters(robot: str | Path) -> RobotParameters:
@@ -302,19 +321,8 @@ def _check_entries(group: Any, axes: int, prefix: str = "") -> None:
     for entry in fields(group):
         key, value = prefix + entry.name, getattr(group, entry.name)
         if isinstance(value, np.ndarray):
-            _require(axes > 0, key, value, "one number per joint")
-            _check_vector(key, value, axes)
+            require(axes > 0, key, value, "one number per joint")
+            check_vector(key, value, axes)
             sign = entry.metadata.get("sign", "")
             fits = np.all(value > 0 if sign == "positive" else value >= 0) or not sign
-            _require(bool(fits), key, value, sign)
-
-
-def _check_vector(key: str, value: np.ndarray, size: int) -> None:
-    fits = value.shape == (size,) and bool(np.all(np.isfinite(value)))
-    _require(fits, key, value, f"{size} finite numbers")
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        shown = value.tolist() if isinstance(value, np.ndarray) else value
-        raise InputError(f"{key} = {shown!r}: must be {allowed}")
+            require(bool(fits), key, value, sign)

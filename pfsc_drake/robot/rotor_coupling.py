@@ -23,10 +23,13 @@ from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.newton_euler import inverse_dynamics, link_motions, mass_matrix
+from pfsc_drake.robot.parameters import RobotParameters
 from pfsc_drake.robot.serial_chain import SerialChain
 
 # of unit vectors, so that right angles leave structural zeros in the expressions
 _DIGITS = 12
+# between a model file and the parameters that it was written from
+_FRAME_TOLERANCE, _INERTIA_TOLERANCE = 1e-6, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +65,54 @@ def mounts_from_dh(
     mounts = []
     for link, axis, ratio in zip(links, np.asarray(axes, dtype=float), gear_ratios, strict=True):
         twist = alpha[link - 1] if link > 0 else 0.0
-        c, s = np.cos(twist), np.sin(twist)
-        R_x = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-        mounts.append(RotorMount(link, np.round(R_x @ axis, _DIGITS), float(ratio)))
+        mounts.append(RotorMount(link, np.round(_R_x(twist) @ axis, _DIGITS), float(ratio)))
     return mounts
+
+
+def _R_x(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def mounts_from_parameters(chain: SerialChain, robot: RobotParameters) -> list[RotorMount]:
+    """Return where the rotors of a robot sit, of its first joints if the chain has fewer.
+
+    Args:
+        chain: The robot, taken from a model that :mod:`~pfsc_drake.robot.model_writer` wrote.
+        robot: Its parameters.
+
+    Raises:
+        InputError: If the parameters do not say where, or are another robot's: joint frames
+            and ``D_M`` must agree.
+    """
+    rotors, table, n = robot.rotors, robot.denavit_hartenberg.table(), chain.dimension
+    if not rotors.fixed_to_link:
+        raise InputError(f"{robot.name}: no rotors.fixed_to_link and rotors.spin_axes; must be set")
+    if n > table.axes:
+        raise InputError(f"{robot.name}: {table.axes} joints; must be {n} or more as the model has")
+    before = np.concatenate([[0.0], table.alpha])[:n]
+    for j, (link, twist, D_M) in enumerate(
+        zip(chain.links, before, rotors.reflected_inertia, strict=False), start=1
+    ):
+        turned = np.allclose(link.R_PF, _R_x(twist), rtol=0.0, atol=_FRAME_TOLERANCE)
+        if not (
+            turned and np.allclose(link.axis, [0.0, 0.0, 1.0], rtol=0.0, atol=_FRAME_TOLERANCE)
+        ):
+            raise InputError(
+                f"{robot.name}: the frame of joint {j} ({link.name}) is not that of its "
+                "Denavit-Hartenberg table; must be, for spin_axes to mean the same"
+            )
+        if not np.isclose(link.reflected_inertia, D_M, rtol=_INERTIA_TOLERANCE, atol=0.0):
+            raise InputError(
+                f"{robot.name}: rotor {j} has D_M = {D_M:g}; must be {link.reflected_inertia:g} "
+                "as in the model"
+            )
+    return mounts_from_dh(
+        rotors.fixed_to_link[:n],
+        np.array(rotors.spin_axes[:n]),
+        rotors.gear_ratio[:n],
+        table.alpha,
+    )
 
 
 def check_mounts(chain: SerialChain, mounts: Sequence[RotorMount]) -> None:

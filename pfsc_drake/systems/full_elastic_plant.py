@@ -15,11 +15,13 @@ class FullElasticPlant(LeafSystem):
     ``[[D_E, U], [U', D_M]] q'' + [[C_E, C_1], [C_2, 0]] q' + g = [tau_J + tau_ext, tau_d - tau_J]``
     with ``q = [q_J, q_M]`` and ``tau_J`` of (2.66); see :mod:`pfsc_drake.robot.rotor_coupling`.
     A MultibodyPlant with reflected inertias obeys (2.65) instead, where U, C_1 and C_2 are
-    zero. There is no geometry, no contact, no friction and no limit in this plant: put
-    :class:`~pfsc_drake.systems.joint_friction.JointFriction` in front of it.
+    zero. There is no geometry, no contact, no friction and no limit in this plant;
+    :class:`~pfsc_drake.systems.joint_friction.JointFriction` has the port ``resistance``, too.
 
     Ports:
         drive_torque (input): ``tau_d`` at the motors, joint side [Nm or N], shape (N,).
+        resistance (input): ``-tau_fM``, adds to ``tau_d`` [Nm or N], shape (N,); 0 if not
+            connected.
         external_torque (input): ``tau_ext`` at the links [Nm or N], shape (N,); 0 if not
             connected.
         joint_state (output): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
@@ -42,6 +44,7 @@ class FullElasticPlant(LeafSystem):
         dynamics = full_dynamics_function(chain, mounts)
         self.DeclareContinuousState(2 * n, 2 * n, 0)
         self._drive = self.DeclareVectorInputPort("drive_torque", n)
+        self._resistance = self.DeclareVectorInputPort("resistance", n)
         self._external = self.DeclareVectorInputPort("external_torque", n)
         # from [q_J, q_M, v_J, v_M] to [q_J, v_J, q_M, v_M] and back
         self._order = np.arange(4 * n).reshape(4, n)[[0, 2, 1, 3]].ravel()
@@ -76,6 +79,8 @@ class FullElasticPlant(LeafSystem):
         """Calculate velocities and accelerations; the framework calls this."""
         self._state[:] = context.get_continuous_state_vector().CopyToVector()
         self._tau_d[:] = self._drive.Eval(context)
+        if self._resistance.HasValue(context):
+            self._tau_d += self._resistance.Eval(context)
         self._tau_ext[:] = self._external.Eval(context) if self._external.HasValue(context) else 0.0
         self._evaluate()
         derivatives.SetFromVector(np.concatenate([self._state[self._half :], self._acceleration]))

@@ -99,13 +99,14 @@ def test_shapes(law, load_robot):
     ]
 
 
-def test_only_the_sampled_elastic_law_is_extrapolated(load_robot):
+def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r", (10.0,) * 3).chain
     for law in ("rigid", "visco_elastic", "elastic"):
         for sampling_time in (0.0, 1e-3):
             options = ActuationOptions(sampling_time)
             linearization = linearize_path(chain, law, oriented=False, options=options)
-            assert linearization.extrapolated == (law == "elastic" and sampling_time > 0.0)
+            lead = {"elastic": 0.5, "visco_elastic": 1.0}.get(law, 0.0)
+            assert linearization.lead == (lead if sampling_time > 0.0 else 0.0)
 
 
 @pytest.mark.parametrize(
