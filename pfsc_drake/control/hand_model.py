@@ -1,11 +1,15 @@
 """A human hand on the tool: a spring-damper towards a moving target."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from pfsc_drake.control.force_profile import smooth_step, smooth_step_slope
+from pfsc_drake.control.force_profile import FRAMES, smooth_step, smooth_step_slope
 from pfsc_drake.errors import InputError
+
+# from coordinates and their rates, shape (3,) each, to position and velocity in the world
+Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 # sinusoids per axis, enough for an irregular tremor
 _TREMOR_LINES = 16
@@ -17,7 +21,7 @@ class HandWaypoint:
 
     Attributes:
         time: [s].
-        position: In the world, shape (3,) [m].
+        position: In the hand's frame, shape (3,) [m].
     """
 
     time: float = 0.0
@@ -35,6 +39,8 @@ class HandParameters:
 
     Attributes:
         waypoints: Of the target, in ascending time.
+        frame: ``world``: positions are along the world's axes; ``manifold``: they are
+            ``eta, xi_1, xi_2`` of the path.
         stiffness: K [N/m].
         damping: D [N s/m].
         rotational_damping: D_r [Nm s/rad], by which the grip resists turning.
@@ -50,6 +56,7 @@ class HandParameters:
     """
 
     waypoints: list[HandWaypoint] = field(default_factory=lambda: [HandWaypoint()])
+    frame: str = "world"
     stiffness: float = 300.0
     damping: float = 30.0
     rotational_damping: float = 0.0
@@ -69,6 +76,7 @@ class HandParameters:
         for key in ("damping", "rotational_damping", "reaction_delay", "tremor", "seed"):
             value = getattr(self, key)
             _require(0.0 <= value < np.inf, key, value, "zero or positive")
+        _require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
         _require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
@@ -93,10 +101,17 @@ class HandModel:
 
     Args:
         parameters: Its properties.
+        place: Where coordinates of the frame ``manifold`` are in the world.
+
+    Raises:
+        InputError: If the waypoints are in the frame ``manifold`` and there is no path.
     """
 
-    def __init__(self, parameters: HandParameters) -> None:
-        self._parameters = parameters
+    def __init__(self, parameters: HandParameters, place: Place | None = None) -> None:
+        self._parameters, self._place = parameters, None
+        if parameters.frame == "manifold":
+            _require(place is not None, "frame", parameters.frame, "world without a path")
+            self._place = place
         self._times = np.array([waypoint.time for waypoint in parameters.waypoints])
         self._positions = np.array([waypoint.position for waypoint in parameters.waypoints])
         random = np.random.default_rng(parameters.seed)
@@ -108,6 +123,11 @@ class HandModel:
 
     def target(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return ``p_d`` [m] and ``p_d'`` [m/s], in the world, shape (3,) each."""
+        coordinates, rates = self._coordinates(time)
+        return (coordinates, rates) if self._place is None else self._place(coordinates, rates)
+
+    def _coordinates(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the target in the hand's own frame, and its rate, shape (3,) each."""
         last = len(self._times) - 1
         i = min(max(int(np.searchsorted(self._times, time, side="right")) - 1, 0), last)
         if i == last:

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from pfsc_drake.control.hand_model import HandModel, HandParameters, observed_twist
+from pfsc_drake.control.hand_model import HandModel, HandParameters, Place, observed_twist
 from pfsc_drake.errors import InputError
 
 
@@ -27,14 +27,17 @@ class OperatorHand(LeafSystem):
     Args:
         parameters: Properties of the hand.
         period: Sampling time [s].
+        place: Where coordinates of the frame ``manifold`` are in the world, if needed.
 
     Raises:
-        InputError: If the reaction delay is not a multiple of the period.
+        InputError: If the reaction delay is not a multiple of the period, or a path is missing.
     """
 
-    def __init__(self, parameters: HandParameters, period: float) -> None:
+    def __init__(
+        self, parameters: HandParameters, period: float, place: Place | None = None
+    ) -> None:
         super().__init__()
-        self._hand, self._period = HandModel(parameters), period
+        self._hand, self._period = HandModel(parameters, place), period
         delay = round(parameters.reaction_delay / period)
         if abs(delay * period - parameters.reaction_delay) > 1e-9:
             raise InputError(
