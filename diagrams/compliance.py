@@ -45,7 +45,7 @@ def add_compliance(
         builder: Builder of the diagram.
         scenario: The scenario, with compliance.
         linearization: Of the law that follows the reference.
-        ports: ``wrench_measured``, ``path_point``, ``manifold_state`` and
+        ports: ``wrench_measured``, ``tared``, ``path_point``, ``manifold_state`` and
             ``desired_reference`` with derivatives up to :func:`reference_order`.
 
     Returns:
@@ -62,7 +62,7 @@ def add_compliance(
         period,
         desired_order=reference_order(scenario, linearization),
     )
-    impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law))
+    impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
     transform = builder.AddNamedSystem(
         "manifold_force_transform",
         ManifoldForceTransform(layout, with_turning=scenario.compliance.with_turning),
@@ -74,6 +74,7 @@ def add_compliance(
     if layout.oriented:
         builder.Connect(reference, transform.GetInputPort("reference"))
     builder.Connect(force, impedance.GetInputPort("manifold_force"))
+    builder.Connect(ports["tared"], impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]

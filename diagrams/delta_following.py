@@ -1,43 +1,65 @@
 """Path following station of the DELTA robot: friction in front of its plant, the same law."""
 
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
-from diagrams.drives import friction_bristles
+from diagrams.arm import joint_state_of
+from diagrams.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_touching_delta
+from diagrams.external_torque import needs_sensor
 from diagrams.following import Task, add_law, add_place_on_path, reference_progress
+from diagrams.force_sensor import add_sensor, sensor_warnings
 from diagrams.measurement import add_joint_state
+from diagrams.notch import UP
+from diagrams.notch_motion import place_in_notch
 from diagrams.parts import make_law, make_path
 from diagrams.scenario import RobotParameters
 from diagrams.scenario_delta import DeltaFollowingScenario
+from diagrams.scenario_notch import NotchParameters
 from diagrams.signal_log import add_log
 from diagrams.start import check_points, start_point
-from diagrams.station import Station
+from diagrams.station import FurtherLength, Station
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.delta import DeltaRobot
 from pfsc_drake.robot.delta_parameters import load_delta_parameters
-from pfsc_drake.systems.delta_plant import DeltaPlant
 from pfsc_drake.systems.joint_friction import JointFriction
 
 # m, between the points of the way along the path that are checked for reach
 _REACH_SPACING = 2e-3
 
 
-class DeltaFollowingStation(Station[DeltaPlant, DeltaRobot]):
+@dataclass
+class DeltaFollowingStation(Station[LeafSystem, DeltaRobot]):
     """Station of a DELTA robot; the path is in the axes of the inertial frame (z_0 down).
 
     Drives and slides are one, ``joint_state = [q, v, q, v]``. With friction its log also
-    holds ``friction_torque``.
+    holds ``friction_torque``; with a notch ``wrench_ext`` of the contact, and with a sensor
+    what :func:`add_sensor` returns.
+
+    Attributes:
+        body: The robot in it.
+        notch: What it touches, if anything.
     """
 
-    def place_robot(self, context: Context) -> None:
+    body: DeltaBody
+    notch: NotchParameters | None
+
+    def place_robot(self, context: Context, state: np.ndarray) -> None:
         """See :meth:`Station.place_robot`."""
-        q, v = np.split(self.initial_state, 2)
-        self.plant.set_state(context, q, v)
+        self.body.place(context, state)
+
+    def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
+        """Return ``notch_position`` of the ball, see :func:`place_in_notch`."""
+        if self.notch is None:
+            return {}
+        place = place_in_notch(self.path, self.notch, y_t, self.initial_theta)
+        free = self.notch.clearance
+        return {"notch_position": FurtherLength(place, ["left", "above"], free)}
 
 
 def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobot:
@@ -84,23 +106,29 @@ def build_delta_following(
     task = Task(scenario, robot, path, law, reference_progress(scenario))
 
     builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", DeltaPlant(robot))
+    body = _add_body(builder, robot, path, scenario)
     coordinates = _coordinates(robot)
-    joint_state = add_joint_state(
-        builder, plant.GetOutputPort("state"), robot, coordinates, scenario
-    )
+    slides = body.slide_state(builder)
+    true_state = joint_state_of(builder, slides, coordinates)
+    joint_state = add_joint_state(builder, true_state, robot, scenario)
     place = add_place_on_path(builder, task, joint_state)
-    controller, made = add_law(builder, task, place, {})
+    forces = {}
+    if isinstance(body, TouchingDelta):
+        builder.Connect(place.signals["tool_pose"], body.contact.GetInputPort("tool_pose"))
+        forces["wrench_ext"] = body.contact.GetOutputPort("wrench")
+        if needs_sensor(scenario):
+            forces |= add_sensor(builder, body.multibody, robot, body.tool, scenario, joint_state)
+    controller, made = add_law(builder, task, place, forces)
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, robot.dimension))
     builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
-    signals = place.signals | made
-    signals |= _add_drives(builder, plant, robot, hold.get_output_port(), scenario)
+    signals = place.signals | forces | made
+    signals |= _add_drives(builder, body, hold.get_output_port(), slides, scenario)
     log = add_log(builder, signals, period)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "delta_following")
     return DeltaFollowingStation(
         diagram,
-        plant,
+        body.plant,
         robot,
         coordinates,
         path,
@@ -112,7 +140,9 @@ def build_delta_following(
         initial_state,
         initial_theta,
         on_motors=False,
-        warnings=[],
+        warnings=sensor_warnings(scenario),
+        body=body,
+        notch=scenario.notch,
     )
 
 
@@ -122,33 +152,37 @@ def _coordinates(robot: DeltaRobot) -> PlantCoordinates:
     return PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(robot.dimension))
 
 
+def _add_body(
+    builder: DiagramBuilder, robot: DeltaRobot, path: Path, scenario: DeltaFollowingScenario
+) -> DeltaBody:
+    if scenario.notch is None:
+        return add_free_delta(builder, robot)
+    return add_touching_delta(
+        builder, robot, path, scenario.notch, scenario.controller.sampling_time
+    )
+
+
 def _add_drives(
     builder: DiagramBuilder,
-    plant: DeltaPlant,
-    robot: DeltaRobot,
+    body: DeltaBody,
     drive_force: OutputPort,
+    slide_state: OutputPort,
     scenario: DeltaFollowingScenario,
 ) -> dict[str, OutputPort]:
     """Connect the drive forces with the plant, less friction; return the signal for the log."""
-    actuation = plant.GetInputPort("actuation")
     if not scenario.drive_friction:
-        builder.Connect(drive_force, actuation)
+        body.connect_drives(builder, drive_force, None)
         return {}
-    n, friction = robot.dimension, robot.parameters.friction
-    slides = np.full(n, robot.parameters.masses.effective_slide)
-    bristles = friction_bristles(
-        scenario, friction.coulomb, friction.viscous, slides, "drive_friction"
-    )
-    drives = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+    n = body.robot.dimension
+    friction = builder.AddNamedSystem("joint_friction", JointFriction(body.bristles(scenario)))
     # the true velocity, whatever the encoders say
     velocity = builder.AddNamedSystem(
         "slide_velocity", MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)]))
     )
-    builder.Connect(plant.GetOutputPort("state"), velocity.get_input_port())
-    builder.Connect(velocity.get_output_port(), drives.GetInputPort("velocity"))
-    builder.Connect(drive_force, drives.GetInputPort("drive_torque"))
-    builder.Connect(drives.GetOutputPort("net_torque"), actuation)
-    return {"friction_torque": drives.GetOutputPort("friction_torque")}
+    builder.Connect(slide_state, velocity.get_input_port())
+    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+    body.connect_drives(builder, drive_force, friction)
+    return {"friction_torque": friction.GetOutputPort("friction_torque")}
 
 
 def _start_state(
@@ -161,11 +195,14 @@ def _start_state(
     """
     points = scenario.reference.points
     check_points(points, path)
-    start = start_point(scenario, path)
+    notch, shift = scenario.notch, np.zeros(3)
+    if notch is not None:  # in its middle, where the ball touches nothing
+        shift = np.array(notch.displacement) + notch.clearance * UP
+    start = start_point(scenario, path, shift)
     q = robot.joint_coordinates(start.y_t, "start")
     begin, end = min(points), max(points)
     for eta in np.linspace(begin, end, 2 + int((end - begin) / _REACH_SPACING)):
         theta = np.array([path.arc_length.parameter(eta)])
-        y_t = path.position.derivatives(theta, 0)[0, 0]
-        robot.joint_coordinates(y_t, f"path at eta = {eta:.4g} m")
+        on_path = path.position.derivatives(theta, 0)[0, 0]
+        robot.joint_coordinates(on_path, f"path at eta = {eta:.4g} m")
     return np.concatenate([q, np.zeros(robot.dimension)]), start.theta

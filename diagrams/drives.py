@@ -3,15 +3,14 @@
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
+from diagrams.arm import Arm
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
 from pfsc_drake.control.friction import BristleFriction, bristles_for_step
 from pfsc_drake.control.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.parameters import load_parameters
 from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.bus_delay import add_bus_delay
@@ -25,9 +24,7 @@ _ROUNDING = 1e-6
 
 def add_drives(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    chain: SerialChain,
-    coordinates: PlantCoordinates,
+    arm: Arm,
     scenario: PathFollowingScenario,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
@@ -36,30 +33,28 @@ def add_drives(
 
     Args:
         builder: Builder of the diagram.
-        plant: Plant with the robot.
-        chain: The robot.
-        coordinates: Where its coordinates stand in the plant's state.
+        arm: The robot.
         scenario: The scenario.
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
         initial_state: State of the plant at the start, for which servos are designed.
 
     Returns:
-        With servos ``drive_torque``, within its limits [Nm or N], shape (N,).
+        With servos ``drive_torque``, within its limits [Nm or N], shape (N,), and
+        ``servo_fault``, shape (1,).
 
     Raises:
         InputError: If the servos do not suit the robot or the controller.
     """
     period, torque = scenario.controller.sampling_time, ports["drive"]
-    signals = {}
+    chain, signals = arm.chain, {}
     if scenario.controller.law == "velocity_servo":
-        q_J = (coordinates.link_rows @ initial_state)[: chain.dimension]
-        torque, period = _add_servo(builder, chain, scenario, ports, q_J)
-        signals["drive_torque"] = torque
+        q_J = (arm.coordinates.link_rows @ initial_state)[: chain.dimension]
+        servo, period = _add_servo(builder, chain, scenario, ports, q_J)
+        torque = servo.GetOutputPort("drive_torque")
+        signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
-    drives = builder.AddNamedSystem("drives", MatrixGain(_drive_order(plant, coordinates)))
     builder.Connect(torque, hold.get_input_port())
-    builder.Connect(hold.get_output_port(), drives.get_input_port())
-    builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
+    arm.connect_drives(builder, hold.get_output_port())
     return signals
 
 
@@ -69,8 +64,8 @@ def _add_servo(
     scenario: PathFollowingScenario,
     ports: dict[str, OutputPort],
     q_J: np.ndarray,
-) -> tuple[OutputPort, float]:
-    """Add velocity servos, and return their torques and sampling time."""
+) -> tuple[VelocityServo, float]:
+    """Add velocity servos, and return them and their sampling time."""
     servo, tick = scenario.servo, scenario.controller.sampling_time
     period = servo.period or tick
     ratio = tick / period
@@ -96,14 +91,13 @@ def _add_servo(
         velocity = keep.get_output_port()
     builder.Connect(velocity, system.GetInputPort("velocity_reference"))
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
-    return system.GetOutputPort("drive_torque"), period
+    return system, period
 
 
 def add_friction(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    chain: SerialChain,
-    coordinates: PlantCoordinates,
+    arm: Arm,
+    joint_state: OutputPort,
     scenario: PathFollowingScenario,
     folder: FilePath,
 ) -> dict[str, OutputPort]:
@@ -111,9 +105,8 @@ def add_friction(
 
     Args:
         builder: Builder of the diagram.
-        plant: Plant with the robot.
-        chain: The robot.
-        coordinates: Where its coordinates stand in the plant's state.
+        arm: The robot.
+        joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
         scenario: The scenario.
         folder: Where relative file names start.
 
@@ -125,19 +118,17 @@ def add_friction(
     """
     if not scenario.friction.is_given:
         return {}
+    chain = arm.chain
     if not np.all(chain.D_M > 0.0):
         raise InputError("friction: needs a robot with rotor inertia in every drive")
     f_c, f_v = _coefficients(scenario.friction, chain, folder)
     bristles = friction_bristles(scenario, f_c, f_v, chain.D_M, "friction")
     friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
-    n, num_positions = chain.dimension, plant.num_positions()
-    rows = coordinates.motor_rows[n:]
-    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(rows))
-    resistance = builder.AddNamedSystem("resistance", MatrixGain(rows[:, num_positions:].T))
-    builder.Connect(plant.get_state_output_port(), velocity.get_input_port())
+    n = chain.dimension
+    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
+    builder.Connect(joint_state, velocity.get_input_port())
     builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
-    builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
-    builder.Connect(resistance.get_output_port(), plant.get_applied_generalized_force_input_port())
+    arm.connect_friction(builder, friction.GetOutputPort("resistance"))
     return {"friction_torque": friction.GetOutputPort("friction_torque")}
 
 
@@ -190,10 +181,3 @@ def _coefficients(
             raise InputError(f"friction.{key}: {len(given)} values; the robot has {n} joints")
         values.append(np.array(given, dtype=float))
     return values[0], values[1]
-
-
-def _drive_order(plant: MultibodyPlant, coordinates: PlantCoordinates) -> np.ndarray:
-    """Return the matrix from the chain's drives to the plant's actuation."""
-    order = np.zeros((plant.num_actuators(), len(coordinates.actuators)))
-    order[coordinates.actuators, np.arange(len(coordinates.actuators))] = 1.0
-    return order

@@ -53,26 +53,40 @@ def add_sensor(
         ),
     )
     builder.Connect(plant.get_reaction_forces_output_port(), sensor.GetInputPort("reaction_forces"))
-    builder.Connect(
-        sensor.GetOutputPort("measured_wrench"), compensation.GetInputPort("measured_wrench")
-    )
+    reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
+    builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(joint_state, compensation.GetInputPort("joint_state"))
-    # one port, split without Python, costs less time per tick than its parts one by one
     whole = compensation.GetOutputPort("compensation")
-    sizes = [6, 1, 1, whole.size() - 8]
-    split = builder.AddNamedSystem("sensor_signals", Demultiplexer(sizes))
-    builder.Connect(whole, split.get_input_port())
-    names = ("wrench_measured", "tared", "sensor_fault")
-    return {name: split.get_output_port(i) for i, name in enumerate(names)}
+    parts = _split(builder, "sensor_signals", whole, [6, 1, 1])
+    return dict(zip(("wrench_measured", "tared", "sensor_fault"), parts, strict=True))
+
+
+def _split(
+    builder: DiagramBuilder, name: str, port: OutputPort, sizes: list[int]
+) -> list[OutputPort]:
+    """Return a port's first parts; split without Python, they cost less time than one by one."""
+    rest = port.size() - sum(sizes)
+    split = builder.AddNamedSystem(name, Demultiplexer([*sizes, rest]))
+    builder.Connect(port, split.get_input_port())
+    return [split.get_output_port(i) for i in range(len(sizes))]
 
 
 def sensor_warnings(scenario: PathFollowingScenario) -> list[str]:
-    """Return what may keep a scenario's sensor from being tared."""
-    noisy = scenario.encoders.difference_quotient and scenario.sensor.inertia != "none"
-    if not (scenario.compliance.is_given and noisy):
+    """Return what may keep a scenario's sensor from being tared, or make it too late."""
+    if not scenario.compliance.is_given:
         return []
-    return [
-        "the tool's inertial load comes from the second difference of encoder positions; if that "
-        "is noisier than sensor.taring_spread, the sensor is never tared and the tool does not "
-        "yield: filter the velocities (encoders.filter_time) or take sensor.inertia 'none'"
-    ]
+    warnings, sensor, dwell = [], scenario.sensor, scenario.reference.dwell
+    if scenario.encoders.difference_quotient and sensor.inertia != "none":
+        warnings.append(
+            "the tool's inertial load comes from the second difference of encoder positions; if "
+            "that is noisier than sensor.taring_spread, the sensor is never tared and what would "
+            "yield rests: filter the velocities (encoders.filter_time) or take sensor.inertia "
+            "'none'"
+        )
+    if dwell < sensor.taring_time:
+        warnings.append(
+            f"the reference sets off after reference.dwell = {dwell:g} s, before the sensor can "
+            f"be tared (sensor.taring_time = {sensor.taring_time:g} s); what yields waits for "
+            "that, and then catches up"
+        )
+    return warnings

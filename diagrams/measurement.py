@@ -1,18 +1,14 @@
 """What the controller measures, and what disturbs the robot."""
 
-import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, MatrixGain, ZeroOrderHold
+from pydrake.systems.primitives import Adder, ZeroOrderHold
 
-from diagrams.robot import tool_frame
+from diagrams.arm import Arm
 from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.control.force_profile import ForceProfile
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.robot.serial_chain import SerialChain
 from pfsc_drake.systems.decoupled_force import DecoupledForce
 from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.joint_encoders import EncoderOptions, JointEncoders
@@ -22,28 +18,23 @@ from pfsc_drake.systems.sensor_failure import SensorFailure
 
 def add_joint_state(
     builder: DiagramBuilder,
-    plant_state: OutputPort,
+    joint_state: OutputPort,
     robot: RobotModel,
-    coordinates: PlantCoordinates,
     scenario: PathFollowingScenario,
 ) -> OutputPort:
-    """Add the encoders, and return ``[q_J, v_J, q_M, v_M]`` as measured.
+    """Add what encoders make of the joint state, and return ``[q_J, v_J, q_M, v_M]`` as measured.
 
     Args:
         builder: Builder of the diagram.
-        plant_state: State of the plant.
+        joint_state: The true one.
         robot: The robot.
-        coordinates: Where its coordinates stand in the plant's state.
         scenario: The scenario.
 
     Raises:
         InputError: If the encoders do not suit the robot, or a sensor is to fail that does
             not exist.
     """
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
-    builder.Connect(plant_state, encoders.get_input_port())
-    measured = _add_imperfection(builder, encoders.get_output_port(), robot, scenario)
+    measured = _add_imperfection(builder, joint_state, robot, scenario)
     failure = scenario.simulation.sensor_failure
     if failure.time < 0.0:
         return measured
@@ -57,6 +48,23 @@ def add_joint_state(
     )
     builder.Connect(measured, broken.GetInputPort("measured"))
     return broken.GetOutputPort("delivered")
+
+
+def states_to_log(
+    scenario: PathFollowingScenario, joint_state: OutputPort, measured: OutputPort
+) -> dict[str, OutputPort]:
+    """Return ``joint_state`` for the log, and ``joint_state_measured`` with imperfect encoders.
+
+    Without, what is measured is the truth, until a sensor fails.
+
+    Args:
+        scenario: The scenario.
+        joint_state: The true one.
+        measured: What the law gets, see :func:`add_joint_state`.
+    """
+    if scenario.encoders == EncoderOptions():
+        return {"joint_state": measured}
+    return {"joint_state": joint_state, "joint_state_measured": measured}
 
 
 def _add_imperfection(
@@ -79,8 +87,7 @@ def _add_imperfection(
 
 def add_forces(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    chain: SerialChain,
+    arm: Arm,
     scenario: PathFollowingScenario,
     layout: PathPointLayout,
     ports: dict[str, OutputPort],
@@ -89,11 +96,11 @@ def add_forces(
 
     Args:
         builder: Builder of the diagram.
-        plant: Plant with the robot.
-        chain: The robot.
+        arm: The robot.
         scenario: The scenario.
         layout: Layout of the path point.
-        ports: ``joint_state`` and ``path_point``.
+        ports: ``joint_state``, the true one, ``path_point``, and ``hand_wrench`` if there is
+            a hand.
 
     Raises:
         InputError: If a force does not suit the robot.
@@ -110,26 +117,28 @@ def add_forces(
         if not layout.oriented:
             raise InputError("hold_back.force: needs a path with orientation and six axes")
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
-        brake = builder.AddNamedSystem("hold_back", DecoupledForce(chain, layout, shape, period))
+        brake = builder.AddNamedSystem(
+            "hold_back", DecoupledForce(arm.chain, layout, shape, period)
+        )
         for name in ("joint_state", "path_point"):
             builder.Connect(ports[name], brake.GetInputPort(name))
         sources.append(brake.GetOutputPort("wrench"))
+    if "hand_wrench" in ports:
+        sources.append(ports["hand_wrench"])
     if not sources:
         return {}
-    total = builder.AddNamedSystem("wrench", Adder(len(sources), 6))
-    for i, source in enumerate(sources):
-        builder.Connect(source, total.get_input_port(i))
+    total = sources[0]
+    if len(sources) > 1:
+        adder = builder.AddNamedSystem("wrench", Adder(len(sources), 6))
+        for i, source in enumerate(sources):
+            builder.Connect(source, adder.get_input_port(i))
+        total = adder.get_output_port()
     # held over a tick, so that it is computed once and not in every stage of the integrator
     hold = builder.AddNamedSystem("wrench_hold", ZeroOrderHold(period, 6))
-    builder.Connect(total.get_output_port(), hold.get_input_port())
+    builder.Connect(total, hold.get_input_port())
     wrench = hold.get_output_port()
-    contact = builder.AddNamedSystem(
-        "external_wrench", ExternalWrench(tool_frame(plant, scenario.robot), chain)
-    )
+    contact = builder.AddNamedSystem("external_wrench", ExternalWrench(arm.tool, arm.chain))
     builder.Connect(wrench, contact.GetInputPort("wrench"))
     builder.Connect(ports["joint_state"], contact.GetInputPort("joint_state"))
-    builder.Connect(
-        contact.GetOutputPort("applied_spatial_force"),
-        plant.get_applied_spatial_force_input_port(),
-    )
+    arm.connect_contact(builder, contact)
     return {"wrench_ext": wrench, "tau_ext": contact.GetOutputPort("tau_ext")}

@@ -20,7 +20,6 @@ from pfsc_drake.control.linearization import (
     RELATIVE_DEGREE,
     ActuationOptions,
     linearize_path,
-    linearize_trajectory,
 )
 from pfsc_drake.control.path_law import PathLaw, SafeState
 from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
@@ -125,12 +124,12 @@ def make_law(parameters: ControllerParameters, chain: RobotModel, oriented: bool
     """
     law = parameters.law
     damping = parameters.boundary_layer_damping
-    linearize = linearize_path if parameters.manifold == "path" else linearize_trajectory
-    linearization = linearize(
+    linearization = linearize_path(
         chain,
         law,
         oriented=oriented,
         options=ActuationOptions(parameters.sampling_time, np.array(damping) if damping else None),
+        time_driven=parameters.manifold != "path",
     )
     if law not in parameters.gains:
         given = ", ".join(parameters.gains) or "none"

@@ -1,38 +1,44 @@
 """Path following station: robot, projector, law, drives and log in one diagram."""
 
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder
+import numpy as np
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
+from diagrams.arm import Arm, add_arm
 from diagrams.drives import add_drives, add_friction
 from diagrams.external_torque import needs_sensor
 from diagrams.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.force_sensor import add_sensor, sensor_warnings
+from diagrams.hand import add_hand
 from diagrams.law_warnings import law_warnings
-from diagrams.measurement import add_forces, add_joint_state
+from diagrams.measurement import add_forces, add_joint_state, states_to_log
 from diagrams.parts import make_law, make_path
-from diagrams.robot import add_robot, tool_frame
 from diagrams.scenario import PathFollowingScenario
 from diagrams.signal_log import add_log
 from diagrams.start import start_state
 from diagrams.station import Station
-from pfsc_drake.errors import InputError
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial_chain import SerialChain
 
 
-class PathFollowingStation(Station[MultibodyPlant, SerialChain]):
+@dataclass
+class PathFollowingStation(Station[LeafSystem, SerialChain]):
     """Station of a serial arm.
 
     Its log also holds, with forces ``wrench_ext``, ``tau_ext``, with compliance what
     :func:`add_compliance` returns, with servos ``drive_torque``, with friction
     ``friction_torque``.
+
+    Attributes:
+        arm: The robot in it.
     """
 
-    def place_robot(self, context: Context) -> None:
+    arm: Arm
+
+    def place_robot(self, context: Context, state: np.ndarray) -> None:
         """See :meth:`Station.place_robot`."""
-        self.plant.SetPositionsAndVelocities(context, self.initial_state)
+        self.arm.place(context, state)
 
 
 def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> PathFollowingStation:
@@ -49,13 +55,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         InputError: If the scenario cannot be built.
     """
     builder = DiagramBuilder()
-    plant = add_robot(builder, scenario.robot, folder)
-    chain, coordinates = chain_from_plant(plant, tool_frame(plant, scenario.robot))
-    undriven = [n for n, a in zip(chain.names, coordinates.actuators, strict=True) if a < 0]
-    if undriven:
-        raise InputError(
-            f"robot.model: {', '.join(undriven)} without actuator; every joint needs one"
-        )
+    arm = add_arm(builder, scenario.robot, folder)
+    chain, coordinates = arm.chain, arm.coordinates
     period, law_name = scenario.controller.sampling_time, scenario.controller.law
     path = make_path(scenario.path, law_name, folder)
     law = make_law(scenario.controller, chain, path.orientation is not None)
@@ -63,28 +64,28 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     on_motors = law_name == "rigid" and chain.is_elastic
     task = Task(scenario, chain, path, law, reference_progress(scenario), on_motors)
 
-    joint_state = add_joint_state(
-        builder, plant.get_state_output_port(), chain, coordinates, scenario
-    )
+    true_state = arm.joint_state(builder)
+    joint_state = add_joint_state(builder, true_state, chain, scenario)
     place = add_place_on_path(builder, task, joint_state)
     signals = dict(place.signals)
-    forces = add_forces(builder, plant, chain, scenario, law.linearization.layout, signals)
+    hand = add_hand(builder, arm, path, scenario, true_state)
+    around = signals | {"joint_state": true_state} | hand
+    forces = add_forces(builder, arm, scenario, law.linearization.layout, around)
     if needs_sensor(scenario):
-        tool = tool_frame(plant, scenario.robot)
-        forces |= add_sensor(builder, plant, chain, tool, scenario, joint_state)
+        arm.require_reaction_forces()
+        forces |= add_sensor(builder, arm.model, chain, arm.tool, scenario, joint_state)
     controller, made = add_law(builder, task, place, forces)
     signals |= forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    signals |= add_drives(
-        builder, plant, chain, coordinates, scenario, signals | drive, initial_state
-    )
-    signals |= add_friction(builder, plant, chain, coordinates, scenario, folder)
+    signals |= add_drives(builder, arm, scenario, signals | drive, initial_state)
+    signals |= add_friction(builder, arm, true_state, scenario, folder)
+    signals |= states_to_log(scenario, true_state, joint_state)
     log = add_log(builder, signals, period)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "path_following")
     return PathFollowingStation(
         diagram,
-        plant,
+        arm.plant,
         chain,
         coordinates,
         path,
@@ -98,4 +99,5 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         on_motors,
         law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
         + sensor_warnings(scenario),
+        arm,
     )

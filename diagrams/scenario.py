@@ -22,6 +22,7 @@ from diagrams.scenario_path import (
     Waypoints,
 )
 from pfsc_drake.control.force_profile import ForcePulse
+from pfsc_drake.control.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.control.linearization import RELATIVE_DEGREE
 from pfsc_drake.systems.joint_encoders import EncoderOptions
 
@@ -33,6 +34,8 @@ __all__ = [
     "EncoderOptions",
     "ForcePulse",
     "GainParameters",
+    "HandParameters",
+    "HandWaypoint",
     "HoldBackParameters",
     "JointFrictionParameters",
     "Keyframe",
@@ -60,10 +63,23 @@ class RobotParameters:
     Attributes:
         model: Name of a shipped model, a ``package://`` URI, or an SDF/URDF file.
         tool_frame: Frame of the model whose origin follows the path.
+        joint_damping: ``K_d`` of its elastic joints, base first [Nm s/rad or N s/m]; empty for
+            the model's.
+        rotor_coupling: Name of a shipped robot, or YAML file with robot parameters, that says
+            where the rotors of its drives sit. The robot then obeys the full elastic model
+            (2.64), with the inertia coupling of spinning rotors and moving links that the
+            laws neglect; empty for the simplified model (2.65).
     """
 
     model: str = "comau_racer_1_4"
     tool_frame: str = "tool_point"
+    joint_damping: list[float] = dc.field(default_factory=list)
+    rotor_coupling: str = ""
+
+    def __post_init__(self) -> None:
+        damping = self.joint_damping
+        valid = all(np.isfinite(K_d) and K_d >= 0.0 for K_d in damping)
+        require(valid, "joint_damping", damping, "finite numbers, none negative")
 
 
 @dc.dataclass
@@ -210,6 +226,7 @@ class PathFollowingScenario:
         start: Where it starts.
         simulation: How it is integrated.
         forces: Wrenches on the tool over time.
+        hand: An operator's hand on the tool, in addition to the forces; none without the block.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
         friction: Friction of the joints.
@@ -231,6 +248,7 @@ class PathFollowingScenario:
     start: StartParameters = dc.field(default_factory=StartParameters)
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)
     forces: list[ForcePulse] = dc.field(default_factory=list)
+    hand: HandParameters | None = None
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
     friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)

@@ -4,6 +4,7 @@ import dataclasses as dc
 
 from diagrams.checks import require
 from diagrams.scenario import EncoderOptions, PathFollowingScenario
+from diagrams.scenario_notch import NotchParameters
 
 
 @dc.dataclass
@@ -16,9 +17,12 @@ class DeltaFollowingScenario(PathFollowingScenario):
 
     Attributes:
         drive_friction: Whether the linear drives have the friction of the robot's parameters.
+        notch: Workpiece that a ball on the end-effector runs in; it starts in the middle of the
+            notch, ``start.offset`` beside. None for a robot that touches nothing.
     """
 
     drive_friction: bool = True
+    notch: NotchParameters | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -29,9 +33,15 @@ class DeltaFollowingScenario(PathFollowingScenario):
         allowed = "none; the robot only translates"
         require(not keyframes, "path.orientation.keyframes", len(keyframes), allowed)
         require(not self.forces, "forces", f"{len(self.forces)} pulses", "none for a DELTA robot")
+        require(self.hand is None, "hand", "a block", "none for a DELTA robot")
         force = self.hold_back.force
         require(force == 0.0, "hold_back.force", force, "0 for a DELTA robot")
         require(not self.friction.is_given, "friction", "a block", "drive_friction here")
         exact = self.encoders == EncoderOptions()
         require(exact, "encoders", "a block", "none for a DELTA robot")
-        require(not self.compliance.is_given, "compliance", "a block", "none for a DELTA robot")
+        for key in ("joint_damping", "rotor_coupling"):
+            value = getattr(self.robot, key)
+            require(not value, f"robot.{key}", value, "none for a DELTA robot")
+        measured = self.compliance.is_given or self.controller.external_torque.source == "measured"
+        allowed = "only with a notch, nothing else touches a DELTA robot"
+        require(self.notch is not None or not measured, "compliance", "a block", allowed)

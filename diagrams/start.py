@@ -28,12 +28,15 @@ class StartPoint:
     R_e: np.ndarray | None
 
 
-def start_point(scenario: PathFollowingScenario, path: Path) -> StartPoint:
+def start_point(
+    scenario: PathFollowingScenario, path: Path, shift: np.ndarray | None = None
+) -> StartPoint:
     """Return where the tool starts.
 
     Args:
         scenario: The scenario.
         path: Its path.
+        shift: Beyond the scenario's offset [m], shape (3,).
 
     Raises:
         InputError: If the start is outside the feasible neighbourhood.
@@ -46,11 +49,14 @@ def start_point(scenario: PathFollowingScenario, path: Path) -> StartPoint:
     e_perp = on_path[layout.normal]
     e_cross = np.cross(slope / np.linalg.norm(slope), e_perp)
     y_t = sigma + start.offset[0] * e_perp + start.offset[1] * e_cross
+    if shift is not None:
+        y_t = y_t + shift
     projection = path.projector.project(y_t.tolist(), theta)
     if not (projection.converged and projection.alpha < scenario.controller.max_alpha):
         raise InputError(
-            f"start.offset: {start.offset} m at eta = {eta:g} m is outside the feasible "
-            f"neighbourhood, alpha = {projection.alpha:.3g}; alpha must be below "
+            f"start.offset: {start.offset} m at eta = {eta:g} m, {np.round(y_t, 6).tolist()} m, is "
+            "outside the feasible neighbourhood of the path"
+            f", alpha = {projection.alpha:.3g}; alpha must be below "
             f"{scenario.controller.max_alpha:g}"
         )
     R_e = None

@@ -73,5 +73,7 @@ def build_station_replay(
     period, layout = settings.simulation.frame_period, station.law.linearization.layout
     if isinstance(settings, DeltaFollowingScenario):
         robot = load_delta_robot(settings.robot, folder)
-        return build_delta_replay(robot, station.path, layout, motion, meshcat, period)
+        return build_delta_replay(
+            robot, station.path, layout, motion, meshcat, period, settings.notch
+        )
     return build_replay(settings.robot, folder, station.path, layout, motion, meshcat, period)

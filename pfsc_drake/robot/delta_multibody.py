@@ -47,7 +47,10 @@ class DeltaModel:
 
 
 def add_delta_plant(
-    plant: MultibodyPlant, parameters: DeltaParameters, visual: bool = False
+    plant: MultibodyPlant,
+    parameters: DeltaParameters,
+    visual: bool = False,
+    with_load: bool = True,
 ) -> DeltaModel:
     """Add a DELTA robot to a plant: (2.71) with the effective masses of Sec. 2.4.5.
 
@@ -62,6 +65,8 @@ def add_delta_plant(
         parameters: The robot.
         visual: Whether to register illustration geometry of everything but the rods, if the
             plant is registered with a scene graph (rods: ``DeltaVisualizer``).
+        with_load: Whether the end-effector has the load's mass; if not, weld a body of that mass
+            to it.
 
     Returns:
         The robot's parts in the plant.
@@ -95,7 +100,8 @@ def add_delta_plant(
         drive = plant.AddJointActuator(name, joint, effort_limit=parameters.drives.effort[i])
         slides.append(joint)
         actuators.append(drive.index())
-    cartesian, end_effector = _add_end_effector(plant, instance, masses.effective_plate)
+    mass = masses.effective_plate - (0.0 if with_load else masses.load)
+    cartesian, end_effector = _add_end_effector(plant, instance, mass)
     for i, slide in enumerate(slides):
         plant.AddDistanceConstraint(
             slide.child_body(),

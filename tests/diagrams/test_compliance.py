@@ -70,7 +70,8 @@ def test_an_untared_sensor_moves_nothing(settings):
     motion = np.abs(signals["tool_pose"] - signals["tool_pose"][0])
     assert motion[~tared].max() < 1e-9
     yielding = np.abs(signals["reference"] - signals["desired_reference"][:, :9])
-    assert yielding[~tared].max() == 0.0
+    # it starts where the tool is, not where that should be
+    assert yielding[~tared].max() < 1e-12
     # afterwards what the mean of the window missed, some 10 mN
     assert motion.max() < 2e-5
 

@@ -112,7 +112,7 @@ def test_the_first_force_is_weight_and_proportional_part():
         (
             "compliance.transversal="
             "{mass: {value: 1}, damping: {value: 10}, stiffness: {value: 500}}",
-            ["compliance", "none for a DELTA"],
+            ["compliance", "only with a notch"],
         ),
         ("controller.law=velocity_servo", ["controller.law", "velocity_servo", "rigid"]),
         ("controller.law=elastic", ["controller.law", "elastic", "rigid"]),

@@ -181,7 +181,7 @@ def test_encoders_count(settings):
     settings.encoders.link_increments = [10_000.0]
     settings.encoders.motor_increments = [1e6]
     _, _, signals = run(settings, 0.2)
-    q_J, v_J, q_M, _ = np.hsplit(signals["joint_state"], 4)
+    q_J, v_J, q_M, _ = np.hsplit(signals["joint_state_measured"], 4)
     for q, increments in ((q_J, 1e4), (q_M, 1e6)):
         counts = q * increments / (2.0 * np.pi)
         np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
@@ -195,5 +195,5 @@ def test_encoders_differentiate(settings):
     settings.encoders.link_increments = [1e8]
     settings.encoders.difference_quotient = True
     _, _, signals = run(settings, 0.2)
-    q_J, v_J, _, _ = np.hsplit(signals["joint_state"], 4)
+    q_J, v_J, _, _ = np.hsplit(signals["joint_state_measured"], 4)
     np.testing.assert_allclose(v_J[1:], np.diff(q_J, axis=0) / TICK, atol=1e-9)

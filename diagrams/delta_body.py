@@ -1,0 +1,237 @@
+"""The DELTA robot in a diagram, whichever model moves it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import (
+    ContactModel,
+    DiscreteContactApproximation,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
+from pydrake.systems.primitives import MatrixGain
+
+from diagrams.drives import friction_bristles
+from diagrams.notch import TOOL_POINT, add_ball, add_notch
+from diagrams.scenario_delta import DeltaFollowingScenario
+from diagrams.scenario_notch import NotchParameters
+from pfsc_drake.control.friction import BristleFriction, bristles_for_step
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import Path
+from pfsc_drake.robot.delta import DeltaRobot
+from pfsc_drake.robot.delta_multibody import (
+    DeltaModel,
+    add_delta_plant,
+    set_delta_positions,
+    slide_state_rows,
+)
+from pfsc_drake.systems.contact_wrench import ContactWrench
+from pfsc_drake.systems.delta_plant import DeltaPlant
+from pfsc_drake.systems.joint_friction import JointFriction
+
+# omega h of stuck bristles whose force is read once per step, see bristles_for_step
+_BRISTLES_PER_STEP = 0.5
+_ROUNDING = 1e-6
+
+
+class DeltaBody(ABC):
+    """A DELTA robot in a diagram: where its signals come from and where they go.
+
+    Attributes:
+        robot: The robot as the laws know it.
+    """
+
+    robot: DeltaRobot
+
+    @property
+    @abstractmethod
+    def plant(self) -> LeafSystem:
+        """The system in the diagram that moves."""
+
+    @abstractmethod
+    def slide_state(self, builder: DiagramBuilder) -> OutputPort:
+        """Return the true ``[q, v]`` of the slides, shape (6,)."""
+
+    @abstractmethod
+    def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
+        """Return the drives' friction, with bristles that suit how the plant is integrated.
+
+        Raises:
+            InputError: If there are none.
+        """
+
+    @abstractmethod
+    def connect_drives(
+        self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
+    ) -> None:
+        """Let drive forces act, shape (3,), less friction if there is any."""
+
+    @abstractmethod
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """Put the plant into a state ``[q, v]`` of the slides, shape (6,)."""
+
+
+@dataclass(frozen=True)
+class FreeDelta(DeltaBody):
+    """A DELTA robot that touches nothing: (2.72).
+
+    Attributes:
+        analytic: The plant.
+    """
+
+    robot: DeltaRobot
+    analytic: DeltaPlant
+
+    @property
+    def plant(self) -> DeltaPlant:
+        """See :class:`DeltaBody`."""
+        return self.analytic
+
+    def slide_state(self, builder: DiagramBuilder) -> OutputPort:
+        """See :class:`DeltaBody`."""
+        return self.analytic.GetOutputPort("state")
+
+    def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
+        """See :class:`DeltaBody`."""
+        friction = self.robot.parameters.friction
+        slides = np.full(self.robot.dimension, self.robot.parameters.masses.effective_slide)
+        return friction_bristles(
+            scenario, friction.coulomb, friction.viscous, slides, "drive_friction"
+        )
+
+    def connect_drives(
+        self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
+    ) -> None:
+        """See :class:`DeltaBody`."""
+        if friction is not None:
+            builder.Connect(force, friction.GetInputPort("drive_torque"))
+            force = friction.GetOutputPort("net_torque")
+        builder.Connect(force, self.analytic.GetInputPort("actuation"))
+
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """See :class:`DeltaBody`."""
+        self.analytic.set_state(context, *np.split(state, 2))
+
+
+@dataclass(frozen=True)
+class TouchingDelta(DeltaBody):
+    """A DELTA robot whose ball may touch a workpiece: (2.71), bodies tied by constraints.
+
+    The plant samples its inputs and its reaction forces: drive forces act, and contact forces
+    are felt, one of its time steps later.
+
+    Attributes:
+        multibody: The plant, discrete.
+        model: The robot in it.
+        tool: Frame in E, behind the sensor.
+        contact: Wrench of the workpiece on the ball.
+    """
+
+    robot: DeltaRobot
+    multibody: MultibodyPlant
+    model: DeltaModel
+    tool: Frame
+    contact: ContactWrench
+
+    @property
+    def plant(self) -> MultibodyPlant:
+        """See :class:`DeltaBody`."""
+        return self.multibody
+
+    def slide_state(self, builder: DiagramBuilder) -> OutputPort:
+        """See :class:`DeltaBody`."""
+        slides = builder.AddNamedSystem(
+            "slides", MatrixGain(slide_state_rows(self.multibody, self.model))
+        )
+        builder.Connect(self.multibody.get_state_output_port(), slides.get_input_port())
+        return slides.get_output_port()
+
+    def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
+        """See :class:`DeltaBody`."""
+        friction = self.robot.parameters.friction
+        slides = np.full(self.robot.dimension, self.robot.parameters.masses.effective_slide)
+        return bristles_for_step(
+            friction.coulomb,
+            friction.viscous,
+            slides,
+            self.multibody.time_step(),
+            frequency=_BRISTLES_PER_STEP,
+        )
+
+    def connect_drives(
+        self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
+    ) -> None:
+        """See :class:`DeltaBody`."""
+        n = self.robot.dimension
+        order = np.zeros((n, n))
+        order[[int(actuator) for actuator in self.model.actuators], np.arange(n)] = 1.0
+        drives = builder.AddNamedSystem("drives", MatrixGain(order))
+        builder.Connect(force, drives.get_input_port())
+        builder.Connect(drives.get_output_port(), self.multibody.get_actuation_input_port())
+        if friction is None:
+            return
+        rows = slide_state_rows(self.multibody, self.model)[n:, self.multibody.num_positions() :]
+        resistance = builder.AddNamedSystem("resistance", MatrixGain(rows.T))
+        builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
+        builder.Connect(
+            resistance.get_output_port(), self.multibody.get_applied_generalized_force_input_port()
+        )
+
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """See :class:`DeltaBody`."""
+        set_delta_positions(self.multibody, context, self.model, *np.split(state, 2))
+
+
+def add_free_delta(builder: DiagramBuilder, robot: DeltaRobot) -> FreeDelta:
+    """Add a robot that touches nothing.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+    """
+    return FreeDelta(robot, builder.AddNamedSystem("plant", DeltaPlant(robot)))
+
+
+def add_touching_delta(
+    builder: DiagramBuilder, robot: DeltaRobot, path: Path, notch: NotchParameters, period: float
+) -> TouchingDelta:
+    """Add a robot with a ball, and a workpiece with a notch.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        path: The path that was taught.
+        notch: Ball and workpiece.
+        period: Sampling time of the controller [s].
+
+    Raises:
+        InputError: If the plant's time step does not suit the controller's.
+    """
+    ratio = period / notch.time_step
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > _ROUNDING:
+        raise InputError(
+            f"notch.time_step = {notch.time_step:g} s; must be a whole fraction of "
+            f"controller.sampling_time = {period:g} s"
+        )
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(notch.time_step))
+    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+    plant.set_contact_model(ContactModel.kHydroelastic)
+    model = add_delta_plant(plant, robot.parameters, with_load=False)
+    ball = add_ball(plant, model.end_effector, robot.parameters.masses.load, notch.ball)
+    add_notch(plant, path, notch)
+    plant.Finalize()
+    builder.Connect(
+        plant.get_geometry_pose_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), plant.get_geometry_query_input_port())
+    contact = builder.AddNamedSystem("contact_wrench", ContactWrench([ball]))
+    builder.Connect(
+        plant.get_contact_results_output_port(), contact.GetInputPort("contact_results")
+    )
+    return TouchingDelta(robot, plant, model, plant.GetFrameByName(TOOL_POINT), contact)

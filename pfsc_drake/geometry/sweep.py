@@ -1,0 +1,62 @@
+"""Surfaces that a cross-section leaves when it is swept along a curve."""
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curve import Curve
+
+
+def swept_surface(
+    curve: Curve, theta: np.ndarray, profile: np.ndarray, up: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangles of a cross-section swept along a curve.
+
+    At each parameter the cross-section stands normal to the curve, its second axis as near to
+    ``up`` as that allows, its first one to the left of the motion, ``up x tangent``.
+
+    Args:
+        curve: The curve.
+        theta: Increasing parameters of the cross-sections, shape (k,), k >= 2.
+        profile: Polygon of the cross-section [m], shape (n, 2), n >= 2: left of the curve, and
+            above it. Seen along the motion, material is on the right of the way along the polygon.
+        up: Direction, shape (3,).
+
+    Returns:
+        Vertices [m], shape (k n, 3), and triangles, shape (2 (k - 1)(n - 1), 3), whose vertices
+        run counter-clockwise seen from outside of the material.
+
+    Raises:
+        InputError: If the curve runs along ``up``, or a shape is wrong.
+    """
+    profile, theta = np.asarray(profile, dtype=float), np.asarray(theta, dtype=float)
+    if profile.ndim != 2 or profile.shape[0] < 2 or profile.shape[1] != 2:
+        raise InputError(f"profile: shape {profile.shape}; must be (n, 2) with n >= 2")
+    if theta.ndim != 1 or len(theta) < 2 or not np.all(np.diff(theta) > 0.0):
+        raise InputError(f"theta: {theta.tolist()}; must be two or more increasing numbers")
+    motion = curve.derivatives(theta, 1)
+    tangent = motion[:, 1] / np.linalg.norm(motion[:, 1], axis=1, keepdims=True)
+    left = np.cross(up, tangent)
+    length = np.linalg.norm(left, axis=1, keepdims=True)
+    if not np.all(length > 1e-6 * np.linalg.norm(up)):
+        where = theta[int(np.argmin(length))]
+        raise InputError(f"up = {np.asarray(up).tolist()}: the curve runs along it at {where:g}")
+    left /= length
+    above = np.cross(tangent, left)
+    vertices = (
+        motion[:, None, 0]
+        + profile[None, :, :1] * left[:, None]
+        + profile[None, :, 1:] * above[:, None]
+    )
+    return vertices.reshape(-1, 3), _strip(len(theta), len(profile))
+
+
+def _strip(rows: int, columns: int) -> np.ndarray:
+    """Return two triangles for every cell of a grid of vertices."""
+    cell = np.arange(columns - 1) + columns * np.arange(rows - 1)[:, None]
+    here, along = cell.ravel(), cell.ravel() + columns
+    return np.concatenate(
+        [
+            np.column_stack([here, here + 1, along]),
+            np.column_stack([here + 1, along + 1, along]),
+        ]
+    )
