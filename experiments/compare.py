@@ -51,6 +51,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     figures = [_deviations(logs, pictures)]
     if all("angles_e" in log for log in logs.values()):
         figures.append(_orientations(logs, pictures))
+    if all("wrench_ext" in log for log in logs.values()):
+        figures.append(_forces(logs, pictures))
     first = next(iter(logs.values()))
     return write_report(
         out,
@@ -79,6 +81,19 @@ def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
         save_canvas(canvas, folder / "deviations.png")
     caption = "Distance from the path and error along it."
     return Figure(folder / "deviations.png", "Deviations", caption)
+
+
+def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas, (panel,) = make_panels(1)
+        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
+            force = np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
+            panel.plot(log.time, force, color=colour, label=name)
+        panel.set(title="Force on the tool", ylabel="force in N")
+        place_legend(panel)
+        save_canvas(canvas, folder / "forces.png")
+    caption = "Size of the force that acts on the tool, not what the sensor makes of it."
+    return Figure(folder / "forces.png", "Forces", caption)
 
 
 def _orientations(logs: dict[str, RunLog], folder: Path) -> Figure:

@@ -1,11 +1,15 @@
 """Metrics of a path following run, each a pure function of its log.
 
 Signals used, as in the log: ``xi`` [samples, 2] m, ``eta``, ``eta_p`` [samples, 1] m, ``eta_dot``
-m/s, ``phi`` [samples, 3] rad, ``tau_d`` [samples, axes] with attribute ``limits``. Times are those
-of the log's time axis. A metric over an interval that holds no sample is NaN.
+m/s, ``phi`` [samples, 3] rad, ``tau_d`` [samples, axes] with attribute ``limits``,
+``manifold_force`` [samples, 3 or more], the first three in N along (eta, xi_1, xi_2), ``tared``
+[samples, 1] 0 or 1, ``wrench_ext``
+[samples, 6] N and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A
+metric over an interval that holds no sample is NaN.
 """
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -165,6 +169,54 @@ def saturation_count(log: RunLog) -> int:
     return int(np.count_nonzero(np.any(at_limit, axis=1)))
 
 
+def max_manifold_force(log: RunLog) -> float:
+    """Largest force along the path's coordinates, the size of its three translational parts.
+
+    Args:
+        log: With ``manifold_force``; with ``tared`` only samples with a tared sensor count.
+
+    Returns:
+        N.
+    """
+    return _max(np.linalg.norm(_tared_forces(log), axis=1))
+
+
+def max_tangential_force(log: RunLog) -> float:
+    """Largest magnitude of the force along the path.
+
+    Args:
+        log: With ``manifold_force``; with ``tared`` only samples with a tared sensor count.
+
+    Returns:
+        N.
+    """
+    return _max(np.abs(_tared_forces(log)[:, 0]))
+
+
+def max_external_force(log: RunLog) -> float:
+    """Largest size of the force that acts on the tool, whether measured or not.
+
+    Args:
+        log: With ``wrench_ext``.
+
+    Returns:
+        N.
+    """
+    return _max(np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1))
+
+
+def max_distance_from_notch_axis(log: RunLog) -> float:
+    """Largest distance of a ball from the middle of its notch.
+
+    Args:
+        log: With ``notch_position``.
+
+    Returns:
+        m.
+    """
+    return _max(np.linalg.norm(log["notch_position"].values, axis=1))
+
+
 def path_following_metrics(
     log: RunLog, settling_tolerance: float, converged_after: float, min_speed: float
 ) -> Metrics:
@@ -207,34 +259,57 @@ def path_following_metrics(
         for axis, torque in enumerate(peak_torque(log), start=1):
             metrics.add(f"peak_torque_{axis}", float(torque), log["tau_d"].unit)
         metrics.add("saturated_samples", saturation_count(log), "1")
+    if "manifold_force" in log:
+        metrics.add("max_manifold_force", max_manifold_force(log), "N")
+        metrics.add("max_tangential_force", max_tangential_force(log), "N")
+    if "wrench_ext" in log:
+        metrics.add("max_external_force", max_external_force(log), "N")
+    if "notch_position" in log:
+        farthest = max_distance_from_notch_axis(log)
+        metrics.add("max_distance_from_notch_axis", farthest, "m")
     return metrics
 
 
-def metric_names(
-    num_joints: int, oriented: bool, on_motors: bool = False, compliant: bool = False
-) -> list[str]:
+def metric_names(num_joints: int, signals: Collection[str]) -> list[str]:
     """Return the names of the metrics that :func:`path_following_metrics` gives.
 
     Args:
         num_joints: Number of drives.
-        oriented: Whether the log has orientation errors.
-        on_motors: Whether it has the path coordinates of the motors too.
-        compliant: Whether it has a reference that yields to forces.
+        signals: Of ``phi``, ``xi_M``, ``xi_d``, ``manifold_force``, ``wrench_ext`` and
+            ``notch_position`` those that the log has, among others.
     """
+    optional = {
+        "xi_d": ["max_error_from_compliant_reference"],
+        "xi_M": ["max_path_deviation_of_motors"],
+        "phi": ["max_orientation_error"],
+        "manifold_force": ["max_manifold_force", "max_tangential_force"],
+        "wrench_ext": ["max_external_force"],
+        "notch_position": ["max_distance_from_notch_axis"],
+    }
+    given = {key: names if key in signals else [] for key, names in optional.items()}
     return [
         "settling_time",
         "max_path_deviation",
         "max_path_deviation_while_moving",
         "rms_path_deviation",
         "static_path_deviation",
-        *(["max_error_from_compliant_reference"] if compliant else []),
-        *(["max_path_deviation_of_motors"] if on_motors else []),
-        *(["max_orientation_error"] if oriented else []),
+        *given["xi_d"],
+        *given["xi_M"],
+        *given["phi"],
         "max_tangential_error",
         "peak_speed",
         *(f"peak_torque_{axis}" for axis in range(1, num_joints + 1)),
         "saturated_samples",
+        *given["manifold_force"],
+        *given["wrench_ext"],
+        *given["notch_position"],
     ]
+
+
+def _tared_forces(log: RunLog) -> FloatArray:
+    """Forces along (eta, xi_1, xi_2) [N] at the samples with a tared sensor."""
+    forces = log["manifold_force"].values[:, :3]
+    return forces[log["tared"].values[:, 0] != 0.0] if "tared" in log else forces
 
 
 def _max(values: FloatArray) -> float:

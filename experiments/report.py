@@ -190,6 +190,8 @@ def _details(scenario_yaml_text: str, diagram_svg: str | None) -> str:
 
 
 def _spoken(name: str, unit: str = "") -> str:
-    """``controller_tick_us_p99`` in ``us`` as ``Controller tick p99``."""
+    """``controller_tick_us_p99`` in ``us`` as ``Controller tick p99``; a torque in N is a force."""
     words = " ".join(word for word in name.split("_") if word and word != unit)
+    if unit == "N":
+        words = words.replace("torque", "force")
     return words[:1].upper() + words[1:]

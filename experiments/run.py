@@ -23,7 +23,7 @@ from experiments.progress import ProgressListener
 from experiments.provenance import standard_attributes
 from experiments.report import write_report
 from experiments.run_log import RunLog
-from experiments.run_signals import collect_log, collect_motion
+from experiments.run_signals import collect_log, collect_motion, optional_signals
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import simulate
 from experiments.tick import measure_tick
@@ -131,14 +131,9 @@ def run_scenario(
 
 def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     """Refuse a target for a metric that the run will not have."""
-    linearization = station.law.linearization
+    signals = optional_signals(station)
     known = [
-        *metric_names(
-            linearization.num_joints,
-            linearization.num_outputs > 3,
-            station.on_motors,
-            settings.compliance.is_given,
-        ),
+        *metric_names(station.chain.dimension, signals),
         "real_time_factor",
         "controller_tick_us",
         "controller_tick_us_p99",
@@ -155,6 +150,8 @@ def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
     """Make file names independent of the scenario's folder, so that the copy runs too."""
     if settings.friction.file and Path(settings.friction.file).suffix:
         settings.friction.file = str((folder / settings.friction.file).resolve())
+    if Path(settings.robot.rotor_coupling).suffix:
+        settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
     shape, model = settings.path.shape, settings.robot.model
     if isinstance(shape, Waypoints):
         shape.file = str((folder / shape.file).resolve())

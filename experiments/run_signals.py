@@ -15,8 +15,10 @@ from pfsc_drake.robot.robot_model import pose_function
 def collect_log(station: Station, root: Context) -> RunLog:
     """Return the signals of a run, named and with units as scripts expect them.
 
-    The tool's pose and its path coordinates are those of the links, also where the law
-    acts on motor coordinates or on the errors from a moving reference point.
+    Joint state, tool pose and path coordinates are the true ones, those of the links, also
+    where the law acts on motor coordinates, on the errors from a moving reference point, or
+    on what imperfect encoders measure. What it acted on is beside them: ``xi_M``,
+    ``tracking_error``, ``q_J_measured``, ``xi_measured`` and so on.
 
     Args:
         station: The station that was simulated.
@@ -24,7 +26,10 @@ def collect_log(station: Station, root: Context) -> RunLog:
     """
     times, raw = station.log.read(root)
     log = RunLog(times)
+    measured = raw.get("joint_state_measured")
     _add_joints(log, station, raw["joint_state"], raw["law"])
+    if measured is not None:
+        _add_joint_state(log, station, measured, "_measured")
     pose = _tool_poses(station, raw["joint_state"])
     log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
     log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
@@ -32,12 +37,11 @@ def collect_log(station: Station, root: Context) -> RunLog:
     Y = raw["law"][:, layout.manifold_state]
     Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
     points = raw["path_point"]
-    if linearization.time_driven or station.on_motors:
+    if linearization.time_driven or station.on_motors or measured is not None:
         if linearization.time_driven:
             log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
         else:
-            log.add("eta_M", Y[:, 0, 0], "m")
-            log.add("xi_M", Y[:, 0, 1:3], "m", ["xi_M_1", "xi_M_2"])
+            _add_seen(log, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose, linearization.relative_degree)
         seen = _path_output(station, raw["joint_state"], points)
         # the orientation errors of trajectory tracking stay those from the moving reference
@@ -50,7 +54,33 @@ def collect_log(station: Station, root: Context) -> RunLog:
     _add_orientation(log, station, orientation_from, pose)
     _add_forces(log, station, raw)
     _add_drives(log, station, raw)
+    for name, length in station.further_lengths(pose[:, :3]).items():
+        log.add(name, length.values, "m", length.labels, length.limit)
     return log
+
+
+def optional_signals(station: Station) -> set[str]:
+    """Return the signals that a station's log has beyond those of every log.
+
+    Args:
+        station: The station, simulated or not.
+    """
+    names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
+    if "desired_reference" in names:
+        names.add("xi_d")
+    if station.on_motors:
+        names.add("xi_M")
+    if station.law.linearization.num_outputs > 3:
+        names.add("phi")
+    return names
+
+
+def _add_seen(log: RunLog, y: np.ndarray, suffix: str) -> None:
+    """Add the path coordinates that the law acted on, shape (samples, m)."""
+    log.add(f"eta_{suffix}", y[:, 0], "m")
+    log.add(f"xi_{suffix}", y[:, 1:3], "m", [f"xi_{suffix}_1", f"xi_{suffix}_2"])
+    if y.shape[1] > 3 and suffix != "M":
+        log.add(f"phi_{suffix}", y[:, 3:], "rad", [f"phi_{suffix}_{axis}" for axis in "zyx"])
 
 
 def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
@@ -76,10 +106,8 @@ def collect_motion(station: Station, root: Context, period: float) -> RecordedMo
     frames = usable[::stride]
     state = raw["joint_state"][frames]
     states = [station.coordinates.plant_state(x) for x in state]
-    num_states = station.coordinates.num_states
-    positions = np.array(states).reshape(len(frames), num_states)
-    continuous = station.plant.GetMyContextFromRoot(root).get_continuous_state()
-    positions = positions[:, : continuous.num_q()]
+    half = station.coordinates.num_states // 2
+    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
     return RecordedMotion(
         times[frames], positions, _tool_poses(station, state), raw["path_point"][frames]
     )
@@ -88,13 +116,8 @@ def collect_motion(station: Station, root: Context, period: float) -> RecordedMo
 def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
     chain, n = station.chain, station.chain.dimension
     q_J, v_J, q_M, v_M = np.hsplit(state, 4)
-    angle, rate, effort = _joint_units(station)
-    axes = [str(i + 1) for i in range(n)]
-    moved = [("q_J", q_J, angle), ("v_J", v_J, rate)]
-    if np.isfinite(chain.K_s).any():  # motors of rigid joints move as the links do
-        moved += [("q_M", q_M, angle), ("v_M", v_M, rate)]
-    for name, values, unit in moved:
-        log.add(name, values, unit, [f"{name}_{axis}" for axis in axes])
+    effort, axes = _joint_units(station)[2], [str(i + 1) for i in range(n)]
+    _add_joint_state(log, station, state)
     drive = law[:, station.law.layout.drive]
     if station.law.linearization.relative_degree > 1:
         labels = [f"tau_d_{axis}" for axis in axes]
@@ -102,6 +125,16 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
     if chain.is_elastic:
         tau_J = chain.K_s * (q_M - q_J) + chain.K_d * (v_M - v_J)
         log.add("tau_J", tau_J, effort, [f"tau_J_{axis}" for axis in axes])
+
+
+def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
+    angle, rate, _ = _joint_units(station)
+    names = ["q_J", "v_J"]
+    if np.isfinite(station.chain.K_s).any():  # motors of rigid joints move as the links do
+        names += ["q_M", "v_M"]
+    for name, values in zip(names, np.hsplit(state, 4), strict=False):
+        labels = [f"{name}{suffix}_{i + 1}" for i in range(station.chain.dimension)]
+        log.add(f"{name}{suffix}", values, angle if name.startswith("q") else rate, labels)
 
 
 def _joint_units(station: Station) -> tuple[str, str, str]:
@@ -173,7 +206,9 @@ def _add_orientation(log: RunLog, station: Station, point: np.ndarray, pose: np.
         return
     R_e, R_d = _rotations(layout, pose, point)
     for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
-        log.add(name, np.unwrap(matrix_to_zyx(R), axis=0), "rad", ["z", "y", "x"])
+        angles = np.unwrap(matrix_to_zyx(R), axis=0)
+        angles[~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))] = np.nan
+        log.add(name, angles, "rad", ["z", "y", "x"])
 
 
 def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
@@ -207,6 +242,8 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         limits = station.chain.gather("effort_limit")
         labels = [f"tau_d_{i + 1}" for i in range(station.chain.dimension)]
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
+        names = [fault.name.lower() for fault in Fault]
+        log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
     if "friction_torque" in raw:
         labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
         log.add("tau_f", raw["friction_torque"], effort, labels)

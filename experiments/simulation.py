@@ -9,7 +9,6 @@ from pydrake.systems.framework import Context
 from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
 from experiments.progress import ProgressListener
-from pfsc_drake.control.path_law import Fault
 
 # progress and faults are looked at this often [s]; between them nothing interrupts the loop
 _CHUNK = 0.05
@@ -36,7 +35,7 @@ def simulate(
     duration: float,
     progress: ProgressListener,
 ) -> SimulationResult:
-    """Simulate until the end or until the controller is in its safe state.
+    """Simulate until the end or until a controller is in its safe state.
 
     Args:
         station: What to simulate.
@@ -49,9 +48,7 @@ def simulate(
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    controller = station.controller
-    law_context = controller.GetMyContextFromRoot(root)
-    period = controller.period
+    period = station.controller.period
     last_tick, stride = int(duration / period + 1e-6), max(1, round(_CHUNK / period))
     wall, tick, fault = 0.0, 0, None
     while root.get_time() < duration and fault is None:
@@ -65,9 +62,7 @@ def simulate(
             fault = f"simulation failed: {' '.join(str(error).split())}"
         wall += time.perf_counter() - begin
         progress(root.get_time(), "simulating")
-        cause = controller.fault(law_context)
-        if cause is not Fault.NONE:
-            fault = cause.explanation
+        fault = station.fault(root) or fault
     return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault)
 
 

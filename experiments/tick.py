@@ -37,7 +37,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
         station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
-        plant.SetContinuousState(x)
+        station.place_robot(plant, x)
         begin = time.perf_counter()
         drive.Eval(controller)
         elapsed.append(time.perf_counter() - begin)

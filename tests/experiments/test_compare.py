@@ -10,7 +10,7 @@ from experiments.run_log import RunLog
 
 @pytest.fixture(name="make_run")
 def fixture_make_run(tmp_path):
-    def make(name, deviation, oriented=True):
+    def make(name, deviation, oriented=True, pushed=False):
         folder = tmp_path / name
         folder.mkdir()
         time = np.linspace(0.0, 1.0, 50)
@@ -21,6 +21,8 @@ def fixture_make_run(tmp_path):
         if oriented:
             for signal in ("angles_e", "angles_d"):
                 log.add(signal, np.outer(time, [0.1, 0.2, 0.3]), "rad")
+        if pushed:
+            log.add("wrench_ext", np.outer(time, [3.0, 0.0, 4.0, 0.0, 0.0, 1.0]), "N, Nm")
         log.write(folder / "log.h5")
         metrics = Metrics()
         metrics.add("max_path_deviation", deviation, "m")
@@ -49,6 +51,18 @@ def test_without_orientation_there_is_no_picture_of_it(make_run, tmp_path):
     folders = [make_run("slow", 0.01), make_run("fast", 0.02, oriented=False)]
     assert main(["compare", *map(str, folders), "--out", str(tmp_path / "page")]) == 0
     assert not (tmp_path / "page" / "figures" / "orientations.png").exists()
+
+
+def test_forces_are_compared_where_both_have_them(make_run, tmp_path):
+    out = tmp_path / "page"
+    folders = [make_run("a", 0.01, pushed=True), make_run("b", 0.02, pushed=True)]
+    assert main(["compare", *map(str, folders), "--out", str(out)]) == 0
+    assert (out / "figures" / "forces.png").exists()
+    assert "Force" in (out / "report.html").read_text(encoding="utf-8")
+    other = tmp_path / "other"
+    folders = [make_run("c", 0.01, pushed=True), make_run("d", 0.02)]
+    assert main(["compare", *map(str, folders), "--out", str(other)]) == 0
+    assert not (other / "figures" / "forces.png").exists()
 
 
 def test_wrong_folders_are_refused(make_run, tmp_path, capsys):

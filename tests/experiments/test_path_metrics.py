@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from experiments.path_metrics import (
+    max_distance_from_notch_axis,
+    max_external_force,
+    max_manifold_force,
     max_orientation_error_after,
     max_path_deviation_after,
     max_path_deviation_while_moving,
+    max_tangential_force,
+    metric_names,
     path_distance,
     path_following_metrics,
     peak_speed,
@@ -114,6 +119,52 @@ def test_torques_and_saturation():
     assert saturation_count(log) == 3
     log.add("tau_d", torque, "Nm")
     assert saturation_count(log) == 0
+
+
+def test_forces_count_once_the_sensor_is_tared():
+    log = RunLog(np.arange(4.0))
+    forces = [[90, 0, 0], [2, 3, 6], [-5, 0, 0], [0, 4, 0]]
+    log.add("manifold_force", np.hstack([forces, np.full((4, 3), 50.0)]), "N, Nm")
+    assert max_manifold_force(log) == 90.0
+    log.add("tared", [0, 1, 1, 1], "1")
+    assert max_manifold_force(log) == pytest.approx(7.0)  # sqrt(4 + 9 + 36)
+    assert max_tangential_force(log) == 5.0
+    log.add("tared", np.zeros(4), "1")
+    assert math.isnan(max_manifold_force(log))
+    assert math.isnan(max_tangential_force(log))
+
+
+def test_external_force():
+    log = RunLog(np.arange(3.0))
+    forces = [[0, 0, 0], [3, -4, 12], [5, 0, 0]]
+    log.add("wrench_ext", np.hstack([forces, np.full((3, 3), 50.0)]), "N, Nm")
+    assert max_external_force(log) == pytest.approx(13.0)
+
+
+def test_distance_from_the_notch_axis():
+    log = RunLog(np.arange(3.0))
+    log.add("notch_position", [[0, 0], [-3e-3, -4e-3], [4e-3, 0]], "m")
+    assert max_distance_from_notch_axis(log) == pytest.approx(5e-3)
+
+
+def test_names_are_those_of_the_collection():
+    log = decaying_log()
+    samples = len(log.time)
+    log.add("xi_p", np.zeros((samples, 2)), "m")
+    for name in ("eta", "eta_p", "eta_dot"):
+        log.add(name, np.zeros(samples), "m")
+    log.add("tau_d", np.ones((samples, 3)), "N")
+    assert list(path_following_metrics(log, 5e-5, 0.5, 0.1)) == metric_names(3, [])
+    log.add("xi_d", np.zeros((samples, 2)), "m")
+    log.add("xi_M", np.zeros((samples, 2)), "m")
+    log.add("phi", np.zeros((samples, 3)), "rad")
+    log.add("manifold_force", np.ones((samples, 6)), "N, Nm")
+    log.add("wrench_ext", np.ones((samples, 6)), "N, Nm")
+    log.add("notch_position", np.ones((samples, 2)), "m")
+    metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
+    assert list(metrics) == metric_names(3, log.signals)
+    for name in ("max_manifold_force", "max_tangential_force", "max_external_force"):
+        assert metrics[name].unit == "N"
 
 
 def test_collection_has_what_the_log_allows():

@@ -97,6 +97,14 @@ def test_nothing_of_the_run_becomes_markup_and_nothing_is_fetched(run):
     assert base64.b64decode(source.split(",")[1]) == run["figures"][0].path.read_bytes()
 
 
+def test_linear_drives_have_forces(run):
+    run["metrics"].add("peak_torque_2", 120.0, "N")
+    page, _ = read(write_report(**run))
+    assert "Peak force 2" in page.text
+    assert "peak_torque_2" in page.text  # the name in metrics.json
+    assert "Peak torque 1" in page.text
+
+
 def test_targets_are_judged(run):
     page, html = read(write_report(**run))
     assert html.count("✓ met") == html.count("✗ missed") == 2  # card and table

@@ -1,0 +1,139 @@
+"""Wrong scenarios through the command line: file, keys, values, gains, where results go.
+
+Status 2, one line on stderr that names the file, the thing, the value and what is allowed; nothing
+is simulated.
+"""
+
+import pytest
+
+from experiments.cli import main
+
+THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
+BARE = ("--no-figures", "--no-recording")
+
+
+def test_missing_scenario(refused, tmp_path):
+    refused(tmp_path / "none.yaml", "scenario file", "no such file")
+    refused(f"{tmp_path}/", "is a folder")
+
+
+def test_unknown_name(refused):
+    refused("pfc_elastic_4r", "unknown scenario", "did you mean 'pfc_elastic_", THREE, SIX)
+
+
+@pytest.mark.parametrize(
+    ("content", "parts"),
+    [
+        (b"\xff\xfe\x00", ("cannot be read", "UTF-8")),
+        (b"", ("empty", "a mapping")),
+        (b"[1, 2]", ("list", "a mapping")),
+        (b"name: [1\nrobot: 2\n", ("invalid YAML in line 2",)),
+        (b"name: x\n\tduration: 1\n", ("invalid YAML in line 2",)),
+        (b"name: x\nname: y\n", ("'name'", "line 2")),
+    ],
+)
+def test_unreadable_scenario(refused, tmp_path, content, parts):
+    file = tmp_path / "mine.yaml"
+    file.write_bytes(content)
+    refused(file, *parts)
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        # unknown keys
+        ("controler.law=rigid", ("'controler'", "did you mean 'controller'", "allowed")),
+        ("start.ofset=[0, 0]", ("'start.ofset'", "did you mean 'offset'", "posture_deg")),
+        ("path.shape=!Spiral {}", ("path.shape", "!Spiral", "!Circle")),
+        ("path.shape=!Circle {radus: 1}", ("path.shape.radus", "did you mean 'radius'")),
+        # wrong types
+        ("duration=long", ("'duration'", "'long'", "a number")),
+        ("duration=.nan", ("'duration'", "nan", "a number")),
+        ("reference.points=0.5", ("reference.points", "0.5", "a list")),
+        ("reference.points=[0, x]", ("reference.points[1]", "'x'", "a number")),
+        ("controller=elastic", ("'controller'", "'elastic'", "a mapping")),
+        ("robot=null", ("'robot'", "empty", "a mapping")),
+        ("name=3", ("'name'", "3", "text")),
+        # wrong values
+        ("controller.law=magic", ("law", "magic", "elastic")),
+        ("path.orientation.convention=xyz", ("convention", "xyz", "zyx, zyz")),
+        # wrong dimensions
+        ("start.offset=[0.01]", ("offset", "[0.01]", "2 finite numbers")),
+        ("start.rotation_deg=[1, 2]", ("rotation_deg", "[1.0, 2.0]", "3 finite numbers")),
+        ("start.posture_deg=[15, 115]", ("start.posture_deg", "2 values", "3 joints")),
+        (
+            "path.orientation.keyframes=[{angles_deg: [1, 2, 3, 4]}]",
+            ("keyframes[0].angles_deg", "4.0", "3 finite numbers"),
+        ),
+        ("path.shape=!Line {start: [1, 2]}", ("start", "[1.0, 2.0]", "3")),
+        ("path.shape=!Circle {center: [1, 2]}", ("center", "[1.0, 2.0]", "3")),
+        ("path.shape=!Circle {axis_u: [0, 1]}", ("axis_u", "[0.0, 1.0]", "3")),
+        # paths that are none
+        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "positive")),
+        ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("axes", "independent")),
+        ("path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}", ("line", "two different")),
+        # references
+        ("reference.points=[0.96]", ("points", "[0.96]", "two or more")),
+        ("reference.points=[]", ("points", "[]", "two or more")),
+        ("reference.velocity=0", ("velocity", "0", "positive")),
+        ("reference.acceleration=-1", ("acceleration", "-1", "positive")),
+        ("reference.dwell=-1", ("dwell", "-1", "zero or a positive")),
+        # times
+        ("duration=-1", ("duration", "-1", "positive")),
+        ("controller.sampling_time=0", ("sampling_time", "0", "positive")),
+        ("simulation.integrator=magic", ("integrator", "magic", "runge_kutta3")),
+        ("simulation.frame_period=0", ("frame_period", "0", "positive")),
+        # sensors and targets that are not there
+        ("simulation.sensor_failure={time: 1, component: 12}", ("component", "12", "0 to 11")),
+        ("targets.elastic.magic={bound: '< 1'}", ("magic", "max_path_deviation")),
+    ],
+)
+def test_scenario_that_says_something_wrong(refused, mine, change, parts):
+    refused(mine(), *parts, changes=[change])
+
+
+@pytest.mark.parametrize("damping", ["[]", "[0.04]", "[0.04, 0.04, -0.02]"])
+def test_boundary_layer_damping(refused, mine, damping):
+    changes = [
+        "controller.law=singular_perturbation",
+        f"controller.boundary_layer_damping={damping}",
+    ]
+    refused(mine(), "boundary_layer_damping", "3 positive values", changes=changes)
+
+
+@pytest.mark.parametrize(
+    ("gains", "parts"),
+    [
+        ("{poles: [-50, -50, -50, 1]}", ("eta", "not Hurwitz", "pole at 1", "negative")),
+        ("{poles: [-50, -50, -50, 0]}", ("eta", "not Hurwitz")),
+        ("{coefficients: [6250000, 500000, 15000, -200]}", ("eta", "-200", "not Hurwitz")),
+        ("{coefficients: [1, 1, 1, 1]}", ("eta", "not Hurwitz")),  # all positive, yet unstable
+        (
+            "{coefficients: [6250000, 500000, 15000, 200], integral: 1e+9}",
+            ("eta", "a_0", "not Hurwitz"),
+        ),
+        ("{poles: [-50, -50]}", ("eta", "2 gains", "needs 4")),
+        ("{coefficients: [900, 60]}", ("controller.gains.elastic.eta", "2", "needs 4")),
+        ("{}", ("controller.gains.elastic.eta", "needs 4")),
+        ("{poles: [-1, -1, -1, -1], integral: 1}", ("poles", "either")),
+        ("{poles: [-50, -50, -50, -.inf]}", ("eta", "finite")),
+    ],
+)
+def test_gains(refused, mine, gains, parts):
+    refused(mine(), *parts, changes=[f"controller.gains.elastic.eta={gains}"])
+
+
+def test_no_gains_for_the_law(refused, mine):
+    parts = ("controller.gains", "'visco_elastic'", "elastic, singular_perturbation, rigid")
+    refused(mine(), *parts, changes=["controller.law=visco_elastic"])
+
+
+def test_results_cannot_be_written(mine, tmp_path, capfd):
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    for out in (tmp_path / "file", tmp_path / "file" / "out"):
+        capfd.readouterr()
+        assert main(["run", mine(), "--out", str(out), "--duration", "0.02", *BARE]) == 2
+        stderr = capfd.readouterr().err
+        assert stderr.startswith("error: ")
+        assert stderr.count("\n") == 1
+        assert str(out) in stderr

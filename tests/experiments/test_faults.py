@@ -1,0 +1,130 @@
+"""Faults on the way, through the command line: status 3, everything logged so far is kept."""
+
+import json
+import math
+
+import h5py
+import numpy as np
+import pytest
+
+from experiments.cli import main
+
+THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
+BARE = ("--no-figures", "--no-recording")
+
+
+@pytest.fixture
+def fault(tmp_path, capfd, mine):
+    """Run into a fault and return log, its attributes and metrics."""
+
+    def check(explanation, *changes, name=THREE, duration="0.5"):
+        out = tmp_path / "out"
+        overrides = [argument for change in changes for argument in ("--set", change)]
+        capfd.readouterr()
+        arguments = ["run", mine(name), "--out", str(out), "--duration", duration, *BARE]
+        status = main([*arguments, *overrides])
+        stderr = capfd.readouterr().err
+        assert status == 3, stderr
+        assert stderr.startswith("fault: ")
+        assert stderr.count("\n") == 1
+        assert explanation in stderr
+        assert "stopped at t = " in stderr
+        assert str(out) in stderr
+        report = (out / "report.html").read_text(encoding="utf-8")
+        assert explanation in report
+        metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+        with h5py.File(out / "log.h5") as file:
+            assert explanation in file.attrs["fault"]
+            log = {key: dataset[:] for key, dataset in file.items()}
+            log["limits"] = file["tau_d"].attrs["limits"]
+            labels = list(file["fault"].attrs["labels"])
+        log["fault"] = np.array([labels[code] for code in log["fault"][:, 0]])
+        # the drives obey their limits, whatever happens, and the rest is on one time axis
+        assert np.all(np.abs(log["tau_d"]) <= log["limits"])
+        assert {len(x) for key, x in log.items() if key != "limits"} == {len(log["t"])}
+        return log, metrics
+
+    return check
+
+
+@pytest.mark.parametrize("component", [0, 5, 6, 11])
+def test_nan_on_the_way(fault, component):
+    failure = f"simulation.sensor_failure={{time: 0.0305, component: {component}}}"
+    log, metrics = fault("not a finite number", failure)
+    healthy = log["t"] < 0.0305
+    assert set(log["fault"][healthy]) == {"none"}
+    assert set(log["fault"][~healthy]) == {"input_not_finite"}
+    measured = np.hstack([log[name] for name in ("q_J", "v_J", "q_M", "v_M")])
+    assert np.isfinite(measured[healthy]).all()
+    assert np.isnan(measured[~healthy, component]).all()
+    # looked at every 50 ms; until then the drives hold the arm
+    assert log["t"][-1] < 0.1
+    assert np.isfinite(log["tau_d"]).all()
+    assert np.abs(np.delete(measured[-1] - measured[30], component)).max() < 1.0
+    assert metrics["saturated_samples"]["value"] == 0.0
+
+
+@pytest.mark.parametrize("name", [THREE, SIX])
+def test_nan_from_the_beginning(fault, name):
+    log, metrics = fault("not a finite number", "simulation.sensor_failure.time=0", name=name)
+    assert set(log["fault"]) == {"input_not_finite"}
+    assert np.isfinite(log["tau_d"]).all()
+    assert metrics["max_path_deviation"]["value"] is None
+
+
+def test_singularity_on_the_way(fault):
+    """A line leads beyond what the stretched arm reaches."""
+    log, _ = fault(
+        "singular",
+        "path.shape=!Line {start: [1.1, 0, 1], end: [2, 0, 1]}",
+        "reference={points: [0, 0.8], velocity: 1, acceleration: 8, dwell: 0}",
+        "start.offset=[0, 0]",
+        duration="1.5",
+    )
+    last_good = np.flatnonzero(log["fault"] == "none")[-1]
+    assert set(log["fault"][last_good + 1 :]) == {"singular"}
+    assert log["rcond"][:last_good, 0].min() >= 1e-3
+    # until the drives gave out the law was exact: first torques, then geometry
+    exact = np.cumsum(log["saturated_drives"][:, 0]) == 0
+    assert np.abs(log["xi"][exact]).max() < 1e-3
+    assert 0.2 < log["eta"][last_good, 0] < 0.8
+
+
+def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
+    """Drives too weak for the arm's weight: it sinks from a circle's top through its centre."""
+    radius = 0.05
+    top = radius * math.pi / 2.0
+    log, metrics = fault(
+        "left the feasible neighbourhood",
+        f"path.shape=!Circle {{radius: {radius}}}",
+        f"reference.points=[{top}, 0.2]",
+        "start.offset=[0, 0]",
+        "controller.effort_scale=0.03",
+    )
+    np.testing.assert_allclose(log["limits"], [54.0, 54.0, 27.0])
+    last_good = np.flatnonzero(log["fault"] == "none")[-1]
+    assert set(log["fault"][last_good + 1 :]) == {"outside_feasible_neighbourhood"}
+    assert log["alpha"][last_good, 0] < 0.95
+    # alpha is the way from the circle to its axis, as a part of the radius
+    depth = radius - np.linalg.norm((log["y_t"] - [0.8, 0.0, 1.0])[:, 1:], axis=1)
+    assert 0.9 * radius < depth[last_good] < 0.96 * radius
+    assert metrics["saturated_samples"]["value"] > 20
+
+
+def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
+    """The first torque wants 202 Nm of axis 1; a tenth of its limit is 180 Nm."""
+    out = tmp_path / "out"
+    arguments = ["--set", "controller.effort_scale=0.1", "--duration", "0.3", *BARE]
+    assert main(["run", mine(), "--out", str(out), *arguments]) == 0
+    assert capfd.readouterr().err == ""
+    metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    with h5py.File(out / "log.h5") as file:
+        tau_d, limits = file["tau_d"][:], file["tau_d"].attrs["limits"]
+        saturated, xi = file["saturated_drives"][:, 0], file["xi"][:]
+    np.testing.assert_allclose(limits, [180.0, 180.0, 90.0])
+    at_limit = np.any(np.abs(tau_d) == limits, axis=1)
+    assert np.all(np.abs(tau_d) <= limits)
+    assert 0 < at_limit.sum() < 50
+    np.testing.assert_array_equal(saturated > 0, at_limit)
+    assert metrics["saturated_samples"]["value"] == at_limit.sum()
+    assert np.linalg.norm(xi[-1]) < 1e-4  # nevertheless on the path in the end
