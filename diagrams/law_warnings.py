@@ -43,7 +43,7 @@ def _fast_resonance(
         f"the joints resonate at up to {resonance / (2.0 * np.pi):.0f} Hz, "
         f"{resonance * period:.2f} rad per sampling interval; above "
         f"{_FASTEST_RESONANCE:g} rad the law 'elastic' loses accuracy and then "
-        "oscillates: sample faster or take the law 'singular_perturbation'"
+        "oscillates: sample faster, or take the law 'visco_elastic' or 'singular_perturbation'"
     ]
 
 

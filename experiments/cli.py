@@ -107,7 +107,7 @@ def compare_command(
 def study_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Which law when: all laws on joints of rising stiffness (about half a minute)."""
+    """Which law when: all laws on joints of rising stiffness (about a minute)."""
     from experiments.stiffness_study import write_study
 
     logging.getLogger("drake").setLevel(logging.ERROR)

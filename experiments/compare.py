@@ -19,7 +19,13 @@ from experiments.report import write_report
 from experiments.run_log import RunLog
 from pfsc_drake.errors import InputError
 
-_COMPARED = ("max_path_deviation", "max_tangential_error", "max_orientation_error")
+_COMPARED = (
+    "max_path_deviation",
+    "max_error_from_compliant_reference",
+    "max_tangential_error",
+    "max_orientation_error",
+    "max_external_force",
+)
 
 
 def write_comparison(folders: Sequence[Path], out: Path) -> Path:
@@ -51,6 +57,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     figures = [_deviations(logs, pictures)]
     if all("angles_e" in log for log in logs.values()):
         figures.append(_orientations(logs, pictures))
+    if all("orientation_lead" in log for log in logs.values()):
+        figures.append(_leads(logs, pictures))
     if all("wrench_ext" in log for log in logs.values()):
         figures.append(_forces(logs, pictures))
     first = next(iter(logs.values()))
@@ -81,6 +89,22 @@ def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
         save_canvas(canvas, folder / "deviations.png")
     caption = "Distance from the path and error along it."
     return Figure(folder / "deviations.png", "Deviations", caption)
+
+
+def _leads(logs: dict[str, RunLog], folder: Path) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas, (panel,) = make_panels(1)
+        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
+            lead = np.rad2deg(log["orientation_lead"].values[:, 0])
+            panel.plot(log.time, lead, color=colour, label=name)
+        panel.set(title="Reference orientation ahead of the tool's place", ylabel="angle in deg")
+        place_legend(panel)
+        save_canvas(canvas, folder / "orientation_lead.png")
+    caption = (
+        "Angle between the orientation that each law asks for and the one that belongs to the "
+        "tool's place on the path: zero where the reference waits."
+    )
+    return Figure(folder / "orientation_lead.png", "Waiting or running on", caption)
 
 
 def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:

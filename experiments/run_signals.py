@@ -2,6 +2,7 @@
 
 import numpy as np
 from pydrake.systems.framework import Context
+from scipy.spatial.transform import Rotation
 
 from diagrams.replay import RecordedMotion
 from diagrams.station import Station
@@ -50,8 +51,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     log.add("theta", points[:, linearization.layout.theta], "1")
     log.add("alpha", points[:, linearization.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
-    orientation_from = raw["path_point"] if linearization.time_driven else points
-    _add_orientation(log, station, orientation_from, pose)
+    _add_orientation(log, station, raw["path_point"], points, pose)
     _add_forces(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -199,16 +199,29 @@ def _rotations(
     return R_e, quaternion_to_matrix(quaternion)
 
 
-def _add_orientation(log: RunLog, station: Station, point: np.ndarray, pose: np.ndarray) -> None:
-    """Add the ZYX angles of the tool and of the reference that the law compares it with."""
-    layout = station.law.linearization.layout
-    if not layout.oriented:
+def _add_orientation(
+    log: RunLog, station: Station, followed: np.ndarray, place: np.ndarray, pose: np.ndarray
+) -> None:
+    """Add the ZYX angles of the tool and of the reference that the law compares it with.
+
+    And how far that reference is away from the orientation that belongs to the tool's place.
+    """
+    linearization = station.law.linearization
+    if not linearization.layout.oriented:
         return
-    R_e, R_d = _rotations(layout, pose, point)
+    point = followed if linearization.time_driven else place
+    R_e, R_d = _rotations(linearization.layout, pose, point)
+    _, R_place = _rotations(linearization.layout, pose, place)
+    unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
     for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
         angles = np.unwrap(matrix_to_zyx(R), axis=0)
-        angles[~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))] = np.nan
+        angles[unknown] = np.nan
         log.add(name, angles, "rad", ["z", "y", "x"])
+    lead = np.full(len(place), np.nan)
+    if not unknown.all():
+        between = np.swapaxes(R_place, 1, 2) @ R_d
+        lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
+    log.add("orientation_lead", lead, "rad")
 
 
 def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:

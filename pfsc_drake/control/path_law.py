@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.control.decoupling import DecouplingInverse, DecouplingSolution
 from pfsc_drake.control.linearization import Linearization
 from pfsc_drake.control.stabilization import Stabilization
@@ -148,24 +149,11 @@ class PathLaw:
 
     def _bind_buffers(self) -> None:
         """Give both functions one set of arrays, so that nothing is copied between them."""
-        self._buffers = [self.function.buffer(), self._completion.buffer()]
-        (first, self._linearize), (second, self._complete) = self._buffers
-        arrays = {}
-        for i in range(self.function.n_in()):
-            arrays[self.function.name_in(i)] = np.zeros(self.function.numel_in(i))
-            first.set_arg(i, arrays[self.function.name_in(i)].data)
-        for i in range(self.function.n_out()):
-            arrays[self.function.name_out(i)] = np.zeros(self.function.numel_out(i))
-            first.set_res(i, arrays[self.function.name_out(i)].data)
-        for i in range(self._completion.n_in()):
-            name = self._completion.name_in(i)
-            arrays.setdefault(name, np.zeros(self._completion.numel_in(i)))
-            second.set_arg(i, arrays[name].data)
-        arrays["result"], arrays["check"] = np.zeros(self.layout.size), np.zeros(1)
-        second.set_res(0, arrays["result"].data)
-        second.set_res(1, arrays["check"].data)
-        # the buffers know addresses only
-        self._arrays = arrays
+        first = BoundFunction(self.function)
+        arrays = first.arguments | first.results
+        second = BoundFunction(self._completion, **arrays)
+        arrays |= second.arguments | second.results
+        self._linearize, self._complete = first.evaluate, second.evaluate
         self._state, self._point = arrays["state"], arrays["path_point"]
         self._reference, self._integral = arrays["reference"], arrays["integral"]
         self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]

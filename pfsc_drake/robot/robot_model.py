@@ -76,7 +76,7 @@ def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
 def gravity_function(robot: RobotModel) -> ca.Function:
     """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
     q = ca.SX.sym("q", robot.dimension)
-    return ca.Function("gravity", [q], [gravity_torque(robot, q)])
+    return ca.Function("gravity", [q], [ca.densify(gravity_torque(robot, q))], ["q"], ["tau"])
 
 
 def pose_function(robot: RobotModel) -> ca.Function:

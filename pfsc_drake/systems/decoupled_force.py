@@ -3,6 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.control.decoupled_force import decoupled_force_function
 from pfsc_drake.control.force_profile import smooth_pulse
 from pfsc_drake.geometry import PathPointLayout
@@ -38,9 +39,10 @@ class DecoupledForce(LeafSystem):
         period: float,
     ) -> None:
         super().__init__()
-        self._function = decoupled_force_function(robot, layout)
+        function = BoundFunction(decoupled_force_function(robot, layout))
+        self._q, self._point = function.arguments.values()
+        (self._unit,), self._evaluate = function.results.values(), function.evaluate
         self._begin, self._end, self._ramp, self._force = pulse
-        self._dimension = robot.dimension
         unit = self.DeclareDiscreteState(6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * robot.dimension)
         self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
@@ -59,8 +61,9 @@ class DecoupledForce(LeafSystem):
     def _look(self, context: Context, state: DiscreteValues) -> EventStatus:
         # nothing is needed of the direction while there is no force
         if self._begin - 0.1 <= context.get_time() <= self._end:
-            q = self._joint_state.Eval(context)[: self._dimension]
-            unit = np.array(self._function(q, self._path_point.Eval(context))).ravel()
-            if np.isfinite(unit).all():
-                state.set_value(unit)
+            self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
+            self._point[:] = self._path_point.Eval(context)
+            self._evaluate()
+            if np.isfinite(self._unit).all():
+                state.set_value(self._unit)
         return EventStatus.Succeeded()

@@ -10,6 +10,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.delta import DeltaRobot
 
@@ -60,16 +61,11 @@ class DeltaPlant(LeafSystem):
         self.DeclarePerStepPublishEvent(self._check_travel)
         self._robot = robot
         self._lower, self._upper = robot.gather("position_limits").T
-        self._x, self._tau, self._f_ext = np.zeros(2 * n), np.zeros(n), np.zeros(3)
-        self._rate, self._y_t = np.zeros(2 * n), np.zeros(3)
-        functions = [_dynamics_function(robot), _position_function(robot)]
-        self._buffers = [function.buffer() for function in functions]
-        (dynamics, self._evaluate_dynamics), (position, self._evaluate_position) = self._buffers
-        for i, argument in enumerate((self._x, self._tau, self._f_ext)):
-            dynamics.set_arg(i, argument.data)
-        dynamics.set_res(0, self._rate.data)
-        position.set_arg(0, self._x.data)
-        position.set_res(0, self._y_t.data)
+        dynamics = BoundFunction(_dynamics_function(robot))
+        self._x, self._tau, self._f_ext = dynamics.arguments.values()
+        position = BoundFunction(_position_function(robot), x=self._x)
+        self._rate, self._y_t = dynamics.results["rate"], position.results["y_t"]
+        self._evaluate_dynamics, self._evaluate_position = dynamics.evaluate, position.evaluate
 
     def set_state(self, context: Context, q: np.ndarray, v: np.ndarray | None = None) -> None:
         """Set the state.
@@ -118,11 +114,13 @@ def _dynamics_function(robot: DeltaRobot) -> ca.Function:
     x, tau, f_ext = ca.SX.sym("x", 6), ca.SX.sym("tau", 3), ca.SX.sym("f_ext", 3)
     q, v = ca.vertsplit(x, 3)
     rate = ca.vertcat(v, robot.acceleration(q, v, tau, f_ext))
-    return ca.Function("delta_dynamics", [x, tau, f_ext], ca.cse([ca.densify(rate)]))
+    arguments, names = [x, tau, f_ext], ["x", "tau", "f_ext"]
+    return ca.Function("delta_dynamics", arguments, ca.cse([ca.densify(rate)]), names, ["rate"])
 
 
 def _position_function(robot: DeltaRobot) -> ca.Function:
     """Return ``x -> y_t``."""
     x = ca.SX.sym("x", 6)
     y_t, _ = robot.tool_pose([Jet([q_i]) for q_i in ca.vertsplit(x[:3])])
-    return ca.Function("delta_position", [x], ca.cse([ca.densify(y_t.coefficients[0])]))
+    results = ca.cse([ca.densify(y_t.coefficients[0])])
+    return ca.Function("delta_position", [x], results, ["x"], ["y_t"])

@@ -3,6 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.control.signal_derivatives import SignalDerivatives
 from pfsc_drake.control.tool_load import joint_torque_function
 from pfsc_drake.robot.robot_model import RobotModel
@@ -42,11 +43,9 @@ class ExternalTorque(LeafSystem):
     ) -> None:
         super().__init__()
         n, self._rows = robot.dimension, num_derivatives + 1
-        self._q, self._argument, self._tau = np.zeros(n), np.zeros(6), np.zeros(n)
-        self._buffer, self._evaluate = joint_torque_function(robot).buffer()
-        self._buffer.set_arg(0, self._q.data)
-        self._buffer.set_arg(1, self._argument.data)
-        self._buffer.set_res(0, self._tau.data)
+        function = BoundFunction(joint_torque_function(robot))
+        self._q, self._argument = function.arguments["q"], function.arguments["wrench"]
+        self._tau, self._evaluate = function.results["tau_ext"], function.evaluate
         self._wrench = self.DeclareVectorInputPort("wrench", 6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         sources = {self._wrench.ticket(), self._joint_state.ticket()}

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.robot.rotor_coupling import RotorMount, full_dynamics_function
 from pfsc_drake.robot.serial_chain import SerialChain
 
@@ -55,12 +56,9 @@ class FullElasticPlant(LeafSystem):
             prerequisites_of_calc={self.xc_ticket()},
         )
         self._half = 2 * n
-        self._state, self._acceleration = np.zeros(4 * n), np.zeros(2 * n)
-        self._tau_d, self._tau_ext = np.zeros(n), np.zeros(n)
-        self._buffer, self._evaluate = dynamics.buffer()
-        for i, argument in enumerate((self._state, self._tau_d, self._tau_ext)):
-            self._buffer.set_arg(i, argument.data)
-        self._buffer.set_res(0, self._acceleration.data)
+        function = BoundFunction(dynamics)
+        self._state, self._tau_d, self._tau_ext = function.arguments.values()
+        self._acceleration, self._evaluate = function.results["acceleration"], function.evaluate
 
     def set_joint_state(self, context: Context, joint_state: np.ndarray) -> None:
         """Put the robot into a state.

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.control.path_law import Fault
 from pfsc_drake.control.velocity_servo import VelocityServoLaw
 from pfsc_drake.errors import InputError
@@ -72,10 +73,9 @@ class VelocityServo(LeafSystem):
         self.DeclareVectorOutputPort("fault", 1, self._calc_fault, prerequisites_of_calc=sources)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(law.gains.period, 0.0, self._update)
-        self._q, self._gravity = np.zeros(n), np.zeros(n)
-        self._buffer, self._evaluate = gravity_function(robot).buffer()
-        self._buffer.set_arg(0, self._q.data)
-        self._buffer.set_res(0, self._gravity.data)
+        function = BoundFunction(gravity_function(robot))
+        self._q, self._gravity = function.arguments["q"], function.results["tau"]
+        self._evaluate = function.evaluate
 
     def fault(self, context: Context) -> Fault:
         """Return the fault that holds at the present instant."""

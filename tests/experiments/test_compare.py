@@ -21,6 +21,7 @@ def fixture_make_run(tmp_path):
         if oriented:
             for signal in ("angles_e", "angles_d"):
                 log.add(signal, np.outer(time, [0.1, 0.2, 0.3]), "rad")
+            log.add("orientation_lead", 0.1 * time, "rad")
         if pushed:
             log.add("wrench_ext", np.outer(time, [3.0, 0.0, 4.0, 0.0, 0.0, 1.0]), "N, Nm")
         log.write(folder / "log.h5")
@@ -43,6 +44,7 @@ def test_both_runs_are_on_the_page(make_run, tmp_path, capsys):
         assert part in page
     assert {path.name for path in (out / "figures").iterdir()} == {
         "deviations.png",
+        "orientation_lead.png",
         "orientations.png",
     }
 
