@@ -6,6 +6,8 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 
+_ROUNDING = 1e-6
+
 
 def require(condition: bool, key: str, value: object, allowed: str) -> None:
     """Refuse a value.
@@ -37,3 +39,26 @@ def require_numbers(key: str, values: Sequence[float], count: int) -> None:
     """Refuse a list of another length, or with values that are not finite."""
     valid = len(values) == count and bool(np.isfinite(values).all())
     require(valid, key, list(values), f"{count} finite numbers")
+
+
+def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
+    """Refuse a step that does not fit into the controller's sampling time a whole number of times.
+
+    Args:
+        key: Key of the step.
+        step: The step [s].
+        sampling_time: Of the controller [s].
+
+    Returns:
+        How many times it fits.
+
+    Raises:
+        InputError: If it does not fit.
+    """
+    ratio = sampling_time / step
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > _ROUNDING:
+        raise InputError(
+            f"{key} = {step:g} s; must be a whole fraction of "
+            f"controller.sampling_time = {sampling_time:g} s"
+        )
+    return round(ratio)

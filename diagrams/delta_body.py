@@ -14,12 +14,12 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
+from diagrams.checks import require_whole_fraction
 from diagrams.drives import friction_bristles
 from diagrams.notch import TOOL_POINT, add_ball, add_notch
 from diagrams.scenario_delta import DeltaFollowingScenario
 from diagrams.scenario_notch import NotchParameters
 from pfsc_drake.control.friction import BristleFriction, bristles_for_step
-from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.delta import DeltaRobot
 from pfsc_drake.robot.delta_multibody import (
@@ -34,7 +34,6 @@ from pfsc_drake.systems.joint_friction import JointFriction
 
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
-_ROUNDING = 1e-6
 
 
 class DeltaBody(ABC):
@@ -210,12 +209,7 @@ def add_touching_delta(
     Raises:
         InputError: If the plant's time step does not suit the controller's.
     """
-    ratio = period / notch.time_step
-    if round(ratio) < 1 or abs(ratio - round(ratio)) > _ROUNDING:
-        raise InputError(
-            f"notch.time_step = {notch.time_step:g} s; must be a whole fraction of "
-            f"controller.sampling_time = {period:g} s"
-        )
+    require_whole_fraction("notch.time_step", notch.time_step, period)
     plant = builder.AddNamedSystem("plant", MultibodyPlant(notch.time_step))
     scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
     plant.RegisterAsSourceForSceneGraph(scene_graph)

@@ -12,7 +12,7 @@ from diagrams.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_to
 from diagrams.external_torque import needs_sensor
 from diagrams.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.force_sensor import add_sensor, sensor_warnings
-from diagrams.measurement import add_joint_state
+from diagrams.measurement import add_joint_state, states_to_log
 from diagrams.notch import UP
 from diagrams.notch_motion import place_in_notch
 from diagrams.parts import make_law, make_path
@@ -121,7 +121,7 @@ def build_delta_following(
     controller, made = add_law(builder, task, place, forces)
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, robot.dimension))
     builder.Connect(controller.GetOutputPort(controller.drive_port), hold.get_input_port())
-    signals = place.signals | forces | made
+    signals = place.signals | forces | made | states_to_log(scenario, true_state, joint_state)
     signals |= _add_drives(builder, body, hold.get_output_port(), slides, scenario)
     log = add_log(builder, signals, period)
     diagram = builder.Build()

@@ -7,6 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.arm import Arm
+from diagrams.checks import require_whole_fraction
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
 from pfsc_drake.control.friction import BristleFriction, bristles_for_step
 from pfsc_drake.control.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
@@ -19,7 +20,6 @@ from pfsc_drake.systems.velocity_servo import VelocityServo
 
 # integration schemes of fixed step that the bristles of friction are made for
 _FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
-_ROUNDING = 1e-6
 
 
 def add_drives(
@@ -68,12 +68,7 @@ def _add_servo(
     """Add velocity servos, and return them and their sampling time."""
     servo, tick = scenario.servo, scenario.controller.sampling_time
     period = servo.period or tick
-    ratio = tick / period
-    if round(ratio) < 1 or abs(ratio - round(ratio)) > _ROUNDING:
-        raise InputError(
-            f"servo.period = {period:g} s; must be a whole fraction of "
-            f"controller.sampling_time = {tick:g} s"
-        )
+    ratio = require_whole_fraction("servo.period", period, tick)
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
     effort = chain.gather("effort_limit") * scenario.controller.effort_scale
@@ -84,7 +79,7 @@ def _add_servo(
     if servo.bus_delay > 0.0:
         bus = add_bus_delay(builder, velocity, servo.bus_delay, tick)
         velocity = bus.GetOutputPort("delivered")
-    elif round(ratio) > 1:
+    elif ratio > 1:
         # the law must not be evaluated between its own ticks
         keep = builder.AddNamedSystem("velocity_hold", ZeroOrderHold(tick, chain.dimension))
         builder.Connect(velocity, keep.get_input_port())

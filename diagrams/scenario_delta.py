@@ -3,7 +3,7 @@
 import dataclasses as dc
 
 from diagrams.checks import require
-from diagrams.scenario import EncoderOptions, PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario_notch import NotchParameters
 
 
@@ -37,8 +37,6 @@ class DeltaFollowingScenario(PathFollowingScenario):
         force = self.hold_back.force
         require(force == 0.0, "hold_back.force", force, "0 for a DELTA robot")
         require(not self.friction.is_given, "friction", "a block", "drive_friction here")
-        exact = self.encoders == EncoderOptions()
-        require(exact, "encoders", "a block", "none for a DELTA robot")
         for key in ("joint_damping", "rotor_coupling"):
             value = getattr(self.robot, key)
             require(not value, f"robot.{key}", value, "none for a DELTA robot")

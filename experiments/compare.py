@@ -92,32 +92,45 @@ def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
 
 
 def _leads(logs: dict[str, RunLog], folder: Path) -> Figure:
-    with plt.rc_context(STYLE):
-        canvas, (panel,) = make_panels(1)
-        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
-            lead = np.rad2deg(log["orientation_lead"].values[:, 0])
-            panel.plot(log.time, lead, color=colour, label=name)
-        panel.set(title="Reference orientation ahead of the tool's place", ylabel="angle in deg")
-        place_legend(panel)
-        save_canvas(canvas, folder / "orientation_lead.png")
     caption = (
         "Angle between the orientation that each law asks for and the one that belongs to the "
         "tool's place on the path: zero where the reference waits."
     )
-    return Figure(folder / "orientation_lead.png", "Waiting or running on", caption)
+    return _draw_one(
+        {name: np.rad2deg(log["orientation_lead"].values[:, 0]) for name, log in logs.items()},
+        logs,
+        "angle in deg",
+        "Reference orientation ahead of the tool's place",
+        Figure(folder / "orientation_lead.png", "Waiting or running on", caption),
+    )
 
 
 def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:
+    caption = "Size of the force that acts on the tool, not what the sensor makes of it."
+    return _draw_one(
+        {
+            name: np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
+            for name, log in logs.items()
+        },
+        logs,
+        "force in N",
+        "Force on the tool",
+        Figure(folder / "forces.png", "Forces", caption),
+    )
+
+
+def _draw_one(
+    signals: dict[str, np.ndarray], logs: dict[str, RunLog], ylabel: str, title: str, figure: Figure
+) -> Figure:
+    """Draw one signal of every run in one panel, into the figure's file."""
     with plt.rc_context(STYLE):
         canvas, (panel,) = make_panels(1)
-        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
-            force = np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
-            panel.plot(log.time, force, color=colour, label=name)
-        panel.set(title="Force on the tool", ylabel="force in N")
+        for colour, (name, values) in zip(COLOURS, signals.items(), strict=False):
+            panel.plot(logs[name].time, values, color=colour, label=name)
+        panel.set(title=title, ylabel=ylabel)
         place_legend(panel)
-        save_canvas(canvas, folder / "forces.png")
-    caption = "Size of the force that acts on the tool, not what the sensor makes of it."
-    return Figure(folder / "forces.png", "Forces", caption)
+        save_canvas(canvas, figure.path)
+    return figure
 
 
 def _orientations(logs: dict[str, RunLog], folder: Path) -> Figure:

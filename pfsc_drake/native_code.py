@@ -58,6 +58,19 @@ _INLINE = {
         "{v}a = fcmp oeq double {x}, 0.0",
         "{v} = select i1 {v}a, double 0.0, double {y}",
     ),
+    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi's is the first
+    ca.OP_FMIN: (
+        "{v}a = fcmp olt double {y}, {x}",
+        "{v}b = fcmp uno double {x}, {x}",
+        "{v}c = or i1 {v}a, {v}b",
+        "{v} = select i1 {v}c, double {y}, double {x}",
+    ),
+    ca.OP_FMAX: (
+        "{v}a = fcmp ogt double {y}, {x}",
+        "{v}b = fcmp uno double {x}, {x}",
+        "{v}c = or i1 {v}a, {v}b",
+        "{v} = select i1 {v}c, double {y}, double {x}",
+    ),
     # of NaN it is NaN, of -0 it is -0
     ca.OP_SIGN: (
         "{v}a = fcmp ogt double {x}, 0.0",
@@ -92,8 +105,6 @@ _BINARY_CALLS = {
     ca.OP_CONSTPOW: "pow",
     ca.OP_FMOD: "fmod",
     ca.OP_REMAINDER: "remainder",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
     ca.OP_ATAN2: "atan2",
     ca.OP_HYPOT: "hypot",
 }

@@ -49,8 +49,8 @@ class BoundFunction:
             values = _array(name, function.sparsity_out(i), shared)
             self._buffer.set_res(i, values.data)
             self.results[name] = values
-        self._left = self.compile_after
-        if not self._left:
+        self._left = self.compile_after + 1
+        if not self.compile_after:
             self.compile()
 
     def evaluate(self) -> None:
