@@ -1,6 +1,7 @@
 """What a path tells the controller at each tick."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,17 +12,40 @@ from pfsc_drake.geometry.curve import Curve
 from pfsc_drake.geometry.frame import ParallelTransportFrame
 from pfsc_drake.geometry.orientation import OrientationCurve
 from pfsc_drake.geometry.path_point import PathPointLayout, PathStatus
+from pfsc_drake.geometry.path_table import tabulate
 from pfsc_drake.geometry.projection import Projector
 
-_OK = float(PathStatus.OK)
 _BEYOND_END = float(PathStatus.BEYOND_END)
 _NOT_CONVERGED = float(PathStatus.NOT_CONVERGED)
+
+# All relative to the length of the domain: the longest step from one tick to the next, ...
+_NEAR = 1.0 / 128.0
+# ... a step of third order after which none of more than the tolerance follows, ...
+_SETTLED = 1e-6
+_TOLERANCE = 1e-12
+# ... and how far a polynomial may be used beyond its piece.
+_SLACK = 1e-13
+_MAX_STEPS = 6
+_NO_TURN = 1e-14
+
+Foot = tuple[int, float, int]
 
 
 class PathEvaluator:
     """Projects a point on a path and evaluates everything a law of one order needs there.
 
     It has no memory: the same input gives the same output. `Path.evaluator` makes it.
+
+    All quantities of the path point are polynomials of u = theta - theta_s on the pieces of
+    one table, so one product of a matrix with the powers of u evaluates them all. The slope of
+    half the squared distance from a point y,
+
+        f(u) = (sigma_t(theta_s + u) - y) . sigma_t'(theta_s + u),
+
+    is a polynomial too, with coefficients affine in y. From the last tick's parameter
+    Halley's steps, of third order, find its root in a few scalar operations. What they find
+    is checked on the path itself; whatever is not quick and plain (a far guess, an end of an
+    open path, a point near the centre of curvature) is left to the `Projector`.
 
     Args:
         position: Curve sigma_t in R^3.
@@ -45,14 +69,21 @@ class PathEvaluator:
         order: int,
     ) -> None:
         self.layout = PathPointLayout(order, orientation is not None)
-        self._position = position.flat_sampler(order + 1)
-        self._orientation = orientation.flat_sampler(order) if orientation is not None else None
+        table = tabulate(position, orientation, arc_length, frame, self.layout)
+        self._rows, self._slopes = list(table.rows), list(table.slopes)
+        self._starts = table.breakpoints[:-1].tolist()
+        self._widths = np.diff(table.breakpoints).tolist()
+        self._interior = table.breakpoints[1:-1].tolist()
+        # Of the table, which may be one or two laps long.
+        self._begin, self._end = float(table.breakpoints[0]), float(table.breakpoints[-1])
+        self._period = self._end - self._begin
+        laps = round(self._period / position.period)
+        self._length, self._turn = laps * arc_length.length, laps * frame.holonomy
         self._domain, self._closed = position.domain, position.closed
-        self._arc_length = arc_length.at
-        self._normal = frame.normal_at
         self._project = projector.project
-        self._size = self.layout.size
-        self._position_end = self.layout.position.stop
+        length = position.period
+        self._near, self._settled = _NEAR * length, _SETTLED * length
+        self._tolerance, self._slack = _TOLERANCE * length, _SLACK * length
 
     def __call__(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
         """Path quantities at the projection of a point.
@@ -65,19 +96,29 @@ class PathEvaluator:
             New array [layout.size], see `PathPointLayout`. All its values but `status` are
             NaN if the point or the guess is not finite.
         """
-        theta, alpha, at_end, _, converged = self._project(point, theta_guess)
-        if alpha != alpha:
-            out = np.full(self._size, math.nan)
-            out[3] = _NOT_CONVERGED
-            return out
-        if not at_end:
-            return self._fill(theta, alpha, _OK if converged else _NOT_CONVERGED)
-        out = self._fill(theta, 0.0, _BEYOND_END)
-        out[13 : self._position_end] = 0.0
-        out[self._position_end + 4 :] = 0.0
-        x, y, z, dx, dy, dz = out[7:13].tolist()
-        along = (point[0] - x) * dx + (point[1] - y) * dy + (point[2] - z) * dz
-        out[1] += along / math.sqrt(dx * dx + dy * dy + dz * dz)
+        x, y, z = point
+        foot = self._find_foot(x, y, z, theta_guess)
+        if foot is None:
+            return self._at_projection(point, theta_guess)
+        piece, u, laps = foot
+        u2 = u * u
+        u3 = u2 * u
+        u4 = u2 * u2
+        out = self._rows[piece].dot((1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4))
+        px, py, pz, dx, dy, dz, cx, cy, cz = out[7:16].tolist()
+        x -= px
+        y -= py
+        z -= pz
+        square = dx * dx + dy * dy + dz * dz
+        alpha = (x * cx + y * cy + z * cz) / square
+        error = (x * dx + y * dy + z * dz) / (square * (1.0 - alpha))
+        tolerance = self._tolerance
+        if not (-tolerance < error < tolerance and alpha < 1.0):
+            return self._at_projection(point, theta_guess)
+        out[0] = self._starts[piece] + u + error
+        out[2] = alpha
+        if laps:
+            self._add_laps(out, laps)
         return out
 
     def evaluate_at(self, theta: float) -> np.ndarray:
@@ -95,16 +136,29 @@ class PathEvaluator:
         begin, end = self._domain
         if not math.isfinite(theta) or (not self._closed and not begin <= theta <= end):
             raise InputError(f"theta: {theta:.9g}; the path is defined on [{begin:.9g}, {end:.9g}]")
-        return self._fill(float(theta), 0.0, _OK)
+        return self._at(float(theta))
 
-    def _fill(self, theta: float, alpha: float, status: float) -> np.ndarray:
-        position = self._position(theta)
-        dx, dy, dz = position[3:6].tolist()
-        scale = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-        x, y, z = self._normal(theta, (dx * scale, dy * scale, dz * scale))
-        out = np.empty(self._size)
-        out[:7] = (theta, self._arc_length(theta), alpha, status, x, y, z)
-        out[7 : self._position_end] = position
-        if self._orientation is not None:
-            out[self._position_end :] = self._orientation(theta)
-        return out
+    def _find_foot(self, x: float, y: float, z: float, theta: float) -> Foot | None:
+        """Root of the slope next to a guess: piece, u, and number of the table's lap.
+
+        Every step must be shorter than a quarter of the one before, as it is near a root;
+        None if it is not, or if the way leads out of an open path.
+        """
+        begin, end, interior = self._begin, self._end, self._interior
+        settled, slack, reach = self._settled, self._slack, self._near
+        laps, piece, u, width = 0, -1, theta, 0.0
+        for _ in range(_MAX_STEPS):
+            if piece < 0 or not -slack <= u <= width + slack:
+                if piece >= 0:
+                    theta = self._starts[piece] + u
+                if not begin <= theta <= end:
+                    if not self._closed or not math.isfinite(theta):
+                        return None
+                    more = math.floor((theta - begin) / self._period)
+                    theta -= more * self._period
+                    laps += more
+                piece = bisect_right(interior, theta)
+                u, width = theta - self._starts[piece], self._widths[piece]
+                c0, c1, c2, c3, c4, c5, c6, c7 = self._slopes[piece].dot((1.0, x, y, z)).tolist()
+            ...
+        return None
