@@ -53,12 +53,13 @@ class ArcLength:
         self.length = float(sums[-1])
         if not self.length > 0.0:
             raise InputError(f"curve: length {self.length:g} m; a regular curve is required")
-        self._closed = curve.closed
+        self._closed, self._laps = curve.closed, curve.laps
         self._begin, self._end = begin, end
         self._breaks, self._sums = breaks.tolist(), sums.tolist()
         self._function = PiecewisePolynomialCurve(breaks, table, known_smoothness=1)
         self._sample = self._function.flat_sampler(0)
-        self._sample_with_speed = self._function.flat_sampler(1)
+        # Highest power first, for Horner's scheme.
+        self._coefficients = table[:, ::-1, 0].tolist()
 
     @overload
     def __call__(self, theta: float) -> float: ...
@@ -76,9 +77,9 @@ class ArcLength:
             s, m, of the same shape.
         """
         if isinstance(theta, np.ndarray):
-            return np.array([self.at(value) for value in theta.ravel().tolist()]).reshape(
-                theta.shape
-            )
+            laps = self._laps(theta)
+            local = np.clip(theta - laps * (self._end - self._begin), self._begin, self._end)
+            return self._function.derivatives(local, 0)[..., 0, 0] + laps * self.length
         return self.at(theta)
 
     def at(self, theta: float) -> float:
@@ -110,12 +111,17 @@ class ArcLength:
             raise InputError(f"arc length: {s:.9g} m; the open path has [0, {self.length:.9g}] m")
         laps = math.floor(s / self.length) if self._closed else 0
         target = min(max(s - laps * self.length, 0.0), self.length)
-        piece = min(bisect_right(self._sums, target), len(self._breaks) - 1)
-        low, high = self._breaks[piece - 1], self._breaks[piece]
-        fraction = (target - self._sums[piece - 1]) / (self._sums[piece] - self._sums[piece - 1])
+        piece = min(bisect_right(self._sums, target), len(self._breaks) - 1) - 1
+        start, coefficients = self._breaks[piece], self._coefficients[piece]
+        low, high = start, self._breaks[piece + 1]
+        fraction = (target - self._sums[piece]) / (self._sums[piece + 1] - self._sums[piece])
         theta = low + (high - low) * fraction
         for _ in range(_INVERSION_STEPS):
-            value, speed = self._sample_with_speed(theta).tolist()
+            u = theta - start
+            value = speed = 0.0
+            for coefficient in coefficients:
+                speed = value + u * speed
+                value = coefficient + u * value
             # s increases: the root stays bracketed, and bisection replaces a step out of it.
             if value < target:
                 low = theta

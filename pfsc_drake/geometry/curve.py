@@ -75,6 +75,20 @@ class Curve(ABC):
         inside = (values >= begin) & (values <= end)
         return np.where(inside, values, begin + np.mod(values - begin, end - begin))
 
+    def laps(self, theta: ArrayLike) -> np.ndarray:
+        """Whole periods by which parameters lie outside the domain; zero if open.
+
+        Args:
+            theta: Unwrapped path parameters, any shape.
+
+        Returns:
+            Array of the same shape, of whole numbers.
+        """
+        values = np.asarray(theta, dtype=float)
+        begin, end = self.domain
+        outside = (values < begin) | (values > end)
+        return np.where(outside & self.closed, np.floor((values - begin) / (end - begin)), 0.0)
+
     def first_discontinuity(self, order: int) -> float | None:
         """Parameter at which a derivative of at most this order first jumps.
 

@@ -39,6 +39,7 @@ class ParallelTransportFrame:
     Attributes:
         holonomy: Angle from e_perp(theta) to e_perp(theta + period) about e_par, rad, in
             (-pi, pi]; zero for an open curve.
+        breakpoints: Between two of them e_perp is smooth, with those of the curve, [n].
 
     Raises:
         InputError: the curve is not three-dimensional or has a corner, or the initial
@@ -57,51 +58,11 @@ class ParallelTransportFrame:
         start = _unit(curve.derivatives(curve.domain[0], 1)[1])
         normal = _initial_normal(start, initial_normal)
         breaks, table, last = _transport(curve, normal)
-        self._begin, self._end = curve.domain
-        self._period = curve.period
         self.holonomy = 0.0
         if curve.closed:
             self.holonomy = math.atan2(last @ np.cross(start, normal), last @ normal)
-        self._laps_matter = curve.closed and self.holonomy != 0.0
         self._table = PiecewisePolynomialCurve(breaks, table, known_smoothness=1)
-        self._sample = self._table.flat_sampler(0)
-
-    def normal_at(self, theta: float, tangent: Vector) -> Vector:
-        """The first normal vector, for each tick.
-
-        Args:
-            theta: Unwrapped path parameter; clamped to the domain of an open curve.
-            tangent: e_par(theta), a unit vector.
-
-        Returns:
-            e_perp(theta), exactly perpendicular to the tangent given, of length one.
-        """
-        begin, end = self._begin, self._end
-        laps = 0
-        if not begin <= theta <= end:
-            if self._curve.closed:
-                laps = math.floor((theta - begin) / self._period)
-                theta -= laps * self._period
-            else:
-                theta = begin if theta < begin else end
-        x, y, z = self._sample(theta).tolist()
-        tx, ty, tz = tangent
-        along = x * tx + y * ty + z * tz
-        x -= along * tx
-        y -= along * ty
-        z -= along * tz
-        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
-        x *= scale
-        y *= scale
-        z *= scale
-        if laps and self._laps_matter:
-            c, s = math.cos(laps * self.holonomy), math.sin(laps * self.holonomy)
-            x, y, z = (
-                c * x + s * (ty * z - tz * y),
-                c * y + s * (tz * x - tx * z),
-                c * z + s * (tx * y - ty * x),
-            )
-        return x, y, z
+        self.breakpoints = self._table.breakpoints
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Both normal vectors.
@@ -110,18 +71,23 @@ class ParallelTransportFrame:
             theta: Unwrapped path parameters, shape [...].
 
         Returns:
-            e_perp and e_cross, each [..., 3].
+            e_perp and e_cross, each [..., 3]: exactly perpendicular to the curve's tangent and
+            to each other, of length one.
 
         Raises:
             InputError: theta lies outside the domain of an open curve.
         """
         values = np.asarray(theta, dtype=float)
-        tangents = self._curve.derivatives(values, 1)[..., 1, :]
-        tangents = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
-        pairs = zip(values.ravel().tolist(), tangents.reshape(-1, 3).tolist(), strict=True)
-        e_perp = np.array([self.normal_at(value, tangent) for value, tangent in pairs])
-        e_perp = e_perp.reshape(tangents.shape)
-        return e_perp, np.cross(tangents, e_perp)
+        tangents = _unit(self._curve.derivatives(values, 1)[..., 1, :])
+        laps = self._curve.laps(values)
+        local = np.clip(values - laps * self._curve.period, *self._curve.domain)
+        e_perp = self._table.derivatives(local, 0)[..., 0, :]
+        along = np.sum(e_perp * tangents, axis=-1, keepdims=True)
+        e_perp = _unit(e_perp - along * tangents)
+        e_cross = np.cross(tangents, e_perp)
+        turn = (laps * self.holonomy)[..., None]
+        c, s = np.cos(turn), np.sin(turn)
+        return c * e_perp + s * e_cross, c * e_cross - s * e_perp
 
 
 def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -186,4 +152,4 @@ def _initial_normal(tangent: np.ndarray, wanted: ArrayLike | None) -> np.ndarray
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)

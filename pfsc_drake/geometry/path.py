@@ -57,6 +57,7 @@ class Path:
         self.arc_length = ArcLength(position)
         self.frame = ParallelTransportFrame(position, initial_normal)
         self.projector = Projector(position)
+        self._evaluators: dict[int, PathEvaluator] = {}
 
     @property
     def closed(self) -> bool:
@@ -96,7 +97,7 @@ class Path:
             )
 
     def evaluator(self, order: int) -> PathEvaluator:
-        """What a law calls at each tick.
+        """What a law calls at each tick; made once for every order.
 
         Args:
             order: Relative degree r of the law, 1..5.
@@ -107,9 +108,11 @@ class Path:
         Raises:
             InputError: order out of range.
         """
-        return PathEvaluator(
-            self.position, self.orientation, self.arc_length, self.frame, self.projector, order
-        )
+        if order not in self._evaluators:
+            self._evaluators[order] = PathEvaluator(
+                self.position, self.orientation, self.arc_length, self.frame, self.projector, order
+            )
+        return self._evaluators[order]
 
     def project_globally(self, point: ArrayLike, samples: int | None = None) -> Projection:
         """Closest point of the whole path (3.6), see the function of the same name."""

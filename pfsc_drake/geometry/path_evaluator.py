@@ -25,7 +25,10 @@ _SETTLED = 1e-6
 _TOLERANCE = 1e-12
 # ... and how far a polynomial may be used beyond its piece.
 _SLACK = 1e-13
+# The foot lies on the piece of the guess, or on the next.
+_MAX_PIECES = 3
 _MAX_STEPS = 6
+# Of the normal over the laps, rad: the holonomy of a plane curve is a rounding error.
 _NO_TURN = 1e-14
 
 Foot = tuple[int, float, int]
@@ -110,13 +113,13 @@ class PathEvaluator:
         y -= py
         z -= pz
         square = dx * dx + dy * dy + dz * dz
-        alpha = (x * cx + y * cy + z * cz) / square
-        error = (x * dx + y * dy + z * dz) / (square * (1.0 - alpha))
-        tolerance = self._tolerance
-        if not (-tolerance < error < tolerance and alpha < 1.0):
+        bend = x * cx + y * cy + z * cz
+        curvature = square - bend
+        slope = x * dx + y * dy + z * dz
+        if not abs(slope) < self._tolerance * curvature:
             return self._at_projection(point, theta_guess)
-        out[0] = self._starts[piece] + u + error
-        out[2] = alpha
+        out[0] = self._starts[piece] + u + slope / curvature
+        out[2] = bend / square
         if laps:
             self._add_laps(out, laps)
         return out
@@ -144,21 +147,101 @@ class PathEvaluator:
         Every step must be shorter than a quarter of the one before, as it is near a root;
         None if it is not, or if the way leads out of an open path.
         """
-        begin, end, interior = self._begin, self._end, self._interior
-        settled, slack, reach = self._settled, self._slack, self._near
-        laps, piece, u, width = 0, -1, theta, 0.0
-        for _ in range(_MAX_STEPS):
-            if piece < 0 or not -slack <= u <= width + slack:
-                if piece >= 0:
-                    theta = self._starts[piece] + u
-                if not begin <= theta <= end:
-                    if not self._closed or not math.isfinite(theta):
-                        return None
-                    more = math.floor((theta - begin) / self._period)
-                    theta -= more * self._period
-                    laps += more
-                piece = bisect_right(interior, theta)
-                u, width = theta - self._starts[piece], self._widths[piece]
-                c0, c1, c2, c3, c4, c5, c6, c7 = self._slopes[piece].dot((1.0, x, y, z)).tolist()
-            ...
+        laps, reach = 0, self._near
+        settled, slack = self._settled, self._slack
+        for _ in range(_MAX_PIECES):
+            if not self._begin <= theta <= self._end:
+                if not self._closed or not math.isfinite(theta):
+                    return None
+                more = math.floor((theta - self._begin) / self._period)
+                theta -= more * self._period
+                laps += more
+            piece = bisect_right(self._interior, theta)
+            start, width = self._starts[piece], self._widths[piece]
+            c0, c1, c2, c3, c4, c5, c6, c7 = self._slopes[piece].dot((1.0, x, y, z)).tolist()
+            u = theta - start
+            for _ in range(_MAX_STEPS):
+                # Horner's scheme for the slope f, its derivative d = f' and g = f''/2 at u.
+                g = d = c7
+                f = c6 + u * c7
+                d = f + u * d
+                g = d + u * g
+                f = c5 + u * f
+                d = f + u * d
+                g = d + u * g
+                f = c4 + u * f
+                d = f + u * d
+                g = d + u * g
+                f = c3 + u * f
+                d = f + u * d
+                g = d + u * g
+                f = c2 + u * f
+                d = f + u * d
+                g = d + u * g
+                f = c1 + u * f
+                d = f + u * d
+                f = c0 + u * f
+                divisor = d * d - f * g
+                if not (d > 0.0 and divisor > 0.0):
+                    return None
+                step = -f * d / divisor
+                if not -reach < step < reach:
+                    return None
+                u += step
+                if not -slack <= u <= width + slack:
+                    break
+                if -settled < step < settled:
+                    return piece, u, laps
+                reach = abs(step) / 4.0
+            reach = max(abs(step) / 4.0, settled)
+            theta = start + u
         return None
+
+    def _at_projection(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
+        """The same as calling the object, by the projector."""
+        theta, alpha, at_end, _, converged = self._project(point, theta_guess)
+        if alpha != alpha:
+            out = np.full(self.layout.size, math.nan)
+            out[3] = _NOT_CONVERGED
+            return out
+        out = self._at(theta)
+        if not at_end:
+            out[2] = alpha
+            if not converged:
+                out[3] = _NOT_CONVERGED
+            return out
+        out[3] = _BEYOND_END
+        rest = self.layout.position.stop
+        out[13:rest] = 0.0
+        out[rest + 4 :] = 0.0
+        x, y, z, dx, dy, dz = out[7:13].tolist()
+        along = (point[0] - x) * dx + (point[1] - y) * dy + (point[2] - z) * dz
+        out[1] += along / math.sqrt(dx * dx + dy * dy + dz * dz)
+        return out
+
+    def _at(self, theta: float) -> np.ndarray:
+        """Path point at a finite unwrapped parameter, with alpha zero and status OK."""
+        laps = 0
+        if self._closed and not self._begin <= theta <= self._end:
+            laps = math.floor((theta - self._begin) / self._period)
+        wrapped = theta - laps * self._period
+        piece = bisect_right(self._interior, wrapped)
+        u = wrapped - self._starts[piece]
+        out = self._rows[piece].dot([u**j for j in range(8)])
+        if laps:
+            self._add_laps(out, laps)
+        out[0] = theta
+        return out
+
+    def _add_laps(self, out: np.ndarray, laps: int) -> None:
+        """Move a path point by laps of the table."""
+        out[0] += laps * self._period
+        out[1] += laps * self._length
+        turn = laps * self._turn
+        if abs(turn) > _NO_TURN:
+            x, y, z = out[4:7].tolist()
+            tx, ty, tz = out[10:13].tolist()
+            c, s = math.cos(turn), math.sin(turn) / math.sqrt(tx * tx + ty * ty + tz * tz)
+            out[4] = c * x + s * (ty * z - tz * y)
+            out[5] = c * y + s * (tz * x - tx * z)
+            out[6] = c * z + s * (tx * y - ty * x)

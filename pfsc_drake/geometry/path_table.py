@@ -45,7 +45,10 @@ def tabulate(
     frame: ParallelTransportFrame,
     layout: PathPointLayout,
 ) -> PathTable:
-    """Table of a path, each quantity to 1e-13 of its largest value.
+    """Table of a path.
+
+    Each quantity agrees to 1e-13 of its largest value, or to the rounding errors of the curve
+    itself where these are larger (polynomials of high degree on long segments).
 
     Args:
         position: Curve sigma_t in R^3.
@@ -77,9 +80,8 @@ def tabulate(
         tolerance=_TOLERANCE,
     )
     rows = np.ascontiguousarray((coefficients * scale).transpose(0, 2, 1))
-    first = layout.position.start
-    slopes = _slopes(np.diff(breakpoints), rows[:, first : first + 3], rows[:, first + 3 : first + 6])
-    return PathTable(breakpoints, rows, slopes)
+    sigma, tangent = rows[:, layout.position][:, :3], rows[:, layout.position][:, 3:6]
+    return PathTable(breakpoints, rows, _slopes(np.diff(breakpoints), sigma, tangent))
 
 
 def _common_breakpoints(

@@ -63,11 +63,10 @@ class PathProjector(LeafSystem):
 
     def _calc_path_point(self, context: Context, output: BasicVector) -> None:
         y_t = self._tool_pose.Eval(context)[:3].tolist()
-        theta = context.get_discrete_state_vector().GetAtIndex(0)
-        output.SetFromVector(self._evaluator(y_t, theta))
+        output.set_value(self._evaluator(y_t, context.get_discrete_state_vector()[0]))
 
     def _remember(self, context: Context, state: DiscreteValues) -> None:
-        theta = self._path_point.Eval(context)[self.layout.theta]
+        theta = self._path_point.Eval(context).item(0)
         # a tool that is nowhere must not make the path's parameter forgotten
-        if math.isfinite(theta[0]):
-            state.set_value(theta)
+        if math.isfinite(theta):
+            state[0] = theta

@@ -1,12 +1,15 @@
 """Reference of the virtual output over time."""
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.polynomial import Polynomial
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
-from pfsc_drake.geometry import Curve
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 
-class ReferenceGenerator(LeafSystem):
+class ReferenceGenerator(Diagram):
     """Motion along the path over time; transversal and rotational references are zero.
 
     Ports:
@@ -20,22 +23,27 @@ class ReferenceGenerator(LeafSystem):
         num_outputs: ``m``.
     """
 
-    def __init__(self, eta_p: Curve, relative_degree: int, num_outputs: int) -> None:
+    def __init__(
+        self, eta_p: PiecewisePolynomialCurve, relative_degree: int, num_outputs: int
+    ) -> None:
         super().__init__()
-        self._begin, self._end = eta_p.domain
-        self._sample = eta_p.flat_sampler(relative_degree)
-        self._reference = np.zeros(((relative_degree + 1), num_outputs))
-        self.DeclareVectorOutputPort(
-            "reference",
-            self._reference.size,
-            self._calc_reference,
-            prerequisites_of_calc={self.time_ticket()},
+        builder = DiagramBuilder()
+        source = builder.AddSystem(
+            TrajectorySource(
+                _trajectory(eta_p, num_outputs),
+                output_derivative_order=relative_degree,
+                zero_derivatives_beyond_limits=True,
+            )
         )
+        builder.ExportOutput(source.get_output_port(), "reference")
+        builder.BuildInto(self)
 
-    def _calc_reference(self, context: Context, output: BasicVector) -> None:
-        time = context.get_time()
-        # only its first column is ever other than zero
-        self._reference[:, 0] = self._sample(min(max(time, self._begin), self._end))
-        if not self._begin <= time <= self._end:
-            self._reference[1:, 0] = 0.0
-        output.SetFromVector(self._reference.ravel())
+
+def _trajectory(eta_p: PiecewisePolynomialCurve, num_outputs: int) -> PiecewisePolynomial:
+    """(eta_p, 0, ..) over time, (num_outputs, 1)."""
+    rest = [[Polynomial(0.0)]] * (num_outputs - 1)
+    pieces = [
+        np.array([[Polynomial(coefficients)], *rest])
+        for coefficients in eta_p.coefficients[:, :, 0]
+    ]
+    return PiecewisePolynomial(pieces, eta_p.breakpoints)

@@ -36,5 +36,5 @@ class TrajectoryPoint(LeafSystem):
         )
 
     def _calc_path_point(self, context: Context, output: BasicVector) -> None:
-        eta_d = float(self._reference.Eval(context)[0])
-        output.SetFromVector(self._evaluate_at(self._parameter(eta_d)))
+        eta_d = self._reference.Eval(context).item(0)
+        output.set_value(self._evaluate_at(self._parameter(eta_d)))

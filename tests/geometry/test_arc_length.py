@@ -78,6 +78,15 @@ def test_circle_and_arrays() -> None:
     np.testing.assert_allclose(s(theta), 0.15 * theta, atol=1e-13)
 
 
+def test_arrays_agree_with_single_values(curve: Curve) -> None:
+    s = ArcLength(curve)
+    begin, end = curve.domain
+    theta = np.linspace(begin - 1.3 * curve.period, end + 2.4 * curve.period, 97)
+    theta = np.append(theta, [begin, end]).reshape(3, 33)
+    expected = [[s.at(value) for value in row] for row in theta.tolist()]
+    np.testing.assert_allclose(s(theta), expected, rtol=1e-14, atol=1e-14)
+
+
 def test_nearly_a_cusp() -> None:
     # |sigma'| falls to 1e-3 of its mean within a short stretch.
     theta = np.array([0.0, 2.0])

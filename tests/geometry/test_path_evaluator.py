@@ -1,6 +1,7 @@
 """Path quantities at each tick against the parts and quadrature."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -8,10 +9,16 @@ from scipy.integrate import quad
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
+    FourierCurve,
+    OrientationCurve,
     Path,
+    PathEvaluator,
     PathStatus,
     PiecewisePolynomialCurve,
+    Projection,
+    Projector,
     WaypointTable,
+    interpolate,
     path_from_waypoints,
     zyx_to_quaternion,
 )
@@ -63,6 +70,121 @@ def test_fields(path: Path, order: int) -> None:
         found = out[layout.quaternion].reshape(order + 1, 4)
         scale = np.abs(q).max(axis=1, keepdims=True)
         np.testing.assert_allclose(found / scale, q / scale, atol=1e-8)
+
+
+WILD = Path(
+    interpolate(
+        np.cumsum(0.1 * np.random.default_rng(8).normal(size=(14, 3)) + [0.1, 0, 0], axis=0),
+        smoothness=6,
+    )
+)
+CIRCLE = Path(
+    FourierCurve.circle([0.0, 0.0, 0.5], 0.3), OrientationCurve.fixed([1, 2, 0, 1], (0, 9))
+)
+
+
+@pytest.mark.parametrize("path", [OPEN, CLOSED, WILD, CIRCLE], ids=["open", "closed", "wild", "c"])
+def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
+    """Near and far guesses, points near and far, laps, ends, centres: one and the same branch."""
+    evaluator, curve = path.evaluator(3), path.position
+    layout = evaluator.layout
+    rng = np.random.default_rng(17)
+    begin, end = curve.domain
+    size = np.abs(curve.derivatives(np.linspace(begin, end, 99), 4)).max(axis=(0, 2))
+    more = 2.0 * curve.period if path.closed else 0.0
+    for _ in range(600):
+        theta = rng.uniform(begin - more, end + more)
+        sigma = curve.derivatives(theta, 0)[0]
+        point = (sigma + rng.normal(size=3) * path.length * rng.choice([1e-3, 1e-2, 0.2])).tolist()
+        guess = theta + rng.normal() * curve.period * rng.choice([0.0, 1e-6, 1e-3, 1e-2, 0.1])
+        expected = path.projector.project(point, guess)
+        out = evaluator(point, guess)
+        assert out[3] == (
+            PathStatus.BEYOND_END
+            if expected.at_end
+            else (PathStatus.OK if expected.converged else PathStatus.NOT_CONVERGED)
+        )
+        assert out[0] == pytest.approx(expected.theta, abs=3e-12 * curve.period)
+        if expected.at_end:
+            continue
+        derivatives = curve.derivatives(out[0], 4)
+        error = (np.array(point) - derivatives[0]) @ derivatives[1]
+        curvature = (1.0 - out[2]) * (derivatives[1] @ derivatives[1])
+        assert abs(error) < 3e-12 * curve.period * abs(curvature) + 1e-15
+        difference = out[layout.position].reshape(5, 3) - derivatives
+        np.testing.assert_array_less(np.abs(difference).max(axis=1) / size, 1e-11)
+
+
+@pytest.mark.parametrize("path", [OPEN, CLOSED, CIRCLE], ids=["open", "closed", "circle"])
+@pytest.mark.parametrize("speed", [0.0, 0.1, 1.5, -1.5])
+def test_ticks_of_a_motion_need_no_projector(path: Path, speed: float) -> None:
+    """At 1 ms the foot is found to rounding from the last one, piece after piece."""
+
+    class Refusing(Projector):
+        def project(self, point: Sequence[float], theta_guess: float) -> Projection:
+            raise AssertionError(f"theta = {theta_guess}")
+
+    curve = path.position
+    parts = (curve, path.orientation, path.arc_length, path.frame, Refusing(curve))
+    evaluator = PathEvaluator(*parts, 2)
+    eta = (0.5 if abs(speed) < 1.0 else 0.2 if speed > 0.0 else 0.8) * path.length
+    theta = path.arc_length.parameter(eta)
+    for tick in range(800):
+        truth = path.arc_length.parameter(eta)
+        e_perp, e_cross = path.frame.normals(truth)
+        sigma = curve.derivatives(truth, 0)[0]
+        turn = 0.01 * tick
+        point = sigma + 0.01 * math.cos(turn) * e_perp + 0.02 * math.sin(turn) * e_cross
+        theta = evaluator(point.tolist(), theta)[0]
+        assert theta == pytest.approx(truth, abs=1e-13 * max(1.0, abs(truth)))
+        eta += 1e-3 * speed
+
+
+@pytest.mark.parametrize("laps", [-3, -1, 1, 2])
+def test_laps_turn_the_normal(twisted: FourierCurve, laps: int) -> None:
+    path = Path(twisted)
+    evaluator = path.evaluator(2)
+    assert abs(path.frame.holonomy) > 0.05
+    for theta in (0.4, 3.0, 6.1):
+        unwrapped = theta + laps * twisted.period
+        e_perp, e_cross = path.frame.normals(theta)
+        angle = laps * path.frame.holonomy
+        expected = math.cos(angle) * e_perp + math.sin(angle) * e_cross
+        sigma = twisted.derivatives(theta, 0)[0]
+        for out in (evaluator.evaluate_at(unwrapped), evaluator(sigma.tolist(), unwrapped + 1e-3)):
+            np.testing.assert_allclose(out[4:7], expected, atol=1e-12)
+            assert out[0] == pytest.approx(unwrapped, abs=1e-13)
+            eta = path.arc_length.at(theta) + laps * path.length
+            assert out[1] == pytest.approx(eta, abs=1e-12)
+
+
+def test_the_seam_is_crossed_both_ways() -> None:
+    evaluator, curve = CLOSED.evaluator(2), CLOSED.position
+    for lap in (-2, 0, 1):
+        seam = curve.domain[0] + lap * curve.period
+        for guess, theta in ((-1e-4, 2e-4), (2e-4, -1e-4), (0.0, -1e-4), (0.0, 1e-4), (1e-4, 0.0)):
+            point = curve.derivatives(seam + theta, 0)[0]
+            out = evaluator(point.tolist(), seam + guess)
+            assert out[0] == pytest.approx(seam + theta, abs=1e-13)
+            assert out[1] == pytest.approx(CLOSED.arc_length.at(seam + theta), abs=1e-12)
+
+
+def test_centre_of_a_circle_has_no_foot() -> None:
+    """There alpha is one, exactly or up to rounding, whichever way it is computed."""
+    evaluator = CIRCLE.evaluator(2)
+    for theta in np.linspace(-7.0, 7.0, 57).tolist():
+        for height in (0.5, 0.6):
+            out = evaluator([0.0, 0.0, height], theta)
+            assert out[2] == pytest.approx(1.0, abs=1e-12)
+            assert np.isfinite(out).all()
+    assert evaluator([0.0, 0.0, 0.5], 0.4)[3] == PathStatus.NOT_CONVERGED
+
+
+def test_made_once_for_every_order() -> None:
+    assert OPEN.evaluator(2) is OPEN.evaluator(2)
+    assert OPEN.evaluator(2) is not OPEN.evaluator(3)
+    with pytest.raises(InputError, match="order"):
+        OPEN.evaluator(0)
 
 
 def test_everything_is_continuous_across_the_seam() -> None:
