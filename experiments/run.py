@@ -27,6 +27,7 @@ from experiments.run_signals import collect_log, collect_motion, optional_signal
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import simulate
 from experiments.tick import measure_tick
+from pfsc_drake.control.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
 
 _PATH_POINTS = 600
@@ -75,7 +76,8 @@ def run_scenario(
     progress(0.0, "preparing")
     settings = load_settings(scenario.data, str(scenario.path))
     try:
-        station = build_station(settings, scenario.path.parent)
+        with compiled_when_bound():
+            station = build_station(settings, scenario.path.parent)
         _check_targets(settings, station)
     except InputError as error:
         raise InputError(f"{scenario.path}: {error}") from None

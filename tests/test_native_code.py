@@ -259,3 +259,13 @@ def test_without_llvmlite(monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     x = ca.SX.sym("x")
     assert native_code(ca.Function("f", [x], [ca.sin(x)])) is None
+
+
+def test_failure_of_the_compiler_is_not_an_error(monkeypatch):
+    def fail(*_):
+        raise AttributeError("create_mcjit_compiler")
+
+    monkeypatch.setattr(module, "_compiled", {})
+    monkeypatch.setattr(module, "NativeCode", fail)
+    x = ca.SX.sym("x")
+    assert native_code(ca.Function("f", [x], [ca.sin(x)])) is None

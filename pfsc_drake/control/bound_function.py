@@ -1,5 +1,7 @@
 """A function that is evaluated a thousand times a second."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar
 
 import casadi as ca
@@ -26,15 +28,16 @@ class BoundFunction:
     Attributes:
         arguments: Flat arrays by name, each (number of elements,); matrices by columns.
         results: The same of the results.
-        compile_after: Number of evaluations by the interpreter before the function is compiled;
-            at 0 that is done at once, so that no evaluation is delayed by it.
+        compile_after: Number of evaluations by the interpreter before the function is compiled,
+            which delays one evaluation; at 0 that is done at once. See also
+            :func:`compiled_when_bound`.
 
     Raises:
         ValueError: If the function has sparse arguments or results, or a shared array does
             not fit.
     """
 
-    compile_after: ClassVar[int] = 1000
+    compile_after: ClassVar[int] = 200
 
     def __init__(self, function: ca.Function, **shared: np.ndarray) -> None:
         self._function = function
@@ -69,6 +72,21 @@ class BoundFunction:
             return False
         self._run = code.bind(list(self.arguments.values()), list(self.results.values()))
         return True
+
+
+@contextmanager
+def compiled_when_bound() -> Iterator[None]:
+    """Compile the functions that are bound in this context at once.
+
+    For controllers that are built to run long, and must not pause in the middle: an elastic law
+    of six axes takes 0.1 s, other functions a few milliseconds.
+    """
+    usual = BoundFunction.compile_after
+    BoundFunction.compile_after = 0
+    try:
+        yield
+    finally:
+        BoundFunction.compile_after = usual
 
 
 def _array(name: str, sparsity: ca.Sparsity, shared: dict[str, np.ndarray]) -> np.ndarray:

@@ -7,6 +7,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.path_following import build_path_following
 from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.control.bound_function import compiled_when_bound
 from pfsc_drake.typed_yaml import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -16,7 +17,8 @@ SPAN = 0.2
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
 def test_closed_loop(benchmark, name):
     scenario = load_file(PathFollowingScenario, SCENARIOS / f"{name}.yaml")
-    station = build_path_following(scenario, SCENARIOS)
+    with compiled_when_bound():
+        station = build_path_following(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     ApplySimulatorConfig(
         SimulatorConfig(

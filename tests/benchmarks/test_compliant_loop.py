@@ -14,6 +14,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.path_following import build_path_following
 from diagrams.scenario import PathFollowingScenario
+from pfsc_drake.control.bound_function import compiled_when_bound
 from pfsc_drake.typed_yaml import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -43,7 +44,8 @@ class Loop:
         self.scenario = load_file(PathFollowingScenario, file)
         for pulse in self.scenario.forces:
             pulse.begin, pulse.end = 0.1, 10.0
-        self.station = build_path_following(self.scenario, SCENARIOS)
+        with compiled_when_bound():
+            self.station = build_path_following(self.scenario, SCENARIOS)
         self.simulator = Simulator(self.station.diagram)
         simulation = self.scenario.simulation
         ApplySimulatorConfig(

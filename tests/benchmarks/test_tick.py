@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 from scipy.optimize import least_squares
 
+from pfsc_drake.control.bound_function import compiled_when_bound
 from pfsc_drake.control.decoupling import DecouplingInverse
 from pfsc_drake.control.linearization import ActuationOptions, linearize_path
 from pfsc_drake.control.path_law import Fault, PathLaw, SafeState
@@ -138,7 +139,8 @@ def make_law(robot, law, oriented):
 
 @pytest.fixture(scope="module", params=CASES, name="chain")
 def fixture_chain(request):
-    return Chain(*CASES[request.param])
+    with compiled_when_bound():
+        return Chain(*CASES[request.param])
 
 
 def test_whole_tick(chain, benchmark):

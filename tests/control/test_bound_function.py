@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake import native_code
-from pfsc_drake.control.bound_function import BoundFunction
+from pfsc_drake.control.bound_function import BoundFunction, compiled_when_bound
 
 A, B = ca.SX.sym("A", 2, 3), ca.SX.sym("b", 3)
 FUNCTION = ca.Function("f", [A, B], [A @ B, ca.sin(A)], ["A", "b"], ["product", "sine"])
@@ -95,3 +95,13 @@ def test_refuses_sparse_results():
     x = ca.SX.sym("x", 2)
     with pytest.raises(ValueError, match=r"y: has .* must be dense"):
         BoundFunction(ca.Function("f", [x], [ca.diag(x)], ["x"], ["y"]))
+
+
+def test_compiled_when_bound(monkeypatch):
+    asked = []
+    monkeypatch.setattr("pfsc_drake.control.bound_function.native_code", asked.append)
+    with pytest.raises(RuntimeError), compiled_when_bound():
+        BoundFunction(FUNCTION)
+        raise RuntimeError
+    BoundFunction(FUNCTION)
+    assert len(asked) == 1
