@@ -141,4 +141,4 @@ def add_forces(
     builder.Connect(wrench, contact.GetInputPort("wrench"))
     builder.Connect(ports["joint_state"], contact.GetInputPort("joint_state"))
     arm.connect_contact(builder, contact)
-    return {"wrench_ext": wrench, "tau_ext": contact.GetOutputPort("tau_ext")}
+    return {"wrench_ext": wrench}

@@ -26,7 +26,7 @@ from pfsc_drake.robot.serial_chain import SerialChain
 class PathFollowingStation(Station[LeafSystem, SerialChain]):
     """Station of a serial arm.
 
-    Its log also holds, with forces ``wrench_ext``, ``tau_ext``, with compliance what
+    Its log also holds, with forces ``wrench_ext``, with compliance what
     :func:`add_compliance` returns, with servos ``drive_torque``, with friction
     ``friction_torque``.
 

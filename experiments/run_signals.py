@@ -9,6 +9,7 @@ from diagrams.station import Station
 from experiments.run_log import RunLog
 from pfsc_drake.control.linearization import path_output_function
 from pfsc_drake.control.path_law import Fault
+from pfsc_drake.control.tool_load import joint_torque_function
 from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
 from pfsc_drake.robot.robot_model import pose_function
 
@@ -231,7 +232,6 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     manifold = ["tau_par", "tau_perp", "tau_cross", "tau_z", "tau_y", "tau_x"][:m]
     known = {
         "wrench_ext": ("N, Nm", wrench),
-        "tau_ext": (effort, None),
         "wrench_measured": ("N, Nm", wrench),
         "manifold_force": ("N, Nm", manifold),
         "tared": ("1", None),
@@ -240,12 +240,23 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     for name, (unit, labels) in known.items():
         if name in raw:
             log.add(name, raw[name], unit, labels)
+    if "wrench_ext" in raw:
+        labels = [f"tau_ext_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_ext", _joint_torques(station, raw), effort, labels)
     if "desired_reference" in raw:
         desired = raw["desired_reference"][:, :m]
         log.add("eta_d", desired[:, 0], "m")
         log.add("xi_d", desired[:, 1:3], "m", ["xi_d_1", "xi_d_2"])
         if m > 3:
             log.add("phi_d", desired[:, 3:], "rad", ["phi_d_z", "phi_d_y", "phi_d_x"])
+
+
+def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
+    """Return what the wrench on the tool means in the joints, shape (samples, N)."""
+    q_J, wrench = raw["joint_state"][:, : station.chain.dimension], raw["wrench_ext"]
+    if len(q_J) == 0:
+        return np.zeros_like(q_J)
+    return np.array(joint_torque_function(station.chain).map(len(q_J))(q_J.T, wrench.T)).T
 
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
