@@ -54,9 +54,24 @@ class Arm(ABC):
     def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
         """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
 
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """Let a wrench act at the tool point, world axes, shape (6,).
+
+        Args:
+            builder: Builder of the diagram.
+            wrench: The wrench [N, Nm].
+            joint_state: The true one.
+        """
+        contact = builder.AddNamedSystem("external_wrench", ExternalWrench(self.tool, self.chain))
+        builder.Connect(wrench, contact.GetInputPort("wrench"))
+        builder.Connect(joint_state, contact.GetInputPort("joint_state"))
+        self.connect_contact(builder, contact)
+
     @abstractmethod
     def connect_contact(self, builder: DiagramBuilder, contact: ExternalWrench) -> None:
-        """Let a wrench act at the tool point."""
+        """Let what presses on the tool act on the plant."""
 
     @abstractmethod
     def place(self, context: Context, state: np.ndarray) -> None:

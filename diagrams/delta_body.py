@@ -30,6 +30,7 @@ from pfsc_drake.robot.delta_multibody import (
 )
 from pfsc_drake.systems.contact_wrench import ContactWrench
 from pfsc_drake.systems.delta_plant import DeltaPlant
+from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.joint_friction import JointFriction
 
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
@@ -44,6 +45,11 @@ class DeltaBody(ABC):
     """
 
     robot: DeltaRobot
+
+    @property
+    def chain(self) -> DeltaRobot:
+        """The robot, as every body in a diagram calls it."""
+        return self.robot
 
     @property
     @abstractmethod
@@ -67,6 +73,12 @@ class DeltaBody(ABC):
         self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
     ) -> None:
         """Let drive forces act, shape (3,), less friction if there is any."""
+
+    @abstractmethod
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """Let a wrench act at the end-effector's centre E, shape (6,); its torque has no effect."""
 
     @abstractmethod
     def place(self, context: Context, state: np.ndarray) -> None:
@@ -109,6 +121,14 @@ class FreeDelta(DeltaBody):
             builder.Connect(force, friction.GetInputPort("drive_torque"))
             force = friction.GetOutputPort("net_torque")
         builder.Connect(force, self.analytic.GetInputPort("actuation"))
+
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """See :class:`DeltaBody`."""
+        force = builder.AddNamedSystem("external_force", MatrixGain(np.eye(3, 6)))
+        builder.Connect(wrench, force.get_input_port())
+        builder.Connect(force.get_output_port(), self.analytic.GetInputPort("external_force"))
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`DeltaBody`."""
@@ -177,6 +197,18 @@ class TouchingDelta(DeltaBody):
         builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
         builder.Connect(
             resistance.get_output_port(), self.multibody.get_applied_generalized_force_input_port()
+        )
+
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """See :class:`DeltaBody`."""
+        push = builder.AddNamedSystem("external_wrench", ExternalWrench(self.tool, self.robot))
+        builder.Connect(wrench, push.GetInputPort("wrench"))
+        builder.Connect(joint_state, push.GetInputPort("joint_state"))
+        builder.Connect(
+            push.GetOutputPort("applied_spatial_force"),
+            self.multibody.get_applied_spatial_force_input_port(),
         )
 
     def place(self, context: Context, state: np.ndarray) -> None:

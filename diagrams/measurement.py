@@ -1,16 +1,16 @@
 """What the controller measures, and what disturbs the robot."""
 
+from typing import Protocol
+
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, ZeroOrderHold
 
-from diagrams.arm import Arm
 from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.control.force_profile import ForceProfile
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.decoupled_force import DecoupledForce
-from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.systems.scripted_force import ScriptedForce
 from pfsc_drake.systems.sensor_failure import SensorFailure
@@ -85,9 +85,22 @@ def _add_imperfection(
     return real.GetOutputPort("joint_state")
 
 
+class Pushable(Protocol):
+    """A robot in a diagram that forces may act on."""
+
+    @property
+    def chain(self) -> RobotModel:
+        """The robot as the laws know it."""
+
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """Let a wrench act at the tool point, world axes, shape (6,)."""
+
+
 def add_forces(
     builder: DiagramBuilder,
-    arm: Arm,
+    body: Pushable,
     scenario: PathFollowingScenario,
     layout: PathPointLayout,
     ports: dict[str, OutputPort],
@@ -96,7 +109,7 @@ def add_forces(
 
     Args:
         builder: Builder of the diagram.
-        arm: The robot.
+        body: The robot.
         scenario: The scenario.
         layout: Layout of the path point.
         ports: ``joint_state``, the true one, ``path_point``, and ``hand_wrench`` if there is
@@ -118,7 +131,7 @@ def add_forces(
             raise InputError("hold_back.force: needs a path with orientation and six axes")
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
         brake = builder.AddNamedSystem(
-            "hold_back", DecoupledForce(arm.chain, layout, shape, period)
+            "hold_back", DecoupledForce(body.chain, layout, shape, period)
         )
         for name in ("joint_state", "path_point"):
             builder.Connect(ports[name], brake.GetInputPort(name))
@@ -137,8 +150,5 @@ def add_forces(
     hold = builder.AddNamedSystem("wrench_hold", ZeroOrderHold(period, 6))
     builder.Connect(total, hold.get_input_port())
     wrench = hold.get_output_port()
-    contact = builder.AddNamedSystem("external_wrench", ExternalWrench(arm.tool, arm.chain))
-    builder.Connect(wrench, contact.GetInputPort("wrench"))
-    builder.Connect(ports["joint_state"], contact.GetInputPort("joint_state"))
-    arm.connect_contact(builder, contact)
+    body.connect_wrench(builder, wrench, ports["joint_state"])
     return {"wrench_ext": wrench}

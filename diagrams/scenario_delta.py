@@ -32,7 +32,6 @@ class DeltaFollowingScenario(PathFollowingScenario):
         keyframes = self.path.orientation.keyframes
         allowed = "none; the robot only translates"
         require(not keyframes, "path.orientation.keyframes", len(keyframes), allowed)
-        require(not self.forces, "forces", f"{len(self.forces)} pulses", "none for a DELTA robot")
         require(self.hand is None, "hand", "a block", "none for a DELTA robot")
         force = self.hold_back.force
         require(force == 0.0, "hold_back.force", force, "0 for a DELTA robot")

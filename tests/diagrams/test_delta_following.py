@@ -68,6 +68,35 @@ def test_encoders_count_increments_of_the_slides():
     assert np.abs(measured - true).max() > 1e-5
 
 
+def test_a_push_deflects_as_the_gains_say():
+    """Without integral action, e = -a_1^-1 A D^-1 J^T f: by the robot's own matrices."""
+    force = np.array([3.0, -2.0, 4.0])
+    station = build(
+        "drive_friction=false",
+        "start.offset=[0, 0]",
+        "reference.dwell=2.0",
+        "controller.gains.rigid.eta={coefficients: [3675, 105]}",
+        "controller.gains.rigid.xi={coefficients: [7500, 150]}",
+        f"forces=[{{begin: 0.1, end: 2.0, ramp: 0.05, force: {force.tolist()}}}]",
+    )
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.8)
+    _, log = station.log.read(simulator.get_context())
+    np.testing.assert_allclose(log["wrench_ext"][-1], [*force, 0, 0, 0], atol=1e-12)
+    q = station.initial_state[:3]
+    J, masses = station.chain.jacobian_at(q), station.chain.parameters.masses
+    D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
+    acceleration = J @ np.linalg.solve(D, J.T @ force)
+    theta = np.array([station.initial_theta])
+    tangent = station.path.position.derivatives(theta, 1)[0, 1]
+    tangent /= np.linalg.norm(tangent)
+    along = tangent * (tangent @ acceleration)
+    moved = station.chain.tool_position(log["joint_state"][-1, :3]) - station.chain.tool_position(q)
+    expected = along / 3675.0 + (acceleration - along) / 7500.0
+    np.testing.assert_allclose(moved, expected, atol=0.02 * np.linalg.norm(expected))
+
+
 def test_starts_at_rest_beside_the_path():
     station = build()
     root = station.diagram.CreateDefaultContext()
@@ -116,7 +145,6 @@ def test_the_first_force_is_weight_and_proportional_part():
         ("start.posture_deg=[0, 0, 0]", ["start.posture_deg", "none"]),
         ("start.rotation_deg=[1, 0, 0]", ["start.rotation_deg", "only translates"]),
         ("path.orientation.keyframes=[{theta: 0}]", ["keyframes", "only translates"]),
-        ("forces=[{begin: 0, end: 1, force: [1, 0, 0]}]", ["forces", "none for a DELTA"]),
         ("hold_back={force: -5}", ["hold_back.force", "-5"]),
         ("friction={f_c: [1, 1, 1]}", ["friction", "drive_friction"]),
         (

@@ -74,6 +74,16 @@ def test_ball_stays_in_the_notch(log):
     assert distance.max() < CLEARANCE + 1e-3
 
 
+def test_a_push_is_measured_with_the_contact(tmp_path):
+    push = "forces=[{begin: 0.1, end: 1.0, ramp: 0.05, force: [0, 0, 4]}]"
+    pushed = run(tmp_path, "pfc_delta_notch", 0.4, push)
+    late = pushed["t"] > 0.3
+    real, measured = (pushed[name][late, :3] for name in ("wrench_ext", "wrench_measured"))
+    assert np.abs(measured.mean(axis=0) - real.mean(axis=0)).max() < 0.05
+    # downwards into the notch, which bears it but for what bends the spring
+    assert 0.0 < real.mean(axis=0)[2] < 4.0
+
+
 def test_position_control_presses_with_ten_times_the_force(tmp_path, log):
     stiff = run(tmp_path, "pfc_delta_notch_stiff", 0.4)
     assert "wrench_measured" not in stiff
