@@ -10,6 +10,12 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
+from diagrams.plant_wiring import (
+    add_external_wrench,
+    connect_actuation,
+    connect_push,
+    connect_resistance,
+)
 from diagrams.robot import add_robot, read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
@@ -17,7 +23,6 @@ from pfsc_drake.robot.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.parameters import load_parameters
 from pfsc_drake.robot.rotor_coupling import mounts_from_parameters
 from pfsc_drake.robot.serial_chain import SerialChain
-from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.full_elastic_plant import FullElasticPlant
 
 
@@ -54,6 +59,7 @@ class Arm(ABC):
     def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
         """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
 
+    @abstractmethod
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
@@ -64,14 +70,6 @@ class Arm(ABC):
             wrench: The wrench [N, Nm].
             joint_state: The true one.
         """
-        contact = builder.AddNamedSystem("external_wrench", ExternalWrench(self.tool, self.chain))
-        builder.Connect(wrench, contact.GetInputPort("wrench"))
-        builder.Connect(joint_state, contact.GetInputPort("joint_state"))
-        self.connect_contact(builder, contact)
-
-    @abstractmethod
-    def connect_contact(self, builder: DiagramBuilder, contact: ExternalWrench) -> None:
-        """Let what presses on the tool act on the plant."""
 
     @abstractmethod
     def place(self, context: Context, state: np.ndarray) -> None:
@@ -105,28 +103,19 @@ class MultibodyArm(Arm):
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
         """See :class:`Arm`."""
-        actuators = self.coordinates.actuators
-        order = np.zeros((self.model.num_actuators(), len(actuators)))
-        order[actuators, np.arange(len(actuators))] = 1.0
-        drives = builder.AddNamedSystem("drives", MatrixGain(order))
-        builder.Connect(torque, drives.get_input_port())
-        builder.Connect(drives.get_output_port(), self.model.get_actuation_input_port())
+        connect_actuation(builder, self.model, self.coordinates.actuators, torque)
 
     def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
         """See :class:`Arm`."""
-        rows = self.coordinates.motor_rows[self.chain.dimension :, self.model.num_positions() :]
-        forces = builder.AddNamedSystem("resistance", MatrixGain(rows.T))
-        builder.Connect(resistance, forces.get_input_port())
-        builder.Connect(
-            forces.get_output_port(), self.model.get_applied_generalized_force_input_port()
-        )
+        rows = self.coordinates.motor_rows[self.chain.dimension :]
+        connect_resistance(builder, self.model, rows, resistance)
 
-    def connect_contact(self, builder: DiagramBuilder, contact: ExternalWrench) -> None:
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
         """See :class:`Arm`."""
-        builder.Connect(
-            contact.GetOutputPort("applied_spatial_force"),
-            self.model.get_applied_spatial_force_input_port(),
-        )
+        push = add_external_wrench(builder, self.tool, self.chain, wrench, joint_state)
+        connect_push(builder, self.model, push)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`Arm`."""
@@ -163,9 +152,12 @@ class CoupledArm(Arm):
         """See :class:`Arm`."""
         builder.Connect(resistance, self.full.GetInputPort("resistance"))
 
-    def connect_contact(self, builder: DiagramBuilder, contact: ExternalWrench) -> None:
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
         """See :class:`Arm`."""
-        builder.Connect(contact.GetOutputPort("tau_ext"), self.full.GetInputPort("external_torque"))
+        push = add_external_wrench(builder, self.tool, self.chain, wrench, joint_state)
+        builder.Connect(push.GetOutputPort("tau_ext"), self.full.GetInputPort("external_torque"))
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`Arm`."""

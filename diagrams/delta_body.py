@@ -17,6 +17,12 @@ from pydrake.systems.primitives import MatrixGain
 from diagrams.checks import require_whole_fraction
 from diagrams.drives import friction_bristles
 from diagrams.notch import TOOL_POINT, add_ball, add_notch
+from diagrams.plant_wiring import (
+    add_external_wrench,
+    connect_actuation,
+    connect_push,
+    connect_resistance,
+)
 from diagrams.scenario_delta import DeltaFollowingScenario
 from diagrams.scenario_notch import NotchParameters
 from pfsc_drake.control.friction import BristleFriction, bristles_for_step
@@ -30,7 +36,6 @@ from pfsc_drake.robot.delta_multibody import (
 )
 from pfsc_drake.systems.contact_wrench import ContactWrench
 from pfsc_drake.systems.delta_plant import DeltaPlant
-from pfsc_drake.systems.external_wrench import ExternalWrench
 from pfsc_drake.systems.joint_friction import JointFriction
 
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
@@ -41,15 +46,10 @@ class DeltaBody(ABC):
     """A DELTA robot in a diagram: where its signals come from and where they go.
 
     Attributes:
-        robot: The robot as the laws know it.
+        chain: The robot as the laws know it.
     """
 
-    robot: DeltaRobot
-
-    @property
-    def chain(self) -> DeltaRobot:
-        """The robot, as every body in a diagram calls it."""
-        return self.robot
+    chain: DeltaRobot
 
     @property
     @abstractmethod
@@ -59,6 +59,12 @@ class DeltaBody(ABC):
     @abstractmethod
     def slide_state(self, builder: DiagramBuilder) -> OutputPort:
         """Return the true ``[q, v]`` of the slides, shape (6,)."""
+
+    def _friction(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coulomb and viscous friction of the drives, and the slides' masses, each (3,)."""
+        parameters = self.chain.parameters
+        friction, mass = parameters.friction, parameters.masses.effective_slide
+        return friction.coulomb, friction.viscous, np.full(self.chain.dimension, mass)
 
     @abstractmethod
     def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
@@ -93,7 +99,7 @@ class FreeDelta(DeltaBody):
         analytic: The plant.
     """
 
-    robot: DeltaRobot
+    chain: DeltaRobot
     analytic: DeltaPlant
 
     @property
@@ -107,11 +113,7 @@ class FreeDelta(DeltaBody):
 
     def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
         """See :class:`DeltaBody`."""
-        friction = self.robot.parameters.friction
-        slides = np.full(self.robot.dimension, self.robot.parameters.masses.effective_slide)
-        return friction_bristles(
-            scenario, friction.coulomb, friction.viscous, slides, "drive_friction"
-        )
+        return friction_bristles(scenario, *self._friction(), "drive_friction")
 
     def connect_drives(
         self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
@@ -149,7 +151,7 @@ class TouchingDelta(DeltaBody):
         contact: Wrench of the workpiece on the ball.
     """
 
-    robot: DeltaRobot
+    chain: DeltaRobot
     multibody: MultibodyPlant
     model: DeltaModel
     tool: Frame
@@ -170,46 +172,26 @@ class TouchingDelta(DeltaBody):
 
     def bristles(self, scenario: DeltaFollowingScenario) -> BristleFriction:
         """See :class:`DeltaBody`."""
-        friction = self.robot.parameters.friction
-        slides = np.full(self.robot.dimension, self.robot.parameters.masses.effective_slide)
-        return bristles_for_step(
-            friction.coulomb,
-            friction.viscous,
-            slides,
-            self.multibody.time_step(),
-            frequency=_BRISTLES_PER_STEP,
-        )
+        step = self.multibody.time_step()
+        return bristles_for_step(*self._friction(), step, frequency=_BRISTLES_PER_STEP)
 
     def connect_drives(
         self, builder: DiagramBuilder, force: OutputPort, friction: JointFriction | None
     ) -> None:
         """See :class:`DeltaBody`."""
-        n = self.robot.dimension
-        order = np.zeros((n, n))
-        order[[int(actuator) for actuator in self.model.actuators], np.arange(n)] = 1.0
-        drives = builder.AddNamedSystem("drives", MatrixGain(order))
-        builder.Connect(force, drives.get_input_port())
-        builder.Connect(drives.get_output_port(), self.multibody.get_actuation_input_port())
-        if friction is None:
-            return
-        rows = slide_state_rows(self.multibody, self.model)[n:, self.multibody.num_positions() :]
-        resistance = builder.AddNamedSystem("resistance", MatrixGain(rows.T))
-        builder.Connect(friction.GetOutputPort("resistance"), resistance.get_input_port())
-        builder.Connect(
-            resistance.get_output_port(), self.multibody.get_applied_generalized_force_input_port()
-        )
+        actuators = np.array([int(actuator) for actuator in self.model.actuators])
+        connect_actuation(builder, self.multibody, actuators, force)
+        if friction is not None:
+            rows = slide_state_rows(self.multibody, self.model)[self.chain.dimension :]
+            resistance = friction.GetOutputPort("resistance")
+            connect_resistance(builder, self.multibody, rows, resistance)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
         """See :class:`DeltaBody`."""
-        push = builder.AddNamedSystem("external_wrench", ExternalWrench(self.tool, self.robot))
-        builder.Connect(wrench, push.GetInputPort("wrench"))
-        builder.Connect(joint_state, push.GetInputPort("joint_state"))
-        builder.Connect(
-            push.GetOutputPort("applied_spatial_force"),
-            self.multibody.get_applied_spatial_force_input_port(),
-        )
+        push = add_external_wrench(builder, self.tool, self.chain, wrench, joint_state)
+        connect_push(builder, self.multibody, push)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`DeltaBody`."""

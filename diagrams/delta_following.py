@@ -5,14 +5,14 @@ from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
-from pydrake.systems.primitives import Adder, MatrixGain, ZeroOrderHold
+from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.arm import joint_state_of
 from diagrams.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_touching_delta
 from diagrams.external_torque import needs_sensor
 from diagrams.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.force_sensor import add_sensor, sensor_warnings
-from diagrams.measurement import add_forces, add_joint_state, states_to_log
+from diagrams.measurement import add_forces, add_joint_state, states_to_log, sum_of_wrenches
 from diagrams.notch import UP
 from diagrams.notch_motion import place_in_notch
 from diagrams.parts import make_law, make_path
@@ -116,8 +116,8 @@ def build_delta_following(
     forces = add_forces(builder, body, scenario, law.linearization.layout, around)
     if isinstance(body, TouchingDelta):
         builder.Connect(place.signals["tool_pose"], body.contact.GetInputPort("tool_pose"))
-        contact = body.contact.GetOutputPort("wrench")
-        forces["wrench_ext"] = _sum(builder, contact, forces.get("wrench_ext"))
+        wrenches = [body.contact.GetOutputPort("wrench"), *forces.values()]
+        forces = {"wrench_ext": sum_of_wrenches(builder, "all_wrenches", wrenches)}
         if needs_sensor(scenario):
             forces |= add_sensor(builder, body.multibody, robot, body.tool, scenario, joint_state)
     controller, made = add_law(builder, task, place, forces)
@@ -164,16 +164,6 @@ def _add_body(
     )
 
 
-def _sum(builder: DiagramBuilder, contact: OutputPort, push: OutputPort | None) -> OutputPort:
-    """Return all that acts on the tool, for the log."""
-    if push is None:
-        return contact
-    total = builder.AddNamedSystem("all_wrenches", Adder(2, 6))
-    builder.Connect(contact, total.get_input_port(0))
-    builder.Connect(push, total.get_input_port(1))
-    return total.get_output_port()
-
-
 def _add_drives(
     builder: DiagramBuilder,
     body: DeltaBody,
@@ -185,7 +175,7 @@ def _add_drives(
     if not scenario.drive_friction:
         body.connect_drives(builder, drive_force, None)
         return {}
-    n = body.robot.dimension
+    n = body.chain.dimension
     friction = builder.AddNamedSystem("joint_friction", JointFriction(body.bristles(scenario)))
     # the true velocity, whatever the encoders say
     velocity = builder.AddNamedSystem(

@@ -140,15 +140,26 @@ def add_forces(
         sources.append(ports["hand_wrench"])
     if not sources:
         return {}
-    total = sources[0]
-    if len(sources) > 1:
-        adder = builder.AddNamedSystem("wrench", Adder(len(sources), 6))
-        for i, source in enumerate(sources):
-            builder.Connect(source, adder.get_input_port(i))
-        total = adder.get_output_port()
+    total = sum_of_wrenches(builder, "wrench", sources)
     # held over a tick, so that it is computed once and not in every stage of the integrator
     hold = builder.AddNamedSystem("wrench_hold", ZeroOrderHold(period, 6))
     builder.Connect(total, hold.get_input_port())
     wrench = hold.get_output_port()
     body.connect_wrench(builder, wrench, ports["joint_state"])
     return {"wrench_ext": wrench}
+
+
+def sum_of_wrenches(builder: DiagramBuilder, name: str, sources: list[OutputPort]) -> OutputPort:
+    """Return the sum of one wrench or more, by a system of a name if there are several.
+
+    Args:
+        builder: Builder of the diagram.
+        name: Of the system.
+        sources: The wrenches, each (6,).
+    """
+    if len(sources) == 1:
+        return sources[0]
+    total = builder.AddNamedSystem(name, Adder(len(sources), 6))
+    for i, source in enumerate(sources):
+        builder.Connect(source, total.get_input_port(i))
+    return total.get_output_port()

@@ -1,6 +1,7 @@
 """Dry and viscous joint friction with true sticking: pure formulas."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,7 +56,6 @@ class BristleFriction:
     viscous: np.ndarray
     presliding: np.ndarray
     relaxation: np.ndarray
-    _slope: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         size = np.size(self.coulomb)
@@ -67,8 +67,6 @@ class BristleFriction:
                 checked_vector("friction", name, getattr(self, name), size, positive=positive),
             )
 
-        object.__setattr__(self, "_slope", self.relaxation / self.presliding)
-
     @property
     def dimension(self) -> int:
         """Number of joints N."""
@@ -78,6 +76,10 @@ class BristleFriction:
     def stiffness(self) -> np.ndarray:
         """Stiffness of the bristles ``f_c / delta`` [Nm/rad], shape (N,)."""
         return self.coulomb / self.presliding
+
+    @cached_property
+    def _slope(self) -> np.ndarray:
+        return self.relaxation / self.presliding
 
     def bend(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return ``f_d / f_c = sat(s + tau v / delta)``, shape (N,).

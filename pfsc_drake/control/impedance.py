@@ -13,23 +13,10 @@ from pfsc_drake.control.bound_function import BoundFunction
 from pfsc_drake.control.impedance_functions import (
     coefficients,
     reference_function,
-    transition,
     update_function,
 )
 from pfsc_drake.errors import InputError
 from pfsc_drake.schema_check import REQUIRED
-
-__all__ = [
-    "DAMPING",
-    "MASS",
-    "STIFFNESS",
-    "CoordinateImpedance",
-    "ImpedanceLaw",
-    "ImpedanceParameters",
-    "ImpedanceStatus",
-    "Profile",
-    "transition",
-]
 
 MASS, DAMPING, STIFFNESS = range(3)
 
@@ -143,11 +130,11 @@ class ImpedanceLaw:
     changes - parameters, external reference, force - changes only how the motion goes on:
     e is formed anew at every tick and absorbs it. Hence no step in y_p or y_p'.
 
-    Over an interval e obeys its differential equation with force and parameters held,
-    solved exactly (:func:`transition`); ``y_d`` goes on by its Taylor polynomial of order
-    ``desired_order``. What that misses acts like a disturbance of e: on a sine of 1 m,
-    5 rad/s, 3e-5 m for order 2 and 6e-11 m for order 4 with Tab. 3.2, and 5e-3 m and
-    1e-8 m for a free mass. Order 2 is the least, for (3.42) contains ``y_d''``.
+    Over an interval e obeys its differential equation with force and parameters held, solved
+    exactly (:mod:`~pfsc_drake.control.impedance_functions`); ``y_d`` goes on by its Taylor
+    polynomial of order ``desired_order``. What that misses acts like a disturbance of e: on
+    a sine of 1 m, 5 rad/s, 3e-5 m for order 2 and 6e-11 m for order 4 with Tab. 3.2, and
+    5e-3 m and 1e-8 m for a free mass. Order 2 is the least, for (3.42) contains ``y_d''``.
 
     ``k = inf`` is position control; when a coordinate becomes rigid, y_p steps to y_d.
     With constant parameters the filter is passive: ``tau . (e(T) - e(0))`` is at least the
@@ -227,7 +214,7 @@ class ImpedanceLaw:
             reference_function(m, p, self.relative_degree, self._response_order), **shared
         )
         self._reference = respond.results["reference"].reshape(-1, m)
-        self._respond, self._functions = respond.evaluate, (step, respond)
+        self._respond = respond.evaluate
 
     def impedance(self, y: np.ndarray) -> np.ndarray:
         """Return masses, dampings, stiffnesses, shape (3, m), at a virtual output y (m,)."""

@@ -152,7 +152,8 @@ def compensation_function(
         ``(motion, state, known, measured, bias) -> (wrench at the tool point in W, residual
         r in S, next state)``. ``motion`` is ``[q, v]``, shape (2N,), with given inertia
         ``[q, v, a]``; ``state`` that of the filter, which rests on the motion if not
-        ``known``.
+        ``known``: as long as ``motion``, and N longer for rigid joints with
+        differentiated inertia.
     """
     n = robot.dimension
     size = 3 * n if inertia == "given" else 2 * n
@@ -168,10 +169,10 @@ def compensation_function(
     next_state = low_pass.update(state, motion)
     if differentiated:
         a = low_pass.derivative(state[n:], motion[n:])
-    if stepwise:
-        # the mean of two trapezoidal derivatives is the filtered difference
-        next_state = ca.vertcat(next_state, a)
-        a = (a + ca.if_else(known, memory[size:], 0.0)) / 2.0
+        if stepwise:
+            # the mean of two trapezoidal derivatives is the filtered difference
+            next_state = ca.vertcat(next_state, a)
+            a = (a + ca.if_else(known, memory[size:], 0.0)) / 2.0
     elif inertia == "none":
         v = ca.SX(n, 1)
     joints = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(n)]

@@ -112,7 +112,7 @@ class ForceTorqueSensor(LeafSystem):
             load=self._result[_LOAD],
             next_state=self._result[_NEXT],
         )
-        self._transducer, self._evaluate = transducer, transducer.evaluate
+        self._evaluate = transducer.evaluate
         self._reaction, self._state, self._sample = transducer.arguments.values()
         memory = np.concatenate([np.full(6, np.nan), [0.0], self._draw(0)])
         state = self.discrete_state_ticket(self.DeclareDiscreteState(memory))

@@ -50,12 +50,8 @@ class ScriptedForce(LeafSystem):
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
-        time = context.get_time()
-        if not self._profile.is_active(time, time):
-            output.SetZero()
-            return
         axes = context.get_discrete_state_vector().value().reshape(3, 3)
-        output.SetFromVector(self._profile.at(time, axes))
+        output.SetFromVector(self._profile.at(context.get_time(), axes))
 
     def _look(self, context: Context, state: DiscreteValues) -> EventStatus:
         time = context.get_time()

@@ -61,13 +61,13 @@ class ToolCompensation(LeafSystem):
         tared (output): 1 once the bias is known, else 0.
         fault (output): A :class:`SensorFault`.
         compensation (output): ``[wrench, tared, fault, r]`` and the filter's next state,
-            shape (14 + 2N,), with given accelerations (14 + 3N,); computed once per tick,
-            the others are parts of it.
+            shape (14 + size of that state,); computed once per tick, the others are parts
+            of it.
 
     State:
         Discrete: bias, shape (6,); tared, fault, whether the filter's state is known, shape
         (1,) each; taring window, shape (19,); state of the filter of the joints' motion,
-        shape (2N,), with given accelerations (3N,).
+        see :func:`compensation_function`, shape (2N,) or (3N,).
 
     Args:
         robot: The robot with the tool.
@@ -109,7 +109,7 @@ class ToolCompensation(LeafSystem):
             guarded_compensation(function, np.asarray(measurement_range)),
             **{name: self._memory[part] for name, part in _MEMORY.items()},
         )
-        self._step, self._evaluate, self._result = step, step.evaluate, step.results["result"]
+        self._evaluate, self._result = step.evaluate, step.results["result"]
         self._motion, self._reading = step.arguments["motion"], step.arguments["measured"]
         self._measured = self.DeclareVectorInputPort("measured_wrench", 6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)

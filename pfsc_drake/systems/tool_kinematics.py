@@ -31,9 +31,9 @@ class ToolKinematics(LeafSystem):
             self._calc_tool_pose,
             prerequisites_of_calc={self._joint_state.ticket()},
         )
-        self._function = BoundFunction(pose_function(robot))
-        self._q, self._pose = self._function.arguments["q"], self._function.results["pose"]
-        self._evaluate = self._function.evaluate
+        function = BoundFunction(pose_function(robot))
+        self._q, self._pose = function.arguments["q"], function.results["pose"]
+        self._evaluate = function.evaluate
 
     def _calc_tool_pose(self, context: Context, output: BasicVector) -> None:
         self._q[:] = self._joint_state.Eval(context)[self._part]

@@ -15,8 +15,8 @@ from pfsc_drake.control.impedance import (
     ImpedanceParameters,
     ImpedanceStatus,
     Profile,
-    transition,
 )
+from pfsc_drake.control.impedance_functions import transition
 from pfsc_drake.errors import InputError
 from pfsc_drake.typed_yaml import load_typed
 
