@@ -63,7 +63,8 @@ def _fast_damping(parameters: ControllerParameters, chain: SerialChain) -> list[
 
 def _unknown_forces(scenario: PathFollowingScenario, chain: SerialChain) -> list[str]:
     parameters = scenario.controller
-    pushed = bool(scenario.forces) or scenario.hold_back.force != 0.0
+    scripted = bool(scenario.forces) or scenario.hold_back.force != 0.0
+    pushed = scripted or scenario.hand is not None
     exact = parameters.law in ("elastic", "visco_elastic") and chain.is_elastic
     if not (exact and pushed and parameters.external_torque.source == "none"):
         return []

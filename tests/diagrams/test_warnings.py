@@ -6,6 +6,7 @@ import pytest
 
 from diagrams.path_following import build_path_following
 from diagrams.scenario import ForcePulse, PathFollowingScenario
+from pfsc_drake.control.hand_model import HandParameters
 from pfsc_drake.typed_yaml import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -46,3 +47,9 @@ def test_forces_that_the_elastic_law_does_not_know_of(scenario):
     scenario.controller.external_torque.source = "none"
     scenario.controller.law = "singular_perturbation"
     assert build_path_following(scenario, SCENARIOS).warnings == []
+
+
+def test_a_hand_that_the_elastic_law_does_not_know_of(scenario):
+    scenario.hand = HandParameters()
+    (warning,) = build_path_following(scenario, SCENARIOS).warnings
+    assert "external_torque" in warning
