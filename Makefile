@@ -41,7 +41,7 @@ benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
 
 models: setup
-	$(BIN)/python -m pfsc_drake.robot.model_writer
+	$(BIN)/python -m pfsc_drake.robot.models.writer
 
 clean:
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache

@@ -7,27 +7,27 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
-from diagrams.arm import joint_state_of
-from diagrams.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_touching_delta
-from diagrams.external_torque import needs_sensor
-from diagrams.following import Task, add_law, add_place_on_path, reference_progress
-from diagrams.force_sensor import add_sensor, sensor_warnings
-from diagrams.measurement import add_forces, add_joint_state, states_to_log, sum_of_wrenches
-from diagrams.notch import UP
-from diagrams.notch_motion import place_in_notch
-from diagrams.parts import make_law, make_path
-from diagrams.scenario import RobotParameters
-from diagrams.scenario_delta import DeltaFollowingScenario
-from diagrams.scenario_notch import NotchParameters
+from diagrams.robots.arm import joint_state_of
+from diagrams.robots.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_touching_delta
+from diagrams.robots.force_sensor import add_sensor, sensor_warnings
+from diagrams.robots.measurement import add_forces, add_joint_state, states_to_log, sum_of_wrenches
+from diagrams.scenario.delta import DeltaFollowingScenario
+from diagrams.scenario.notch import NotchParameters
+from diagrams.scenario.schema import RobotParameters
 from diagrams.signal_log import add_log
-from diagrams.start import check_points, start_point
 from diagrams.station import FurtherLength, Station
+from diagrams.surroundings.notch import UP
+from diagrams.surroundings.notch_motion import place_in_notch
+from diagrams.tasks.external_torque import needs_sensor
+from diagrams.tasks.following import Task, add_law, add_place_on_path, reference_progress
+from diagrams.tasks.parts import make_law, make_path
+from diagrams.tasks.start import check_points, start_point
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates
-from pfsc_drake.robot.delta import DeltaRobot
-from pfsc_drake.robot.delta_parameters import load_delta_parameters
-from pfsc_drake.systems.joint_friction import JointFriction
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.parameters import load_delta_parameters
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.systems.physics.joint_friction import JointFriction
 
 # m, between the points of the way along the path that are checked for reach
 _REACH_SPACING = 2e-3

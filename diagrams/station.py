@@ -8,13 +8,14 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from diagrams.signal_log import SignalLog
-from pfsc_drake.control.path_law import Fault, PathLaw
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.law import PathLaw
 from pfsc_drake.geometry import Path
-from pfsc_drake.robot.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.can_fail import CanFail
-from pfsc_drake.systems.path_following_controller import PathFollowingController
-from pfsc_drake.systems.path_projector import PathProjector
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.systems.control.can_fail import CanFail
+from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.path_projector import PathProjector
 
 Plant = TypeVar("Plant")
 Robot = TypeVar("Robot", bound=RobotModel)

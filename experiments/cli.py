@@ -17,13 +17,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.catalog.scenario_catalog import list_scenarios
 from experiments.progress import ProgressDisplay
-from experiments.scenario_catalog import list_scenarios
 from pfsc_drake.errors import InputError
 
 if TYPE_CHECKING:
-    from experiments.metrics import Metrics
-    from experiments.scenario_file import ScenarioFile
+    from experiments.catalog.scenario_file import ScenarioFile
+    from experiments.results.metrics import Metrics
 
 WRONG_INPUT = 2
 FAULT = 3
@@ -75,7 +75,7 @@ def run_command(
     ] = True,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.scenario_file import read_scenario
+    from experiments.catalog.scenario_file import read_scenario
 
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
         raise InputError(f"--duration {duration:g}: allowed: a positive number of seconds")
@@ -97,7 +97,7 @@ def compare_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/comparison"),
 ) -> None:
     """Put several runs on one page."""
-    from experiments.compare import write_comparison
+    from experiments.pages.compare import write_comparison
 
     page = write_comparison(runs, out)
     Console().print(f"Open the comparison: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
@@ -108,7 +108,7 @@ def study_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
     """Which law when: all laws on joints of rising stiffness (about a minute)."""
-    from experiments.stiffness_study import write_study
+    from experiments.studies.stiffness import write_study
 
     logging.getLogger("drake").setLevel(logging.ERROR)
     console = Console()
@@ -177,7 +177,7 @@ def _run(
 
 def _metrics_table(metrics: "Metrics") -> Table:
     """The metrics with their targets, one line each."""
-    from experiments.units import format_quantity
+    from experiments.results.units import format_quantity
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("Metric", no_wrap=True)

@@ -11,23 +11,23 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from diagrams.block_diagram import block_diagram_svg
-from diagrams.replay import RecordedMotion, record
-from diagrams.scenario import PathFollowingScenario, Waypoints
+from diagrams.drawing.block_diagram import block_diagram_svg
+from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.scenario.schema import PathFollowingScenario, Waypoints
 from diagrams.station import Station
 from diagrams.stations import build_station, build_station_replay, load_settings
-from experiments.figures import write_figures
-from experiments.metrics import Metrics
-from experiments.path_metrics import metric_names, path_following_metrics
+from experiments.catalog.scenario_file import ScenarioFile
+from experiments.figures.all import write_figures
+from experiments.pages.report import write_report
 from experiments.progress import ProgressListener
-from experiments.provenance import standard_attributes
-from experiments.report import write_report
-from experiments.run_log import RunLog
-from experiments.run_signals import collect_log, collect_motion, optional_signals
-from experiments.scenario_file import ScenarioFile
+from experiments.results.metrics import Metrics
+from experiments.results.path_metrics import metric_names, path_following_metrics
+from experiments.results.provenance import standard_attributes
+from experiments.results.run_log import RunLog
+from experiments.results.run_signals import collect_log, collect_motion, optional_signals
+from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
-from experiments.tick import measure_tick
-from pfsc_drake.control.bound_function import compiled_when_bound
+from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
 
 _PATH_POINTS = 600

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pfsc_drake import __version__
-from pfsc_drake.robot.model_files import models_directory
+from pfsc_drake.robot.models.files import models_directory
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -18,7 +18,7 @@ WHEEL = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
 
 FIND_MODELS = """
 import pfsc_drake
-from pfsc_drake.robot.model_files import models_directory, resolve_model
+from pfsc_drake.robot.models.files import models_directory, resolve_model
 print(pfsc_drake.__file__)
 print(models_directory())
 print(resolve_model("comau_racer_1_4_elastic_3r"))
@@ -66,7 +66,7 @@ def test_without_models_the_error_says_so(tmp_path):
     code = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
         "from pfsc_drake import InputError\n"
-        "from pfsc_drake.robot.model_files import models_directory\n"
+        "from pfsc_drake.robot.models.files import models_directory\n"
         "try:\n    models_directory()\nexcept InputError as error:\n    print(error)\n"
     )
     (message,) = imported_names(code)

@@ -3,16 +3,18 @@
 Knows neither robots nor Drake. Numbers in parentheses are equations of the dissertation.
 """
 
-from pfsc_drake.geometry.arc_length import ArcLength
-from pfsc_drake.geometry.curve import Curve
-from pfsc_drake.geometry.fourier import FourierCurve
-from pfsc_drake.geometry.frame import ParallelTransportFrame
-from pfsc_drake.geometry.orientation import OrientationCurve, interpolate_orientation
-from pfsc_drake.geometry.path import Path
-from pfsc_drake.geometry.path_evaluator import PathEvaluator
-from pfsc_drake.geometry.path_point import PathPointLayout, PathStatus
-from pfsc_drake.geometry.polynomial import PiecewisePolynomialCurve
-from pfsc_drake.geometry.projection import Projection, Projector, project_globally
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.fourier import FourierCurve
+from pfsc_drake.geometry.curves.orientation import OrientationCurve, interpolate_orientation
+from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
+from pfsc_drake.geometry.curves.spline import interpolate
+from pfsc_drake.geometry.paths.arc_length import ArcLength
+from pfsc_drake.geometry.paths.evaluator import PathEvaluator
+from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
+from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.paths.point import PathPointLayout, PathStatus
+from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
+from pfsc_drake.geometry.paths.waypoints import WaypointTable, path_from_waypoints, read_waypoints
 from pfsc_drake.geometry.rotation import (
     check_rotation_matrix,
     matrix_to_quaternion,
@@ -26,8 +28,6 @@ from pfsc_drake.geometry.rotation import (
     zyz_to_matrix,
     zyz_to_quaternion,
 )
-from pfsc_drake.geometry.spline import interpolate
-from pfsc_drake.geometry.waypoints import WaypointTable, path_from_waypoints, read_waypoints
 
 __all__ = [
     "ArcLength",

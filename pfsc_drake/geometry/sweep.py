@@ -3,7 +3,7 @@
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curve import Curve
+from pfsc_drake.geometry.curves.curve import Curve
 
 
 def swept_surface(

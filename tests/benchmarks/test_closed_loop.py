@@ -6,9 +6,9 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario import PathFollowingScenario
-from pfsc_drake.control.bound_function import compiled_when_bound
-from pfsc_drake.typed_yaml import load_file
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.yaml.typed import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
 SPAN = 0.2

@@ -11,12 +11,13 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 from scipy.optimize import least_squares
 
-from pfsc_drake.control.bound_function import compiled_when_bound
-from pfsc_drake.control.decoupling import DecouplingInverse
-from pfsc_drake.control.linearization import ActuationOptions, linearize_path
-from pfsc_drake.control.path_law import Fault, PathLaw, SafeState
-from pfsc_drake.control.reference import rest_to_rest
-from pfsc_drake.control.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.control.law.decoupling import DecouplingInverse
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -24,12 +25,12 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     zyx_to_quaternion,
 )
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.model_files import resolve_model
-from pfsc_drake.systems.path_following_controller import PathFollowingController
-from pfsc_drake.systems.path_projector import PathProjector
-from pfsc_drake.systems.reference_generator import ReferenceGenerator
-from pfsc_drake.systems.tool_kinematics import ToolKinematics
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
 THETA = 0.7

@@ -10,10 +10,10 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.decoupling import DecouplingInverse
-from pfsc_drake.control.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
-from pfsc_drake.control.path_law import PathLaw, SafeState
-from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.law.decoupling import DecouplingInverse
+from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
+from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -21,8 +21,8 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     zyx_to_quaternion,
 )
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.model_files import resolve_model
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 NAMES = ("eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3")
 

@@ -9,11 +9,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.robot import add_robot, tool_frame
-from diagrams.scenario import PathFollowingScenario, RobotParameters
-from experiments.scenario_catalog import find_scenario
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
-from pfsc_drake.typed_yaml import load_file
+from diagrams.robots.model import add_robot, tool_frame
+from diagrams.scenario.schema import PathFollowingScenario, RobotParameters
+from experiments.catalog.scenario_catalog import find_scenario
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.yaml.typed import load_file
 
 
 class Arm:

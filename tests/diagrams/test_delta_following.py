@@ -5,13 +5,13 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.delta_replay import build_delta_replay
-from diagrams.replay import RecordedMotion, record
-from diagrams.scenario import PathFollowingScenario
-from diagrams.scenario_delta import DeltaFollowingScenario
+from diagrams.drawing.delta_replay import build_delta_replay
+from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.scenario.delta import DeltaFollowingScenario
+from diagrams.scenario.schema import PathFollowingScenario
 from diagrams.stations import build_station, load_settings
-from experiments.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.scenario_file import load_scenario_data
+from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
 
 FILE = SCENARIO_DIRECTORY / "pfc_delta.yaml"

@@ -7,9 +7,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario import GainParameters, LawGains
+from diagrams.scenario.schema import GainParameters, LawGains
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.model_files import resolve_model
+from pfsc_drake.robot.models.files import resolve_model
 
 ENCODERS = ("joint_encoders", "y0")
 WIRES = {

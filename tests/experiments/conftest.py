@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
+from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
-from experiments.run_log import RunLog
-from experiments.scenario_catalog import find_scenario
+from experiments.results.run_log import RunLog
 
 BARE = ("--no-figures", "--no-recording")
 FIRST_MOVE = "1.7"  # s, of pfc_elastic_3r

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments import scenario_catalog
+from experiments.catalog import scenario_catalog
 from experiments.cli import main
-from experiments.metrics import Metrics
-from experiments.provenance import PROJECT_ROOT
+from experiments.results.metrics import Metrics
+from experiments.results.provenance import PROJECT_ROOT
 from pfsc_drake import InputError
 
 

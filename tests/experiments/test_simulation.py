@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.schema import PathFollowingScenario
 from experiments import simulation
-from experiments.run_signals import collect_log, collect_motion
-from experiments.scenario_catalog import find_scenario
+from experiments.catalog.scenario_catalog import find_scenario
+from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate
-from pfsc_drake.typed_yaml import load_file
+from pfsc_drake.yaml.typed import load_file
 
 
 class Listener:

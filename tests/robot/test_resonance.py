@@ -4,10 +4,11 @@ import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.model_files import resolve_model
+from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.resonance import joint_resonances
-from pfsc_drake.robot.serial_chain import ChainLink, SerialChain
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.serial.links import ChainLink
 
 
 def test_two_masses_and_a_spring():

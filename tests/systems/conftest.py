@@ -6,13 +6,13 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import least_squares
 
-from pfsc_drake.control.decoupling import DecouplingInverse
-from pfsc_drake.control.linearization import ActuationOptions, linearize_path
-from pfsc_drake.control.path_law import PathLaw, SafeState
-from pfsc_drake.control.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.law.decoupling import DecouplingInverse
+from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.geometry import FourierCurve, Path
-from pfsc_drake.robot.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.model_files import resolve_model
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 
 class Arm:

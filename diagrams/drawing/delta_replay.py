@@ -1,0 +1,84 @@
+"""A logged run of a DELTA robot in Meshcat, base on top as it hangs."""
+
+import numpy as np
+from pydrake.geometry import Cylinder, Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from diagrams.drawing.replay import RecordedMotion, add_source
+from diagrams.scenario.notch import NotchParameters
+from diagrams.surroundings.notch import UP, notch_surface
+from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.shapes import ACCENT, METAL, PLATE
+from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer, turn_scene_over
+from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
+
+# m, between the path's lowest point and the grid
+_CLEARANCE = 0.15
+_HOLDER_RADIUS = 0.008  # m
+_NOTCH_VIEW = np.array([0.5, -0.4, 0.35])  # m, from the notch to the camera
+_WORKPIECE = Rgba(0.75, 0.72, 0.66, 0.75)
+
+
+def build_delta_replay(
+    robot: DeltaRobot,
+    path: Path,
+    layout: PathPointLayout,
+    motion: RecordedMotion,
+    meshcat: Meshcat,
+    period: float,
+    notch: NotchParameters | None = None,
+) -> Diagram:
+    """Return a diagram that draws a recorded motion while its time advances.
+
+    Args:
+        robot: The robot.
+        path: The path, axes of the inertial frame (z_0 down).
+        layout: Layout of the path points.
+        motion: What to draw; its positions are those of the slides.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+        notch: Ball and workpiece, if there are any.
+    """
+    _arrange_scene(path, meshcat)
+    if notch is not None:
+        _draw_notch(path, notch, meshcat)
+    builder = DiagramBuilder()
+    slides = add_source(builder, "positions", motion.times, motion.positions)
+    tool_pose = add_source(builder, "tool_pose", motion.times, motion.tool_pose)
+    path_point = add_source(builder, "path_point", motion.times, motion.path_point)
+    body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
+    builder.Connect(slides, body.GetInputPort("slide_positions"))
+    drawing = builder.AddNamedSystem(
+        "path_visualizer", PathVisualizer(path, layout, meshcat, period)
+    )
+    builder.Connect(tool_pose, drawing.GetInputPort("tool_pose"))
+    builder.Connect(path_point, drawing.GetInputPort("path_point"))
+    return builder.Build()
+
+
+def _draw_notch(path: Path, notch: NotchParameters, meshcat: Meshcat) -> None:
+    """Draw ball and workpiece, and look down at them."""
+    vertices, triangles = notch_surface(path, notch)
+    meshcat.SetTriangleMesh("workpiece", vertices.T, triangles.T, _WORKPIECE)
+    ball = notch.ball
+    holder = 0.5 * (ball.distance - ball.radius)
+    for name, shape, below, color in (
+        ("ball", Sphere(ball.radius), ball.distance, ACCENT),
+        ("holder", Cylinder(_HOLDER_RADIUS, 2.0 * holder), holder, METAL),
+    ):
+        part = f"delta_robot/{PLATE}/{name}"
+        meshcat.SetObject(part, shape, color)
+        meshcat.SetTransform(part, RigidTransform(-below * UP))
+    target = np.array([0.0, 0.0, _CLEARANCE])
+    meshcat.SetCameraPose(target + _NOTCH_VIEW, target)
+
+
+def _arrange_scene(path: Path, meshcat: Meshcat) -> None:
+    """Hang the robot above the grid, and look at it from the side, level with the rods."""
+    depth = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, 2]
+    height = float(depth.max()) + _CLEARANCE
+    turn_scene_over(meshcat, height)
+    target = np.array([0.0, 0.0, height - 0.55 * depth.max()])
+    meshcat.SetCameraPose(target + depth.max() * np.array([1.35, -1.0, 0.1]), target)

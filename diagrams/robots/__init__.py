@@ -1,0 +1,1 @@
+"""Robots in diagrams: plant, drives, sensors."""

@@ -1,0 +1,178 @@
+"""What is between the law's output and the plant's joints: hold, servo, bus, friction."""
+
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
+
+from diagrams.robots.arm import Arm
+from diagrams.scenario.checks import require_whole_fraction
+from diagrams.scenario.schema import JointFrictionParameters, PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
+from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
+from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.systems.physics.bus_delay import add_bus_delay
+from pfsc_drake.systems.physics.joint_friction import JointFriction
+from pfsc_drake.systems.physics.velocity_servo import VelocityServo
+
+# integration schemes of fixed step that the bristles of friction are made for
+_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
+
+
+def add_drives(
+    builder: DiagramBuilder,
+    arm: Arm,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+    initial_state: np.ndarray,
+) -> dict[str, OutputPort]:
+    """Connect the law to the plant's actuation, and return further signals for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        arm: The robot.
+        scenario: The scenario.
+        ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
+        initial_state: State of the plant at the start, for which servos are designed.
+
+    Returns:
+        With servos ``drive_torque``, within its limits [Nm or N], shape (N,), and
+        ``servo_fault``, shape (1,).
+
+    Raises:
+        InputError: If the servos do not suit the robot or the controller.
+    """
+    period, torque = scenario.controller.sampling_time, ports["drive"]
+    chain, signals = arm.chain, {}
+    if scenario.controller.law == "velocity_servo":
+        q_J = (arm.coordinates.link_rows @ initial_state)[: chain.dimension]
+        servo, period = _add_servo(builder, chain, scenario, ports, q_J)
+        torque = servo.GetOutputPort("drive_torque")
+        signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
+    builder.Connect(torque, hold.get_input_port())
+    arm.connect_drives(builder, hold.get_output_port())
+    return signals
+
+
+def _add_servo(
+    builder: DiagramBuilder,
+    chain: SerialChain,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+    q_J: np.ndarray,
+) -> tuple[VelocityServo, float]:
+    """Add velocity servos, and return them and their sampling time."""
+    servo, tick = scenario.servo, scenario.controller.sampling_time
+    period = servo.period or tick
+    ratio = require_whole_fraction("servo.period", period, tick)
+    rate = None if servo.integral_rate < 0.0 else servo.integral_rate
+    gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
+    effort = chain.gather("effort_limit") * scenario.controller.effort_scale
+    system = builder.AddNamedSystem(
+        "velocity_servo", VelocityServo(chain, VelocityServoLaw(gains, effort))
+    )
+    velocity = ports["drive"]
+    if servo.bus_delay > 0.0:
+        bus = add_bus_delay(builder, velocity, servo.bus_delay, tick)
+        velocity = bus.GetOutputPort("delivered")
+    elif ratio > 1:
+        # the law must not be evaluated between its own ticks
+        keep = builder.AddNamedSystem("velocity_hold", ZeroOrderHold(tick, chain.dimension))
+        builder.Connect(velocity, keep.get_input_port())
+        velocity = keep.get_output_port()
+    builder.Connect(velocity, system.GetInputPort("velocity_reference"))
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    return system, period
+
+
+def add_friction(
+    builder: DiagramBuilder,
+    arm: Arm,
+    joint_state: OutputPort,
+    scenario: PathFollowingScenario,
+    folder: FilePath,
+) -> dict[str, OutputPort]:
+    """Add the scenario's friction, and return its signal for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        arm: The robot.
+        joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
+        scenario: The scenario.
+        folder: Where relative file names start.
+
+    Returns:
+        ``friction_torque``, positive against positive velocities [Nm or N], shape (N,).
+
+    Raises:
+        InputError: If the friction does not suit the robot or the integration.
+    """
+    if not scenario.friction.is_given:
+        return {}
+    chain = arm.chain
+    if not np.all(chain.D_M > 0.0):
+        raise InputError("friction: needs a robot with rotor inertia in every drive")
+    f_c, f_v = _coefficients(scenario.friction, chain, folder)
+    bristles = friction_bristles(scenario, f_c, f_v, chain.D_M, "friction")
+    friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+    n = chain.dimension
+    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
+    builder.Connect(joint_state, velocity.get_input_port())
+    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+    arm.connect_friction(builder, friction.GetOutputPort("resistance"))
+    return {"friction_torque": friction.GetOutputPort("friction_torque")}
+
+
+def friction_bristles(
+    scenario: PathFollowingScenario,
+    f_c: np.ndarray,
+    f_v: np.ndarray,
+    inertia: np.ndarray,
+    key: str,
+) -> BristleFriction:
+    """Return friction whose bristles suit the integration.
+
+    Args:
+        scenario: The scenario.
+        f_c: Coulomb friction [Nm or N], shape (N,).
+        f_v: Viscous friction [Nm s/rad or N s/m], shape (N,).
+        inertia: Least inertia behind each drive, shape (N,).
+        key: Key of the scenario that asks for friction, for the message.
+
+    Raises:
+        InputError: If the bristles are not made for the integration.
+    """
+    simulation = scenario.simulation
+    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+        raise InputError(
+            f"simulation.integrator = {simulation.integrator} with {key}; allowed: "
+            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+        )
+    # stiff enough for the step of the integration, or of the hold if that is shorter
+    step = min(simulation.max_step, scenario.controller.sampling_time)
+    return bristles_for_step(f_c, f_v, inertia, step)
+
+
+def _coefficients(
+    parameters: JointFrictionParameters, chain: SerialChain, folder: FilePath
+) -> tuple[np.ndarray, np.ndarray]:
+    n = chain.dimension
+    if parameters.file:
+        file = parameters.file
+        known = load_parameters(folder / file if FilePath(file).suffix else file).friction
+        if known.coulomb.size < n:
+            raise InputError(
+                f"friction.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
+            )
+        return known.coulomb[:n], known.viscous[:n]
+    values = []
+    for key in ("f_c", "f_v"):
+        given = getattr(parameters, key) or [0.0] * n
+        if len(given) != n:
+            raise InputError(f"friction.{key}: {len(given)} values; the robot has {n} joints")
+        values.append(np.array(given, dtype=float))
+    return values[0], values[1]

@@ -1,0 +1,92 @@
+"""The force/torque sensor between robot and tool."""
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Demultiplexer
+
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
+from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
+
+
+def add_sensor(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    robot: RobotModel,
+    tool: Frame,
+    scenario: PathFollowingScenario,
+    joint_state: OutputPort,
+) -> dict[str, OutputPort]:
+    """Add a force/torque sensor with taring and compensation of the tool behind it.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: Plant with the robot.
+        robot: The robot.
+        tool: Frame at the tool point, in the plant.
+        scenario: The scenario.
+        joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
+
+    Returns:
+        ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``.
+
+    Raises:
+        InputError: If the sensor does not suit the robot or the sampling time.
+    """
+    parameters, period = scenario.sensor, scenario.controller.sampling_time
+    if not plant.HasJointNamed(parameters.joint):
+        raise InputError(
+            f"sensor.joint: the model {scenario.robot.model} has no joint '{parameters.joint}'"
+        )
+    joint = plant.GetJointByName(parameters.joint)
+    sensor = builder.AddNamedSystem(
+        "force_torque_sensor", ForceTorqueSensor(plant, joint, parameters.transducer(), period)
+    )
+    load = tool_load_from_plant(plant, joint, tool)
+    compensation = builder.AddNamedSystem(
+        "tool_compensation",
+        ToolCompensation(
+            robot, load, parameters.measurement_range, parameters.compensation(), period
+        ),
+    )
+    builder.Connect(plant.get_reaction_forces_output_port(), sensor.GetInputPort("reaction_forces"))
+    reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
+    builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
+    builder.Connect(joint_state, compensation.GetInputPort("joint_state"))
+    whole = compensation.GetOutputPort("compensation")
+    parts = _split(builder, "sensor_signals", whole, [6, 1, 1])
+    return dict(zip(("wrench_measured", "tared", "sensor_fault"), parts, strict=True))
+
+
+def _split(
+    builder: DiagramBuilder, name: str, port: OutputPort, sizes: list[int]
+) -> list[OutputPort]:
+    """Return a port's first parts; split without Python, they cost less time than one by one."""
+    rest = port.size() - sum(sizes)
+    split = builder.AddNamedSystem(name, Demultiplexer([*sizes, rest]))
+    builder.Connect(port, split.get_input_port())
+    return [split.get_output_port(i) for i in range(len(sizes))]
+
+
+def sensor_warnings(scenario: PathFollowingScenario) -> list[str]:
+    """Return what may keep a scenario's sensor from being tared, or make it too late."""
+    if not scenario.compliance.is_given:
+        return []
+    warnings, sensor, dwell = [], scenario.sensor, scenario.reference.dwell
+    if scenario.encoders.difference_quotient and sensor.inertia != "none":
+        warnings.append(
+            "the tool's inertial load comes from the second difference of encoder positions; if "
+            "that is noisier than sensor.taring_spread, the sensor is never tared and what would "
+            "yield rests: filter the velocities (encoders.filter_time) or take sensor.inertia "
+            "'none'"
+        )
+    if dwell < sensor.taring_time:
+        warnings.append(
+            f"the reference sets off after reference.dwell = {dwell:g} s, before the sensor can "
+            f"be tared (sensor.taring_time = {sensor.taring_time:g} s); what yields waits for "
+            "that, and then catches up"
+        )
+    return warnings

@@ -1,0 +1,79 @@
+"""What drives, friction and forces of a robot mean for the MultibodyPlant that moves it."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain
+
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.physics.external_wrench import ExternalWrench
+
+
+def connect_actuation(
+    builder: DiagramBuilder, plant: MultibodyPlant, actuators: np.ndarray, torque: OutputPort
+) -> None:
+    """Let drive torques or forces act.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: The plant.
+        actuators: Index of each drive's actuator in the plant, shape (N,).
+        torque: Shape (N,) [Nm or N].
+    """
+    order = np.zeros((plant.num_actuators(), len(actuators)))
+    order[actuators, np.arange(len(actuators))] = 1.0
+    drives = builder.AddNamedSystem("drives", MatrixGain(order))
+    builder.Connect(torque, drives.get_input_port())
+    builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
+
+
+def connect_resistance(
+    builder: DiagramBuilder, plant: MultibodyPlant, rows: np.ndarray, resistance: OutputPort
+) -> None:
+    """Let friction act, beside the drives and whatever their limits.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: The plant.
+        rows: Map from the plant's state to the velocities of the drives, shape (N, num_states).
+        resistance: Friction torques or forces, positive with the velocity, shape (N,).
+    """
+    forces = builder.AddNamedSystem("resistance", MatrixGain(rows[:, plant.num_positions() :].T))
+    builder.Connect(resistance, forces.get_input_port())
+    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+
+
+def add_external_wrench(
+    builder: DiagramBuilder,
+    tool: Frame,
+    robot: RobotModel,
+    wrench: OutputPort,
+    joint_state: OutputPort,
+) -> ExternalWrench:
+    """Return what a wrench on the tool is for bodies and for joints.
+
+    Args:
+        builder: Builder of the diagram.
+        tool: Frame at the tool point.
+        robot: The robot.
+        wrench: At the tool point, world axes, shape (6,) [N, Nm].
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+    """
+    push = builder.AddNamedSystem("external_wrench", ExternalWrench(tool, robot))
+    builder.Connect(wrench, push.GetInputPort("wrench"))
+    builder.Connect(joint_state, push.GetInputPort("joint_state"))
+    return push
+
+
+def connect_push(builder: DiagramBuilder, plant: MultibodyPlant, push: ExternalWrench) -> None:
+    """Let a wrench act on the tool's body.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: The plant.
+        push: The wrench.
+    """
+    builder.Connect(
+        push.GetOutputPort("applied_spatial_force"), plant.get_applied_spatial_force_input_port()
+    )

@@ -1,0 +1,1 @@
+"""What a scenario file says: its schema, one file per block."""

@@ -1,0 +1,107 @@
+"""Compliance of a scenario's robot, and the force/torque sensor that it needs."""
+
+import dataclasses as dc
+
+import numpy as np
+
+from diagrams.scenario.checks import require
+from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
+from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
+from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
+
+
+@dc.dataclass
+class ComplianceParameters:
+    """How the tool yields to measured forces (3.42), (3.44); what is not given stays rigid.
+
+    Attributes:
+        tangential: Of eta.
+        transversal: Of xi_1 and xi_2.
+        rotational: Of the three angles; oriented paths only.
+        with_turning: Whether torques act along eta where the path's orientation turns.
+    """
+
+    tangential: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    transversal: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    rotational: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
+    with_turning: bool = False
+
+    @property
+    def is_given(self) -> bool:
+        """Whether any coordinate yields."""
+        kinds = (self.tangential, self.transversal, self.rotational)
+        return any(kind.stiffness.at or np.isfinite(kind.stiffness.value) for kind in kinds)
+
+    def impedance(self) -> ImpedanceParameters:
+        """Return the impedance of all coordinates."""
+        return ImpedanceParameters(self.tangential, self.transversal, self.rotational)
+
+
+@dc.dataclass
+class SensorParameters:
+    """The force/torque sensor and how its signal is used; only built with compliance.
+
+    In arrays of six, the first three entries are forces [N], the others torques [Nm].
+
+    Attributes:
+        joint: Fixed joint of the model with the sensor in it; its child side is the tool.
+        measurement_range: Largest magnitude that is measured, shape (6,).
+        bias: Reading without load, shape (6,).
+        noise: Standard deviation of one sample, shape (6,).
+        bandwidth: Of the sensor's filter, and of the tool compensation's [Hz].
+        seed: Of the noise.
+        inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
+        taring_time: Length of the quiet stretch whose mean becomes the bias [s].
+        taring_spread: Largest difference within it, shape (6,).
+        taring_bias: Largest bias that is believed, shape (6,).
+        force_dead_band: [N].
+        torque_dead_band: [Nm].
+    """
+
+    joint: str = "weld_tool"
+    measurement_range: np.ndarray = dc.field(
+        default_factory=lambda: ForceTorqueParameters().measurement_range
+    )
+    bias: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().bias)
+    noise: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().noise)
+    bandwidth: float = 200.0
+    seed: int = 0
+    inertia: str = "differentiated"
+    taring_time: float = 0.05
+    taring_spread: np.ndarray = dc.field(
+        default_factory=lambda: ToolCompensationParameters().taring_spread
+    )
+    taring_bias: np.ndarray = dc.field(
+        default_factory=lambda: ToolCompensationParameters().taring_bias
+    )
+    force_dead_band: float = 0.0
+    torque_dead_band: float = 0.0
+
+    def __post_init__(self) -> None:
+        # accelerations are known to no component of the station
+        known = self.inertia in ("differentiated", "none")
+        require(known, "inertia", self.inertia, "differentiated, none")
+        self.transducer()
+        self.compensation()
+
+    def transducer(self) -> ForceTorqueParameters:
+        """Return the properties of the sensor itself."""
+        return ForceTorqueParameters(
+            measurement_range=self.measurement_range,
+            bias=self.bias,
+            noise=self.noise,
+            bandwidth=self.bandwidth,
+            seed=self.seed,
+        )
+
+    def compensation(self) -> ToolCompensationParameters:
+        """Return how the tool's load is taken off."""
+        return ToolCompensationParameters(
+            inertia=self.inertia,
+            bandwidth=self.bandwidth,
+            taring_time=self.taring_time,
+            taring_spread=self.taring_spread,
+            taring_bias=self.taring_bias,
+            force_dead_band=self.force_dead_band,
+            torque_dead_band=self.torque_dead_band,
+        )

@@ -1,0 +1,110 @@
+"""The controller of a scenario."""
+
+import dataclasses as dc
+
+from diagrams.scenario.checks import require, require_not_negative, require_positive
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+
+MANIFOLDS = ("path", "trajectory")
+_TORQUE_SOURCES = ("none", "known", "measured")
+
+
+@dc.dataclass
+class GainParameters:
+    """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
+
+    Attributes:
+        poles: Real poles [1/s], r of them.
+        coefficients: ``a_1 .. a_r``, alternatively.
+        integral: ``a_0``; needs coefficients.
+    """
+
+    poles: list[float] = dc.field(default_factory=list)
+    coefficients: list[float] = dc.field(default_factory=list)
+    integral: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(
+            not (self.poles and (self.coefficients or self.integral)),
+            "poles",
+            self.poles,
+            "either poles, or coefficients with or without integral",
+        )
+
+
+@dc.dataclass
+class LawGains:
+    """Gains of all coordinates for one law.
+
+    Attributes:
+        eta: Tangential.
+        xi: Both transversal.
+        phi: Rotational; unused by arms that only position.
+    """
+
+    eta: GainParameters = dc.field(default_factory=GainParameters)
+    xi: GainParameters = dc.field(default_factory=GainParameters)
+    phi: GainParameters = dc.field(default_factory=GainParameters)
+
+
+@dc.dataclass
+class ExternalTorqueParameters:
+    """What the law knows of the external torques in the joints.
+
+    Attributes:
+        source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
+            ``measured``: from the force/torque sensor.
+        bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
+            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives.
+    """
+
+    source: str = "none"
+    bandwidth: float = 0.0
+
+    def __post_init__(self) -> None:
+        known = self.source in _TORQUE_SOURCES
+        require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
+        require_not_negative("bandwidth", self.bandwidth)
+
+
+@dc.dataclass
+class ControllerParameters:
+    """The path following controller.
+
+    Attributes:
+        law: Actuation model that the law is made for.
+        gains: Gains by law.
+        sampling_time: Sampling time ``T_s`` [s].
+        boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], for ``singular_perturbation``.
+        min_rcond: Smallest reciprocal condition number of the decoupling matrix.
+        max_alpha: End of the feasible neighbourhood for the controller, below 1.
+        brake_damping: Damping of the safe state on every drive, as a fraction of its
+            effort limit per rad/s.
+        effort_scale: Fraction of the model's effort limits that the law may use.
+        manifold: ``path``: path following; ``trajectory``: classical tracking of a point
+            that moves along the path with time, for comparison.
+        external_torque: What it knows of forces on the tool.
+    """
+
+    law: str = "elastic"
+    gains: dict[str, LawGains] = dc.field(default_factory=dict)
+    sampling_time: float = 1e-3
+    boundary_layer_damping: list[float] = dc.field(default_factory=list)
+    min_rcond: float = 1e-3
+    max_alpha: float = 0.95
+    brake_damping: float = 0.1
+    effort_scale: float = 1.0
+    manifold: str = "path"
+    external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
+
+    def __post_init__(self) -> None:
+        require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
+        require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
+        for law in self.gains:
+            require(law in RELATIVE_DEGREE, "gains", law, ", ".join(RELATIVE_DEGREE))
+        in_range = 1e-5 <= self.sampling_time <= 0.1
+        require(
+            in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"
+        )
+        require_positive("effort_scale", self.effort_scale)
+        require_not_negative("brake_damping", self.brake_damping)

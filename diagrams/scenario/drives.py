@@ -1,0 +1,66 @@
+"""What is between the law and the joints of a scenario's robot: servos and friction."""
+
+import dataclasses as dc
+
+import numpy as np
+
+from diagrams.scenario.checks import require, require_not_negative, require_positive
+
+
+@dc.dataclass
+class ServoParameters:
+    """Velocity controllers of the joints, behind the law ``velocity_servo``.
+
+    Attributes:
+        bandwidth: ``omega`` [rad/s], see :func:`~pfsc_drake.physics.velocity_servo.servo_gains`.
+        integral_rate: Rate at which loads are removed [rad/s]; 0 for no integral part,
+            negative for a quarter of the bandwidth.
+        period: Sampling time [s], a whole fraction of the controller's; 0 for the same.
+        bus_delay: Delay between law and servo [s], a multiple of the controller's
+            sampling time; 0 for none.
+    """
+
+    bandwidth: float = 200.0
+    integral_rate: float = -1.0
+    period: float = 0.0
+    bus_delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("bandwidth", self.bandwidth)
+        require(
+            bool(np.isfinite(self.integral_rate)),
+            "integral_rate",
+            self.integral_rate,
+            "a finite number",
+        )
+        require_not_negative("period", self.period)
+        require_not_negative("bus_delay", self.bus_delay)
+
+
+@dc.dataclass
+class JointFrictionParameters:
+    """Coulomb and viscous friction of the joints; empty for none.
+
+    Attributes:
+        f_c: Coulomb friction of every joint [Nm or N].
+        f_v: Viscous friction of every joint [Nm s/rad or N s/m].
+        file: Instead, name of a shipped robot or YAML file with robot parameters, whose
+            friction of the first joints is taken.
+    """
+
+    f_c: list[float] = dc.field(default_factory=list)
+    f_v: list[float] = dc.field(default_factory=list)
+    file: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("f_c", "f_v"):
+            values = getattr(self, key)
+            valid = all(np.isfinite(value) and value >= 0.0 for value in values)
+            require(valid, key, values, "finite numbers, none negative")
+        given = bool(self.f_c or self.f_v)
+        require(not (self.file and given), "file", self.file, "either file, or f_c and f_v")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there is any friction."""
+        return bool(self.f_c or self.f_v or self.file)

@@ -1,0 +1,80 @@
+"""The workpiece with a notch that a DELTA robot's ball runs in (Sec. 3.8.2)."""
+
+import dataclasses as dc
+
+from diagrams.scenario.checks import (
+    require,
+    require_not_negative,
+    require_numbers,
+    require_positive,
+)
+
+_STEPS = (1e-5, 1e-3)
+
+
+@dc.dataclass
+class BallParameters:
+    """A ball with a soft shell, held below the end-effector by a gripper.
+
+    Gripper, ball and force/torque sensor are the load of the robot's parameters.
+
+    Attributes:
+        radius: Radius [m].
+        distance: From the end-effector's centre E down to the ball's [m].
+        modulus: Elasticity of the shell, pressure per relative depth [Pa].
+        dissipation: Of Hunt and Crossley [s/m].
+        friction: Coulomb coefficient between ball and notch.
+        resolution: Edge length of the mesh that contact is computed with [m].
+    """
+
+    radius: float = 0.02
+    distance: float = 0.12
+    modulus: float = 1e6
+    dissipation: float = 1.0
+    friction: float = 0.2
+    resolution: float = 6e-3
+
+    def __post_init__(self) -> None:
+        for key in ("radius", "distance", "modulus", "resolution"):
+            require_positive(key, getattr(self, key))
+        for key in ("dissipation", "friction"):
+            require_not_negative(key, getattr(self, key))
+
+
+@dc.dataclass
+class NotchParameters:
+    """A rigid workpiece with a round-bottomed notch, and the ball that runs in it.
+
+    The path is where E is when the ball lies on the bottom of the notch of a workpiece that
+    stands where it stood when the path was taught.
+
+    Attributes:
+        ball: The ball.
+        displacement: Of the workpiece since then [m], axes of the inertial frame (z_0 down).
+        radius: Of the bottom [m], more than the ball's.
+        depth: From the rim down to the bottom [m], not less than ``radius``.
+        width: Of the workpiece across the notch [m].
+        time_step: Of the plant, a whole fraction of the controller's sampling time [s].
+    """
+
+    ball: BallParameters = dc.field(default_factory=BallParameters)
+    displacement: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    radius: float = 0.022
+    depth: float = 0.025
+    width: float = 0.07
+    time_step: float = 5e-4
+
+    def __post_init__(self) -> None:
+        require_numbers("displacement", self.displacement, 3)
+        require_positive("radius", self.radius)
+        require(self.radius > self.ball.radius, "radius", self.radius, "more than ball.radius")
+        require(self.depth >= self.radius, "depth", self.depth, "radius or more")
+        require(self.width > 2.0 * self.radius, "width", self.width, "more than twice the radius")
+        shortest, longest = _STEPS
+        allowed = f"{shortest:g} to {longest:g} s"
+        require(shortest <= self.time_step <= longest, "time_step", self.time_step, allowed)
+
+    @property
+    def clearance(self) -> float:
+        """From the bottom up to where the ball touches nothing, the notch's axis [m]."""
+        return self.radius - self.ball.radius

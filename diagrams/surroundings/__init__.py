@@ -1,0 +1,1 @@
+"""What surrounds a robot: hands, forces, workpieces."""

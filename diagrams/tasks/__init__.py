@@ -1,0 +1,1 @@
+"""Tasks in diagrams: manifold, law, reference, compliance."""

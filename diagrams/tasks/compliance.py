@@ -1,0 +1,85 @@
+"""Compliance: from forces on the tool to the reference of the law."""
+
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.errors import InputError
+from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
+from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
+
+# up to which derivative the filter knows the external reference, see ImpedanceLaw
+_DESIRED_ORDER = 4
+
+
+def reference_order(scenario: PathFollowingScenario, linearization: Linearization) -> int:
+    """Return the highest derivative of the external reference that is needed.
+
+    Args:
+        scenario: The scenario.
+        linearization: Of the law.
+
+    Raises:
+        InputError: If there is compliance that the law cannot have.
+    """
+    if not scenario.compliance.is_given:
+        return linearization.relative_degree
+    if linearization.time_driven:
+        raise InputError(
+            "compliance: controller.manifold = trajectory has no path coordinates that could "
+            "yield; must be path"
+        )
+    return max(linearization.relative_degree, _DESIRED_ORDER)
+
+
+def add_compliance(
+    builder: DiagramBuilder,
+    scenario: PathFollowingScenario,
+    linearization: Linearization,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add everything between the measured forces on the tool and the reference of the law.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario, with compliance.
+        linearization: Of the law that follows the reference.
+        ports: ``wrench_measured``, ``tared``, ``path_point``, ``manifold_state`` and
+            ``desired_reference`` with derivatives up to :func:`reference_order`.
+
+    Returns:
+        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``.
+
+    Raises:
+        InputError: If the compliance does not suit the law.
+    """
+    layout, period = linearization.layout, scenario.controller.sampling_time
+    law = ImpedanceLaw(
+        scenario.compliance.impedance(),
+        linearization.num_outputs,
+        linearization.relative_degree,
+        period,
+        desired_order=reference_order(scenario, linearization),
+    )
+    impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
+    transform = builder.AddNamedSystem(
+        "manifold_force_transform",
+        ManifoldForceTransform(layout, with_turning=scenario.compliance.with_turning),
+    )
+    reference = impedance.GetOutputPort("reference")
+    force = transform.GetOutputPort("manifold_force")
+    builder.Connect(ports["wrench_measured"], transform.GetInputPort("wrench"))
+    builder.Connect(ports["path_point"], transform.GetInputPort("path_point"))
+    if layout.oriented:
+        builder.Connect(reference, transform.GetInputPort("reference"))
+    builder.Connect(force, impedance.GetInputPort("manifold_force"))
+    builder.Connect(ports["tared"], impedance.GetInputPort("ready"))
+    for name in ("desired_reference", "manifold_state"):
+        builder.Connect(ports[name], impedance.GetInputPort(name))
+    desired = ports["desired_reference"]
+    return {
+        "reference": reference,
+        "desired_reference": desired,
+        "manifold_force": force,
+    }

@@ -1,0 +1,53 @@
+"""What the law is told about forces on the tool."""
+
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.external_torque import ExternalTorque
+from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+
+
+def needs_sensor(scenario: PathFollowingScenario) -> bool:
+    """Return whether something in the scenario acts on measured forces."""
+    measured = scenario.controller.external_torque.source == "measured"
+    return measured or scenario.compliance.is_given
+
+
+def add_external_torque(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    scenario: PathFollowingScenario,
+    controller: PathFollowingController,
+    ports: dict[str, OutputPort],
+) -> None:
+    """Tell the law the external torques in the joints, if it is to know them.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        scenario: The scenario.
+        controller: The controller.
+        ports: ``joint_state``, and of ``wrench_ext`` and ``wrench_measured`` what there is.
+
+    Raises:
+        InputError: If the law knows no external torques.
+    """
+    parameters = scenario.controller.external_torque
+    wrench = ports.get({"known": "wrench_ext", "measured": "wrench_measured"}[parameters.source])
+    degree = controller.relative_degree
+    if degree == 1:
+        raise InputError(
+            f"controller.external_torque.source = {parameters.source} with the law "
+            f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
+        )
+    if wrench is None:  # nothing acts on the tool
+        return
+    torque = builder.AddNamedSystem(
+        "external_torque",
+        ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
+    )
+    builder.Connect(wrench, torque.GetInputPort("wrench"))
+    builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
+    builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))

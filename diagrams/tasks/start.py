@@ -1,0 +1,124 @@
+"""The state in which a run starts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.robot.inverse_kinematics import solve_pose
+from pfsc_drake.robot.robot_model import gravity_function
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+
+
+@dataclass(frozen=True)
+class StartPoint:
+    """Where the tool starts, beside the path.
+
+    Attributes:
+        y_t: Tool point [m], shape (3,).
+        theta: Path parameter of the nearest point of the path.
+        R_e: Orientation of the tool, shape (3, 3), or None on paths without.
+    """
+
+    y_t: np.ndarray
+    theta: float
+    R_e: np.ndarray | None
+
+
+def start_point(
+    scenario: PathFollowingScenario, path: Path, shift: np.ndarray | None = None
+) -> StartPoint:
+    """Return where the tool starts.
+
+    Args:
+        scenario: The scenario.
+        path: Its path.
+        shift: Beyond the scenario's offset [m], shape (3,).
+
+    Raises:
+        InputError: If the start is outside the feasible neighbourhood.
+    """
+    start, eta = scenario.start, scenario.reference.points[0]
+    theta = path.arc_length.parameter(eta)
+    layout = PathPointLayout(2, path.orientation is not None)
+    on_path = path.evaluator(2).evaluate_at(theta)
+    sigma, slope = on_path[layout.position].reshape(-1, 3)[:2]
+    e_perp = on_path[layout.normal]
+    e_cross = np.cross(slope / np.linalg.norm(slope), e_perp)
+    y_t = sigma + start.offset[0] * e_perp + start.offset[1] * e_cross
+    if shift is not None:
+        y_t = y_t + shift
+    projection = path.projector.project(y_t.tolist(), theta)
+    if not (projection.converged and projection.alpha < scenario.controller.max_alpha):
+        raise InputError(
+            f"start.offset: {start.offset} m at eta = {eta:g} m, {np.round(y_t, 6).tolist()} m, is "
+            "outside the feasible neighbourhood of the path"
+            f", alpha = {projection.alpha:.3g}; alpha must be below "
+            f"{scenario.controller.max_alpha:g}"
+        )
+    R_e = None
+    if path.orientation is not None:
+        deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
+        R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
+    return StartPoint(y_t, projection.theta, R_e)
+
+
+def start_state(
+    scenario: PathFollowingScenario, path: Path, chain: SerialChain, coordinates: PlantCoordinates
+) -> tuple[np.ndarray, float]:
+    """Return the plant's state at rest beside the path, and the path parameter there.
+
+    Elastic joints carry the links' weight.
+
+    Args:
+        scenario: The scenario.
+        path: Its path.
+        chain: Its robot.
+        coordinates: Where the robot's coordinates stand in the plant's state.
+
+    Raises:
+        InputError: If the start is off the path's ends, outside the feasible
+            neighbourhood, or out of the robot's reach.
+    """
+    check_points(scenario.reference.points, path)
+    start = start_point(scenario, path)
+    q_J = solve_pose(
+        chain, start.y_t, start.R_e, _posture(scenario.start.posture_deg, chain), "start"
+    )
+    weight = np.array(gravity_function(chain)(q_J)).ravel()
+    rest = np.zeros(chain.dimension)
+    joint_state = np.concatenate([q_J, rest, q_J + weight / chain.K_s, rest])
+    return coordinates.plant_state(joint_state), start.theta
+
+
+def check_points(points: list[float], path: Path) -> None:
+    """Refuse arc lengths off the ends of an open path.
+
+    Args:
+        points: Arc lengths [m].
+        path: The path.
+
+    Raises:
+        InputError: If one is not on it.
+    """
+    rounding = 1e-9 * path.length
+    for eta in points:
+        if not path.closed and not -rounding <= eta <= path.length + rounding:
+            raise InputError(
+                f"reference.points: {eta:g} m; the path is open and {path.length:.6g} m long"
+            )
+
+
+def _posture(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
+    if not posture_deg:
+        lower, upper = chain.gather("position_limits").T
+        return np.nan_to_num((lower + upper) / 2.0)
+    if len(posture_deg) != chain.dimension:
+        raise InputError(
+            f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"
+        )
+    is_angle = np.array([link.is_revolute for link in chain.links])
+    return np.where(is_angle, np.deg2rad(posture_deg), posture_deg)

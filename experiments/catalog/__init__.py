@@ -1,0 +1,1 @@
+"""Shipped scenarios, and scenario files of a user's own."""

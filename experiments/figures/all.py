@@ -1,0 +1,76 @@
+"""The figures of a path following run, chosen by the signals that its log has."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import matplotlib
+
+from experiments.figures.coordinates import (
+    draw_angles,
+    draw_orientation,
+    draw_progress,
+    draw_transversal,
+)
+from experiments.figures.drives import draw_deflection, draw_efforts, draw_friction, draw_velocities
+from experiments.figures.forces import draw_forces, has_forces
+from experiments.figures.notch import draw_notch_position
+from experiments.figures.path import draw_path
+from experiments.figures.style import STYLE, Drawing, Figure, save_canvas
+from experiments.results.run_log import FloatArray, RunLog
+
+
+def write_figures(log: RunLog, path_points: FloatArray, directory: Path) -> list[Figure]:
+    """Writes all figures that the log has signals for.
+
+    Args:
+        log: Of a path following run.
+        path_points: [k, 3] m, points of the path in order, in the frame of ``y_t``.
+        directory: Folder for the PNG files; created if missing.
+
+    Returns:
+        The figures in the order of the report.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    figures = []
+    with matplotlib.rc_context(STYLE):
+        for drawing in draw_figures(log, path_points):
+            path = directory / f"{drawing.name}.png"
+            save_canvas(drawing.canvas, path)
+            figures.append(Figure(path, drawing.title, drawing.caption))
+    return figures
+
+
+def draw_figures(log: RunLog, path_points: FloatArray) -> Iterator[Drawing]:
+    """Draws all figures that the log has signals for, one after the other.
+
+    Args:
+        log: Of a path following run.
+        path_points: [k, 3] m, points of the path in order, in the frame of ``y_t``.
+    """
+    if log.time.size == 0:
+        return
+    if "y_t" in log:
+        yield draw_path(log, path_points)
+    for can_draw, draw in _FIGURES:
+        if can_draw(log):
+            yield draw(log)
+
+
+def _has(*signals: str) -> Callable[[RunLog], bool]:
+    """Condition that a log has these signals."""
+    return lambda log: all(signal in log for signal in signals)
+
+
+# In the order of the report: when a figure can be drawn, and what draws it.
+_FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
+    (_has("eta"), draw_progress),
+    (_has("xi"), draw_transversal),
+    (_has("phi"), draw_orientation),
+    (_has("angles_e", "angles_d"), draw_angles),
+    (has_forces, draw_forces),
+    (_has("notch_position"), draw_notch_position),
+    (_has("v_J"), draw_velocities),
+    (_has("tau_d"), draw_efforts),
+    (_has("tau_f", "v_J"), draw_friction),
+    (_has("q_M", "q_J"), draw_deflection),
+]

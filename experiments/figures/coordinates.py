@@ -1,0 +1,213 @@
+"""The coordinates of the path over time: along, across, and orientation."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from experiments.figures.forces import shade_pushes
+from experiments.figures.style import (
+    BROAD,
+    COLOURS,
+    INK,
+    REFERENCE,
+    Drawing,
+    draw_components,
+    draw_reference,
+    fitting_unit,
+    is_dwarfed,
+    largest,
+    late_samples,
+    make_panels,
+    place_legend,
+    scale_to_late,
+)
+from experiments.results.run_log import FloatArray, RunLog
+
+MILLI = 1e3
+FLOOR = 1e-9  # m or rad; zero has no place on a logarithmic axis
+SAME = 1e-6  # m; references nearer to each other are drawn as one
+MIN_SPAN = 2.0  # degrees, that an axis of angles shows at least
+
+
+def draw_progress(log: RunLog) -> Drawing:
+    """Tangential coordinate with its references, its error, how far it yields, and the speed."""
+    eta = log["eta"].values[:, 0]
+    reference = log["eta_p"].values[:, 0] if "eta_p" in log else None
+    desired = None
+    if reference is not None and "eta_d" in log:
+        desired = log["eta_d"].values[:, 0]
+        desired = desired if largest(reference - desired) > SAME else None
+    rows = 1 + (reference is not None) + (desired is not None) + ("eta_dot" in log)
+    canvas, panels = make_panels(rows)
+    position, *further = panels
+    if reference is not None:
+        position.plot(log.time, reference, label=r"$\eta^p$ (reference)", **BROAD)
+        error = further.pop(0)
+        scale, unit = fitting_unit(eta - reference, "m")
+        error.plot(log.time, scale * (eta - reference), color=COLOURS[1])
+        error.set(ylabel=f"error in {unit}", title=r"Tangential error $\eta - \eta^p$")
+    if reference is not None and desired is not None:
+        position.plot(log.time, desired, "--", color=INK, label=r"$\eta^d$ (desired)")
+        yielding = further.pop(0)
+        yielding.plot(log.time, MILLI * (reference - desired), color=COLOURS[2])
+        yielding.set(ylabel="way in mm", title=r"How far the reference yields $\eta^p - \eta^d$")
+    position.plot(log.time, eta, color=COLOURS[0], label=r"$\eta$")
+    position.set(ylabel="arc length in m", title="Position along the path")
+    if further:
+        speed = further.pop(0)
+        speed.plot(log.time, log["eta_dot"].values[:, 0], color=COLOURS[0])
+        speed.set(ylabel="speed in m/s", title=r"Speed along the path $\dot\eta$")
+    shade_pushes(panels, log)
+    place_legend(position)
+    shown = [
+        *(["its reference", "the error between them"] if reference is not None else []),
+        *(["how far the reference yields to forces"] if desired is not None else []),
+        *(["the speed"] if "eta_dot" in log else []),
+    ]
+    *first, last = ["Tangential coordinate", *shown]
+    separator = ", and " if len(first) > 1 else " and "
+    caption = f"{', '.join(first)}{separator}{last}." if first else f"{last}."
+    return Drawing("progress", "Progress along the path", caption, canvas)
+
+
+def draw_transversal(log: RunLog) -> Drawing:
+    """Transversal coordinates with references, the error or an enlargement, and log distances."""
+    xi = log["xi"].values
+    compliant = _is_used(log, "xi_p")
+    canvas, panels = make_panels(3 if compliant or is_dwarfed(log.time, xi) else 2)
+    labels = [r"$\xi_1$", r"$\xi_2$"][: xi.shape[1]]
+    error = _draw_with_references(panels[0], log, "xi", r"\xi", labels)
+    panels[0].set(ylabel="deviation in mm", title="Transversal coordinates")
+    if error is not None:
+        title = r"Error from the reference $\xi - \xi^p$"
+        _draw_enlarged(panels[1], log.time, error, "m", labels, title)
+    elif len(panels) == 3:
+        _draw_enlarged(panels[1], log.time, xi, "m", labels, "The same")
+    distances = {r"$\|\xi\|$": xi}
+    for name, label in (("xi_M", r"of the motors $\|\xi_M\|$"), ("xi_measured", "as measured")):
+        if name in log:
+            distances[label] = log[name].values
+    if error is not None:
+        distances[r"from the reference $\|\xi - \xi^p\|$"] = error
+    panels[-1].set(ylabel="distance in mm")
+    _draw_sizes(panels[-1], log.time, distances, "Distance from the path")
+    shade_pushes(panels, log)
+    place_legend(panels[0])
+    caption = (
+        "Transversal coordinates, enlarged where the start dwarfs the rest, and the distance from"
+        " the path on a logarithmic scale."
+        if error is None
+        else "Transversal coordinates over the reference that yields to forces (broad), what lies"
+        " between the two, and the distances on a logarithmic scale."
+    )
+    return Drawing("transversal", "Deviation from the path", caption, canvas)
+
+
+def draw_orientation(log: RunLog) -> Drawing:
+    """Orientation errors: components with references and, on a logarithmic scale, their norm."""
+    canvas, panels = make_panels(3 if _is_used(log, "phi_p") else 2)
+    labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
+    if log["phi"].dim != 3:
+        labels = log["phi"].labels
+    error = _draw_with_references(panels[0], log, "phi", r"\phi", labels)
+    name = "Orientation error" if error is None else "Orientation relative to the path"
+    panels[0].set(ylabel="angle in mrad", title=name)
+    sizes = {r"$\|\phi\|$": log["phi"].values}
+    if error is not None:
+        title = r"Error from the reference $\phi - \phi^p$"
+        _draw_enlarged(panels[1], log.time, error, "rad", labels, title)
+        sizes[r"from the reference $\|\phi - \phi^p\|$"] = error
+    panels[-1].set(ylabel="norm in mrad")
+    _draw_sizes(panels[-1], log.time, sizes, "Size of the angles")
+    shade_pushes(panels, log)
+    place_legend(panels[0])
+    caption = "ZYX angles of the tool against the orientation that belongs to its place"
+    caption += "." if error is None else ", over the reference that yields to torques (broad)."
+    return Drawing("orientation", name, caption, canvas)
+
+
+def draw_angles(log: RunLog) -> Drawing:
+    """ZYX angles of the tool over those of the reference orientation, a panel for each."""
+    tool, path = (np.rad2deg(log[name].values) for name in ("angles_e", "angles_d"))
+    canvas, panels = make_panels(tool.shape[1], height=1.9)
+    for column, (panel, axis) in enumerate(zip(panels, log["angles_e"].labels, strict=True)):
+        panel.plot(log.time, path[:, column], label=r"reference $R_d$", **BROAD)
+        panel.plot(log.time, tool[:, column], color=COLOURS[column], label=f"tool, about {axis}")
+        _keep_span(panel, MIN_SPAN)
+        panel.set(ylabel="angle in deg", title=f"Rotation about {axis}")
+    shade_pushes(panels, log)
+    # the tool has another colour in each panel
+    for panel in panels:
+        place_legend(panel)
+    caption = (
+        "ZYX angles of tool and reference in the world: the reference belongs to a point that"
+        " moves with time and runs on, whatever holds the tool."
+        if "tracking_error" in log
+        else "ZYX angles of tool and path in the world: the reference belongs to the place of the"
+        " tool on the path and waits where the tool waits."
+    )
+    return Drawing("angles", "Orientation of tool and reference", caption, canvas)
+
+
+def _is_used(log: RunLog, reference: str) -> bool:
+    """Whether a reference is in the log and anywhere other than zero, but for rounding."""
+    return reference in log and largest(log[reference].values) > FLOOR
+
+
+def _draw_with_references(
+    panel: Axes, log: RunLog, name: str, symbol: str, labels: list[str]
+) -> FloatArray | None:
+    """Draws a coordinate over the references that are not zero.
+
+    Args:
+        panel: Where to draw, in thousandths of the log's unit.
+        log: With signal ``name``, perhaps ``name_p`` and ``name_d``.
+        name: Of the coordinate.
+        symbol: The same in TeX.
+        labels: One per component.
+
+    Returns:
+        [samples, dim] error from the reference in the log's unit, None if that is zero.
+    """
+    values = log[name].values
+    error = None
+    panel.axhline(0.0, color=REFERENCE, linewidth=0.8)
+    if _is_used(log, f"{name}_p"):
+        reference = log[f"{name}_p"].values
+        draw_reference(panel, log.time, MILLI * reference, f"${symbol}^p$ (reference)")
+        error = values - reference
+    draw_components(panel, log.time, MILLI * values, labels)
+    if _is_used(log, f"{name}_d"):
+        desired = [f"{label} desired" for label in labels]
+        draw_components(panel, log.time, MILLI * log[f"{name}_d"].values, desired, "--")
+    return error
+
+
+def _draw_enlarged(
+    panel: Axes, time: FloatArray, values: FloatArray, unit: str, labels: list[str], title: str
+) -> None:
+    """Draws components scaled to the last three quarters of the run, and says so if it matters."""
+    scale, shown_unit = fitting_unit(values[late_samples(time)], unit)
+    panel.axhline(0.0, color=REFERENCE, linewidth=0.8)
+    draw_components(panel, time, scale * values, labels)
+    scale_to_late(panel, time, scale * values)
+    if is_dwarfed(time, values):
+        title += ", scaled to the last three quarters"
+    panel.set(ylabel=f"deviation in {shown_unit}", title=title)
+
+
+def _draw_sizes(panel: Axes, time: FloatArray, vectors: dict[str, FloatArray], title: str) -> None:
+    """Norms, in thousandths, on a logarithmic scale; the title names one, a legend several."""
+    panel.set_title(title if len(vectors) > 1 else f"{title} {next(iter(vectors))}")
+    for (label, values), colour in zip(vectors.items(), (INK, *COLOURS), strict=False):
+        norm = MILLI * np.maximum(np.linalg.norm(values, axis=1), FLOOR)
+        panel.semilogy(time, norm, color=colour, linewidth=1.2, label=label)
+    if len(vectors) > 1:
+        place_legend(panel)
+
+
+def _keep_span(panel: Axes, span: float) -> None:
+    """Widens an axis that shows less, so that rounding does not look like motion."""
+    low, high = panel.get_ylim()
+    if high - low < span:
+        centre = 0.5 * (low + high)
+        panel.set_ylim(centre - 0.5 * span, centre + 0.5 * span)

@@ -1,0 +1,183 @@
+"""The drives over time: velocities, torques or forces, friction, deflection.
+
+Rotary drives have joints, velocities in rad/s and torques in Nm; linear ones have slides, m/s and
+forces in N. The words follow the units of the signals.
+"""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from experiments.figures.style import (
+    ALERT,
+    COLOURS,
+    REFERENCE,
+    Drawing,
+    draw_components,
+    is_dwarfed,
+    largest,
+    make_panels,
+    place_legend,
+    scale_to_late,
+    shade,
+)
+from experiments.results.run_log import RunLog
+
+MILLI = 1e3
+AT_REST = 0.01  # share of an axis' largest velocity, below which it counts as at rest
+PEAK_RATIO = 4.0  # first peak to the rest of the run, from which on the rest is drawn enlarged
+_EFFORTS = {"Nm": "torque", "N": "force"}
+_EFFORT_TITLES = {"Nm": "torques", "N": "forces"}
+_MOVERS = {"rad/s": "joint", "m/s": "slide"}
+_MILLI_UNITS = {"rad": "mrad", "m": "mm"}
+
+
+def draw_velocities(log: RunLog) -> Drawing:
+    """Velocities of joints or slides and of motors, and their difference where both are logged."""
+    signals = {name: log[name] for name in ("v_J", "v_M") if name in log}
+    mover = _MOVERS.get(signals["v_J"].unit, "joint and slide")
+    titles = {
+        "v_J": f"{mover.capitalize()} velocities " + r"$\dot q_J$",
+        "v_M": r"Motor velocities $\dot q_M$",
+    }
+    both = len(signals) == 2
+    canvas, panels = make_panels(len(signals) + both)
+    for panel, (name, signal) in zip(panels, signals.items(), strict=False):
+        draw_components(panel, log.time, signal.values, _axis_labels(signal.dim))
+        panel.set(ylabel=f"velocity in {signal.unit}", title=titles[name])
+    place_legend(panels[0])
+    if not both:
+        title = f"{mover.capitalize()} velocities"
+        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}.", canvas)
+    difference = log["v_M"].values - log["v_J"].values
+    draw_components(panels[2], log.time, difference, _axis_labels(difference.shape[1]))
+    title = r"Difference $\dot q_M - \dot q_J$"
+    panels[2].set(ylabel=f"velocity in {log['v_M'].unit}", title=title)
+    caption = "They differ through the elastic transmissions, where the load on them changes."
+    return Drawing("velocities", f"{mover.capitalize()} and motor velocities", caption, canvas)
+
+
+def draw_efforts(log: RunLog) -> Drawing:
+    """Drive torques or forces, three axes per panel, with limits near enough to matter (dashed).
+
+    Where a short peak flattens everything else, a second panel shows the rest enlarged.
+    """
+    signal = log["tau_d"]
+    title = f"Drive {_EFFORT_TITLES.get(signal.unit, 'torques and forces')}"
+    groups = [range(i, min(i + 3, signal.dim)) for i in range(0, signal.dim, 3)]
+    dwarfed = [is_dwarfed(log.time, signal.values[:, group], PEAK_RATIO) for group in groups]
+    canvas, panels = make_panels(len(groups) + sum(dwarfed), height=2.6)
+    labels = _axis_labels(signal.dim)
+    places = iter(panels)
+    for group, enlarge in zip(groups, dwarfed, strict=True):
+        panel = next(places)
+        _draw_group(panel, log, group, labels)
+        axes = f"axes {group[0] + 1} to {group[-1] + 1}" if len(group) > 1 else labels[group[0]]
+        panel.set(ylabel=_effort_label(signal.unit), title=f"{title}, {axes}")
+        place_legend(panel)
+        if enlarge:
+            panel = next(places)
+            values = signal.values[:, group]
+            for axis in group:
+                panel.plot(log.time, signal.values[:, axis], color=COLOURS[axis % len(COLOURS)])
+            scale_to_late(panel, log.time, values)
+            enlarged = "The same, scaled to the last three quarters"
+            panel.set(ylabel=_effort_label(signal.unit), title=enlarged)
+    caption = f"{title.removeprefix('Drive ').capitalize()} of the drives"
+    limited = any(_nears_limit(log, axis) for axis in range(signal.dim))
+    caption += "; dashed lines are limits within reach." if limited else "."
+    name = title.lower().replace(" ", "_")
+    return Drawing(name, title, caption, canvas)
+
+
+def draw_friction(log: RunLog) -> Drawing:
+    """Friction of each drive over the velocity that it acts on; both zeros at one height."""
+    friction = log["tau_f"]
+    motors = "v_M" in log
+    velocity = log["v_M" if motors else "v_J"]
+    mover = "motor" if motors else _MOVERS.get(velocity.unit, "joint or slide")
+    word = _EFFORTS.get(friction.unit, "torque or force")
+    canvas, panels = make_panels(friction.dim, height=2.0)
+    for axis, panel in enumerate(panels):
+        v, tau_f = velocity.values[:, axis], friction.values[:, axis]
+        right = panel.twinx()
+        right.fill_between(log.time, v, color="#9CA3AF", alpha=0.35, linewidth=0.0)
+        right.plot(log.time, v, color=REFERENCE, linewidth=1.0)
+        right.set(ylabel=f"{mover} velocity\nin {velocity.unit}")
+        right.grid(visible=False)
+        right.spines["right"].set_visible(True)
+        # the twin is drawn above; friction belongs on top
+        panel.set_zorder(right.get_zorder() + 1)
+        panel.patch.set_visible(False)
+        panel.plot(log.time, tau_f, color=COLOURS[1], label=f"friction {word} (left)")
+        panel.plot([], [], color=REFERENCE, linewidth=1.0, label=f"{mover} velocity (right)")
+        shade(
+            [panel],
+            log.time,
+            np.abs(v) < AT_REST * largest(v),
+            "nearly at rest",
+            "#FDE9C4",
+        )
+        for axes, values in ((panel, tau_f), (right, v)):
+            span = 1.15 * largest(values)
+            if span > 0.0:
+                axes.set_ylim(-span, span)
+        panel.set(ylabel=_effort_label(friction.unit), title=f"Axis {axis + 1}")
+    place_legend(panels[0])
+    caption = (
+        f"Friction over the velocity that it acts on. Nearly at rest, below {100 * AT_REST:g} % of"
+        f" its top speed, a drive sticks: there the friction {word} goes from one sign to the other"
+        " without motion."
+    )
+    return Drawing("friction", "Friction of the drives", caption, canvas)
+
+
+def draw_deflection(log: RunLog) -> Drawing:
+    """Deflection of the elastic joints."""
+    canvas, (panel,) = make_panels(1, height=3.2)
+    deflection = MILLI * (log["q_M"].values - log["q_J"].values)
+    panel.axhline(0.0, color=REFERENCE, linewidth=0.8)
+    draw_components(panel, log.time, deflection, _axis_labels(deflection.shape[1]))
+    unit = _MILLI_UNITS.get(log["q_M"].unit, "mrad or mm")
+    panel.set(ylabel=f"deflection in {unit}", title=r"Deflection $q_M - q_J$")
+    place_legend(panel)
+    caption = "Deflection of the elastic transmissions, motor coordinate less joint coordinate."
+    return Drawing("deflection", "Joint deflection", caption, canvas)
+
+
+def _axis_labels(count: int) -> list[str]:
+    """Labels ``axis 1`` and so on."""
+    return [f"axis {i + 1}" for i in range(count)]
+
+
+def _effort_label(unit: str) -> str:
+    """Label of an axis, in two lines where drives are of both kinds."""
+    return f"{_EFFORTS[unit]} in {unit}" if unit in _EFFORTS else f"torque or force\nin {unit}"
+
+
+def _plural(words: str) -> str:
+    """``joints and slides`` of ``joint and slide``."""
+    return " and ".join(f"{word}s" for word in words.split(" and "))
+
+
+def _draw_group(panel: Axes, log: RunLog, group: range, labels: list[str]) -> None:
+    """The torques or forces of some axes with their limits."""
+    signal = log["tau_d"]
+    for axis in group:
+        colour = COLOURS[axis % len(COLOURS)]
+        effort = signal.values[:, axis]
+        panel.plot(log.time, effort, color=colour, label=labels[axis])
+        if signal.limits is not None and _nears_limit(log, axis):
+            limit = float(signal.limits[axis])
+            at_limit = largest(effort) >= limit * (1.0 - 1e-9)
+            for level in (-limit, limit):
+                panel.axhline(
+                    level, linestyle="--", color=ALERT if at_limit else colour, linewidth=1.0
+                )
+
+
+def _nears_limit(log: RunLog, axis: int) -> bool:
+    """Whether a drive comes within a factor of two of its limit."""
+    signal = log["tau_d"]
+    if signal.limits is None or not np.isfinite(signal.limits[axis]):
+        return False
+    return largest(signal.values[:, axis]) >= 0.5 * float(signal.limits[axis])

@@ -1,0 +1,267 @@
+"""How the project's figures look: colours, sizes, grid, panels, and the file a figure becomes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
+from numpy.typing import ArrayLike, NDArray
+
+from experiments.results.run_log import FloatArray
+
+matplotlib.use("Agg")
+
+# Okabe and Ito's palette: told apart with any colour vision, and in this order by lightness.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
+REFERENCE = "#6B7280"
+INK = "#1F2937"
+GRID = "#E5E7EB"
+ALERT = "#B91C1C"
+
+# A reference, drawn first: what follows it stays visible on top, and where it does not.
+BROAD: dict[str, Any] = {"color": "#9CA3AF", "linewidth": 4.0, "alpha": 0.6}
+
+WIDTH = 9.0  # inches; at DPI 200 the page shows it at half size on screens of double density
+DPI = 200
+TITLE_SIZE, LEGEND_SIZE = 11.0, 10.0  # points
+LINE_WIDTH = 560.0  # points, what title and legend share above a panel
+MICRO_BELOW = 1e-4  # m or rad
+
+STYLE: Any = {  # Any: matplotlib's own type of the keys changes with its version
+    "axes.edgecolor": "#9CA3AF",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 11,
+    "axes.linewidth": 0.8,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": TITLE_SIZE,
+    "axes.titleweight": "bold",
+    "axes.xmargin": 0.01,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": DPI,
+    "font.size": 11,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "legend.fontsize": LEGEND_SIZE,
+    "legend.frameon": True,
+    "legend.framealpha": 0.9,
+    "legend.edgecolor": "none",
+    "lines.linewidth": 1.6,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 10,
+    "ytick.labelsize": 10,
+}
+
+
+@dataclass
+class Figure:
+    """A figure as written.
+
+    Attributes:
+        path: PNG file.
+        title: A few words.
+        caption: What to see in it, one or two sentences.
+    """
+
+    path: Path
+    title: str
+    caption: str
+
+
+@dataclass
+class Drawing:
+    """A figure as drawn.
+
+    Attributes:
+        name: Of its file, without suffix.
+        title: A few words.
+        caption: What to see in it, one or two sentences.
+        canvas: The drawing.
+    """
+
+    name: str
+    title: str
+    caption: str
+    canvas: Canvas
+
+
+def make_panels(count: int, height: float = 2.3) -> tuple[Canvas, list[Axes]]:
+    """A canvas with panels one above the other on a common time axis.
+
+    Args:
+        count: Number of panels.
+        height: Height of one panel [inches].
+
+    Returns:
+        The canvas and its panels from top to bottom.
+    """
+    canvas = Canvas(figsize=(WIDTH, height * count + 0.5))
+    panels = canvas.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    panels[-1].set_xlabel("time in s")
+    return canvas, list(panels)
+
+
+def draw_components(
+    panel: Axes, time: ArrayLike, values: ArrayLike, labels: list[str], style: str = "-"
+) -> None:
+    """Draws the columns of a signal, always in the same colours.
+
+    Args:
+        panel: Where to draw.
+        time: [samples] s.
+        values: [samples, dim] in the panel's unit.
+        labels: One per column.
+        style: Line style.
+    """
+    for index, (column, label) in enumerate(zip(np.asarray(values).T, labels, strict=True)):
+        panel.plot(time, column, style, color=COLOURS[index % len(COLOURS)], label=label)
+
+
+def draw_reference(panel: Axes, time: ArrayLike, values: ArrayLike, label: str) -> None:
+    """Draws the columns of a reference broad and pale, each in its component's colour.
+
+    Args:
+        panel: Where to draw, before what follows the reference.
+        time: [samples] s.
+        values: [samples, dim] in the panel's unit.
+        label: One entry of the legend for all columns, in grey.
+    """
+    for index, column in enumerate(np.asarray(values).T):
+        panel.plot(time, column, **BROAD | {"color": COLOURS[index % len(COLOURS)], "alpha": 0.3})
+    panel.add_line(Line2D([], [], **BROAD, label=label))
+
+
+def shade(
+    panels: list[Axes], time: FloatArray, where: ArrayLike, label: str, colour: str, hatch: str = ""
+) -> None:
+    """Shades the times at which something holds, from sample to sample.
+
+    Args:
+        panels: All of them are shaded; the first gets an entry for the legend.
+        time: [samples] s.
+        where: [samples] bool.
+        label: What holds.
+        colour: Of the shade.
+        hatch: Pattern, where colour alone could be mistaken.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(where, dtype=int), [0]])))
+    spans = edges.reshape(-1, 2)
+    for panel in panels:
+        for number, (first, after) in enumerate(spans):
+            panel.axvspan(
+                time[first],
+                time[min(after, len(time) - 1)],
+                facecolor=colour,
+                edgecolor="#9CA3AF" if hatch else "none",
+                linewidth=0.0,
+                alpha=0.45,
+                hatch=hatch,
+                zorder=0.5,
+                label=label if panel is panels[0] and number == 0 else None,
+            )
+
+
+def late_samples(time: FloatArray) -> NDArray[np.bool_]:
+    """Which samples are of the last three quarters of a run, [samples] bool.
+
+    Args:
+        time: [samples] s.
+    """
+    return np.asarray(time >= time[0] + 0.25 * (time[-1] - time[0]))
+
+
+def scale_to_late(panel: Axes, time: FloatArray, values: FloatArray) -> None:
+    """Scales a panel, zero in the middle, to the last three quarters of what it shows.
+
+    Args:
+        panel: To scale.
+        time: [samples] s.
+        values: [samples, dim] in the panel's unit.
+    """
+    span = 1.2 * largest(values[late_samples(time)])
+    if span > 0.0:
+        panel.set_ylim(-span, span)
+
+
+def is_dwarfed(time: FloatArray, values: FloatArray, ratio: float = 1.2) -> bool:
+    """Whether the last three quarters of a run are dwarfed by what comes before.
+
+    Args:
+        time: [samples] s.
+        values: [samples, dim] in any unit.
+        ratio: Of the largest magnitudes, from which on it counts.
+    """
+    return 0.0 < ratio * largest(values[late_samples(time)]) < largest(values)
+
+
+def largest(values: FloatArray) -> float:
+    """Largest finite magnitude, 0 of none.
+
+    Args:
+        values: Any shape.
+    """
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+
+
+def fitting_unit(values: FloatArray, unit: str) -> tuple[float, str]:
+    """Milli, or micro where milli would leave nothing but decimals.
+
+    Args:
+        values: Any shape, in ``unit``.
+        unit: Unit of the values.
+
+    Returns:
+        Factor from ``unit`` to the one for the axis, and its name.
+    """
+    return (1e6, f"µ{unit}") if 0.0 < largest(values) < MICRO_BELOW else (1e3, f"m{unit}")
+
+
+def place_legend(panel: Axes, columns: int | None = None) -> None:
+    """Legend above the panel's right end, and above its title too where both are long.
+
+    Args:
+        panel: Whose legend; titles and lines are there already.
+        columns: Number of columns, by default all entries in one row.
+    """
+    labels = panel.get_legend_handles_labels()[1]
+    entries = sum(_text_width(label, LEGEND_SIZE) + 3.8 * LEGEND_SIZE for label in labels)
+    title = panel.get_title("left") or panel.get_title()
+    beside = entries + _text_width(title, TITLE_SIZE, "bold") < LINE_WIDTH
+    panel.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns or len(labels),
+        borderaxespad=0.1 if beside else 2.0,
+        handlelength=1.6,
+        columnspacing=1.4,
+    )
+
+
+def _text_width(text: str, size: float, weight: str = "normal") -> float:
+    """Width of a line of text [points]."""
+    if not text:
+        return 0.0
+    font = FontProperties(weight=weight)
+    return float(TextPath((0.0, 0.0), text, size=size, prop=font).get_extents().width)
+
+
+def save_canvas(canvas: Canvas, path: Path) -> None:
+    """Writes a canvas as PNG.
+
+    Args:
+        canvas: To write.
+        path: PNG file.
+    """
+    canvas.align_ylabels()
+    canvas.savefig(path, dpi=DPI, facecolor="white")

@@ -1,0 +1,154 @@
+"""Several runs on one page."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from experiments.figures.style import (
+    COLOURS,
+    STYLE,
+    Figure,
+    make_panels,
+    place_legend,
+    save_canvas,
+)
+from experiments.pages.report import write_report
+from experiments.results.metrics import Metrics
+from experiments.results.run_log import RunLog
+from pfsc_drake.errors import InputError
+
+_COMPARED = (
+    "max_path_deviation",
+    "max_error_from_compliant_reference",
+    "max_tangential_error",
+    "max_orientation_error",
+    "max_external_force",
+)
+
+
+def write_comparison(folders: Sequence[Path], out: Path) -> Path:
+    """Write a page that shows what differs between runs.
+
+    Args:
+        folders: Folders of two or more runs.
+        out: Folder for the page.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: If a folder holds no run, or fewer than two are given.
+    """
+    if len(folders) < 2:
+        raise InputError(f"compare: {len(folders)} run given; two or more are needed")
+    logs = {folder.name: RunLog.read(folder / "log.h5") for folder in folders}
+    if len(logs) < len(folders):
+        raise InputError("compare: the folders' names must differ; they are the runs' names here")
+    metrics = Metrics()
+    for folder in folders:
+        own = Metrics.read(folder / "metrics.json")
+        for name in _COMPARED:
+            if name in own:
+                metrics.add(f"{folder.name}: {name}", own[name].value, own[name].unit)
+    pictures = out / "figures"
+    pictures.mkdir(parents=True, exist_ok=True)
+    figures = [_deviations(logs, pictures)]
+    if all("angles_e" in log for log in logs.values()):
+        figures.append(_orientations(logs, pictures))
+    if all("orientation_lead" in log for log in logs.values()):
+        figures.append(_leads(logs, pictures))
+    if all("wrench_ext" in log for log in logs.values()):
+        figures.append(_forces(logs, pictures))
+    first = next(iter(logs.values()))
+    return write_report(
+        out,
+        title=" against ".join(logs),
+        description="The same motion, side by side.",
+        scenario_yaml_text="\n---\n".join(
+            (folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders
+        ),
+        metrics=metrics,
+        figures=figures,
+        log_attributes={k: v for k, v in first.attributes.items() if k != "scenario"},
+    )
+
+
+def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas, (above, below) = make_panels(2)
+        for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
+            distance = np.linalg.norm(log["xi"].values, axis=1) * 1e3
+            above.plot(log.time, distance, color=colour, label=name)
+            error = (log["eta"].values - log["eta_p"].values)[:, 0] * 1e3
+            below.plot(log.time, error, color=colour)
+        above.set(title="Distance from the path", ylabel="distance in mm")
+        below.set(title="Error along the path", ylabel="error in mm")
+        place_legend(above)
+        save_canvas(canvas, folder / "deviations.png")
+    caption = "Distance from the path and error along it."
+    return Figure(folder / "deviations.png", "Deviations", caption)
+
+
+def _leads(logs: dict[str, RunLog], folder: Path) -> Figure:
+    caption = (
+        "Angle between the orientation that each law asks for and the one that belongs to the "
+        "tool's place on the path: zero where the reference waits."
+    )
+    return _draw_one(
+        {name: np.rad2deg(log["orientation_lead"].values[:, 0]) for name, log in logs.items()},
+        logs,
+        "angle in deg",
+        "Reference orientation ahead of the tool's place",
+        Figure(folder / "orientation_lead.png", "Waiting or running on", caption),
+    )
+
+
+def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:
+    caption = "Size of the force that acts on the tool, not what the sensor makes of it."
+    return _draw_one(
+        {
+            name: np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
+            for name, log in logs.items()
+        },
+        logs,
+        "force in N",
+        "Force on the tool",
+        Figure(folder / "forces.png", "Forces", caption),
+    )
+
+
+def _draw_one(
+    signals: dict[str, np.ndarray], logs: dict[str, RunLog], ylabel: str, title: str, figure: Figure
+) -> Figure:
+    """Draw one signal of every run in one panel, into the figure's file."""
+    with plt.rc_context(STYLE):
+        canvas, (panel,) = make_panels(1)
+        for colour, (name, values) in zip(COLOURS, signals.items(), strict=False):
+            panel.plot(logs[name].time, values, color=colour, label=name)
+        panel.set(title=title, ylabel=ylabel)
+        place_legend(panel)
+        save_canvas(canvas, figure.path)
+    return figure
+
+
+def _orientations(logs: dict[str, RunLog], folder: Path) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas, panels = make_panels(3)
+        for i, (panel, axis) in enumerate(zip(panels, "zyx", strict=True)):
+            for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
+                for signal, style, what in (
+                    ("angles_e", "-", "tool"),
+                    ("angles_d", "--", "reference"),
+                ):
+                    angle = np.rad2deg(log[signal].values[:, i])
+                    panel.plot(log.time, angle, style, color=colour, label=f"{name}, {what}")
+            panel.set(title=f"Angle about {axis}", ylabel="angle in deg")
+        place_legend(panels[0], columns=2)
+        save_canvas(canvas, folder / "orientations.png")
+    caption = (
+        "Tool and the reference that each law compares it with. With path following the "
+        "reference waits while the tool is held back; with trajectory tracking it runs on."
+    )
+    return Figure(folder / "orientations.png", "Orientation", caption)

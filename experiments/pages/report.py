@@ -1,0 +1,197 @@
+"""The report of a run: one self-contained HTML page."""
+
+import base64
+import os
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from string import Template
+from urllib.parse import quote
+
+from experiments.figures.style import Figure
+from experiments.results.metrics import Metric, Metrics
+from experiments.results.units import NARROW_SPACE, format_quantity
+
+TEMPLATE = Path(__file__).resolve().parent / "report_template.html"
+MAX_CARDS = 8
+
+_SYMBOLS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥"}
+
+
+def write_report(
+    directory: Path,
+    title: str,
+    description: str,
+    scenario_yaml_text: str,
+    metrics: Metrics,
+    figures: Sequence[Figure],
+    log_attributes: Mapping[str, str],
+    recording: Path | None = None,
+    fault: str | None = None,
+    warnings: Sequence[str] = (),
+    diagram_svg: str | None = None,
+) -> Path:
+    """Writes ``report.html``; figures and diagram are inside, only the recording is beside it.
+
+    Args:
+        directory: Folder of the run; created if missing.
+        title: Name of the scenario.
+        description: What was run, plain text.
+        scenario_yaml_text: The scenario as resolved.
+        metrics: All of them. Those with a target become cards, or the first few if none has one.
+        figures: In reading order; their files must exist.
+        log_attributes: What identifies the run, see :mod:`experiments.results.provenance`.
+        recording: Meshcat page, linked by its path relative to ``directory``.
+        fault: Why the run was stopped; None if it completed.
+        warnings: What may not have gone as well as hoped, one sentence each.
+        diagram_svg: The block diagram as SVG text.
+
+    Returns:
+        Path of the page.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    page = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        title=escape(title),
+        description=escape(description.strip()),
+        badges=_badges(metrics, fault),
+        fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
+        warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
+        cards=_cards(metrics),
+        recording=_recording(recording, directory),
+        figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
+        table=_table(metrics),
+        details=_details(scenario_yaml_text, diagram_svg),
+        attributes="\n".join(
+            f"<div><dt>{escape(_spoken(name))}</dt><dd>{escape(value)}</dd></div>"
+            for name, value in log_attributes.items()
+        ),
+    )
+    path = directory / "report.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def _section(heading: str, content: str) -> str:
+    """A section with heading, nothing without content."""
+    return f"<section>\n<h2>{heading}</h2>\n{content}\n</section>" if content else ""
+
+
+def _badges(metrics: Metrics, fault: str | None) -> str:
+    """How the run ended, and how many targets were met."""
+    status = (
+        '<span class="badge bad">✗ stopped by fault</span>'
+        if fault
+        else '<span class="badge good">✓ completed</span>'
+    )
+    verdicts = [metric.passed for metric in metrics.values() if metric.passed is not None]
+    if not verdicts:
+        return status
+    kind = "good" if all(verdicts) else "bad"
+    return (
+        f'{status}<span class="badge {kind}">{sum(verdicts)} of {len(verdicts)} targets met</span>'
+    )
+
+
+def _cards(metrics: Metrics) -> str:
+    """The metrics to look at first."""
+    chosen = [name for name, metric in metrics.items() if metric.target is not None]
+    cards = [_card(name, metrics[name]) for name in (chosen or list(metrics))[:MAX_CARDS]]
+    return _section("Key results", f'<div class="cards">{"".join(cards)}</div>' if cards else "")
+
+
+def _card(name: str, metric: Metric) -> str:
+    """One metric, large."""
+    verdict = " ".join(part for part in (_mark(metric), _target(metric)) if part)
+    return (
+        f'<div class="card"><div class="name">{escape(_spoken(name, metric.unit))}</div>'
+        f'<div class="value">{_value(metric)}</div><div class="verdict">{verdict}</div></div>\n'
+    )
+
+
+def _table(metrics: Metrics) -> str:
+    """All metrics."""
+    rows = "\n".join(
+        f"<tr><td>{escape(_spoken(name, metric.unit))}<br><code>{escape(name)}</code></td>"
+        f'<td class="number">{_value(metric)}</td><td class="target">{_target(metric)}</td>'
+        f"<td>{_mark(metric)}</td><td>{escape(metric.source or '')}</td></tr>"
+        for name, metric in metrics.items()
+    )
+    head = (
+        '<tr><th>Metric</th><th class="number">Value</th><th>Target</th><th>Met</th>'
+        "<th>Source</th></tr>"
+    )
+    table = (
+        f'<div class="scroll"><table><thead>{head}</thead><tbody>\n{rows}\n</tbody></table></div>'
+    )
+    return _section("All metrics", table if metrics else "")
+
+
+def _value(metric: Metric) -> str:
+    """The value with unit."""
+    return escape(format_quantity(metric.value, metric.unit))
+
+
+def _target(metric: Metric) -> str:
+    """The target in the unit of the metric, as text where it is no comparison."""
+    if metric.bound is None:
+        return escape(metric.target or "")
+    comparison, number = metric.bound
+    return escape(f"{_SYMBOLS[comparison]}{NARROW_SPACE}{format_quantity(number, metric.unit)}")
+
+
+def _mark(metric: Metric) -> str:
+    """Whether the target is met, by sign, word and colour."""
+    if metric.passed is None:
+        return ""
+    kind, text = ("good", "✓ met") if metric.passed else ("bad", "✗ missed")
+    return f'<span class="mark {kind}">{text}</span>'
+
+
+def _figure(figure: Figure) -> str:
+    """A figure, inside the page."""
+    encoded = base64.b64encode(figure.path.read_bytes()).decode("ascii")
+    return (
+        f'<figure><div class="sheet"><img src="data:image/png;base64,{encoded}"'
+        f' alt="{escape(figure.title)}"></div>'
+        f"<figcaption><strong>{escape(figure.title)}.</strong> {escape(figure.caption)}"
+        "</figcaption></figure>"
+    )
+
+
+def _recording(recording: Path | None, directory: Path) -> str:
+    """The recording in a frame, with a link for a window of its own."""
+    if recording is None:
+        return ""
+    link = quote(Path(os.path.relpath(recording, directory)).as_posix())
+    return _section(
+        "Recording",
+        f'<figure><iframe src="{link}" title="Recording of the robot" loading="lazy"'
+        " allowfullscreen></iframe>"
+        '<p class="hint">Drag to turn, scroll to zoom; play, pause and scrub under'
+        f' <em>Animations</em> in the controls. <a href="{link}" target="_blank">Open the recording'
+        " in a tab of its own</a> (keep the file beside this page).</p></figure>",
+    )
+
+
+def _details(scenario_yaml_text: str, diagram_svg: str | None) -> str:
+    """What was run in full: scenario and block diagram, folded."""
+    blocks = [
+        f"<details><summary>Scenario as resolved</summary><pre>{escape(scenario_yaml_text)}</pre>"
+        "</details>"
+    ]
+    if diagram_svg:
+        # As an image nothing inside the SVG can act on the page.
+        encoded = base64.b64encode(diagram_svg.encode("utf-8")).decode("ascii")
+        blocks.append(
+            '<details><summary>Block diagram</summary><div class="diagram">'
+            f'<img src="data:image/svg+xml;base64,{encoded}" alt="Block diagram"></div></details>'
+        )
+    return _section("What was run", "\n".join(blocks))
+
+
+def _spoken(name: str, unit: str = "") -> str:
+    """``controller_tick_us_p99`` in ``us`` as ``Controller tick p99``; a torque in N is a force."""
+    words = " ".join(word for word in name.split("_") if word and word != unit)
+    if unit == "N":
+        words = words.replace("torque", "force")
+    return words[:1].upper() + words[1:]

@@ -1,0 +1,174 @@
+"""The log of one run: named signals over time, kept in one HDF5 file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pfsc_drake.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class Signal:
+    """A sampled signal with its unit and a name for each component.
+
+    Attributes:
+        values: [samples, dim] in ``unit``; a vector [samples] becomes one column.
+        unit: Unit of all components, e.g. ``"m"``; ``"1"`` without unit.
+        labels: One name per column. A signal of names (``mode``) has one integer column
+            and a label per *value* instead.
+        limits: Optional [dim], magnitude of the admissible range, in ``unit``.
+    """
+
+    values: FloatArray
+    unit: str
+    labels: list[str]
+    limits: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        self.values = _as_columns(self.values)
+        if self.limits is not None:
+            self.limits = np.broadcast_to(
+                np.asarray(self.limits, dtype=float), (self.values.shape[1],)
+            ).copy()
+
+    @property
+    def dim(self) -> int:
+        """Number of components."""
+        return int(self.values.shape[1])
+
+
+@dataclass
+class RunLog:
+    """All signals of one run on one time axis.
+
+    ``log["xi"]`` is the signal ``xi``; ``"xi" in log`` tells whether the run had it.
+
+    Attributes:
+        time: [samples] s.
+        signals: By name, as listed in :meth:`write`; each has as many samples as ``time``.
+        attributes: What identifies the run, see ``provenance.standard_attributes``.
+    """
+
+    time: FloatArray
+    signals: dict[str, Signal] = field(default_factory=dict)
+    attributes: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.time = np.asarray(self.time, dtype=float).reshape(-1)
+        for name, signal in self.signals.items():
+            self._check(name, signal)
+
+    def __getitem__(self, name: str) -> Signal:
+        try:
+            return self.signals[name]
+        except KeyError:
+            raise KeyError(
+                f"log has no signal {name!r}; it has: {', '.join(self.signals)}"
+            ) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def add(
+        self,
+        name: str,
+        values: ArrayLike,
+        unit: str,
+        labels: list[str] | None = None,
+        limits: ArrayLike | None = None,
+    ) -> Signal:
+        """Adds a signal and returns it.
+
+        Args:
+            name: Name in the log, e.g. ``"q_J"``.
+            values: [samples, dim] or [samples], in ``unit``.
+            unit: Unit of all components.
+            labels: One name per column; by default the name itself, numbered from 1 if dim > 1.
+            limits: [dim] or scalar, magnitude of the admissible range, in ``unit``.
+
+        Returns:
+            The signal that was added.
+        """
+        columns = _as_columns(values)
+        if labels is None:
+            dim = columns.shape[1]
+            labels = [name] if dim == 1 else [f"{name}_{i + 1}" for i in range(dim)]
+        signal = Signal(
+            columns, unit, labels, None if limits is None else np.asarray(limits, dtype=float)
+        )
+        self._check(name, signal)
+        self.signals[name] = signal
+        return signal
+
+    def write(self, path: Path) -> None:
+        """Writes the log as HDF5.
+
+        Dataset ``t`` [s] and one dataset [samples, dim] per signal with attributes ``unit``,
+        ``labels`` and, where known, ``limits``; ``attributes`` become the root's attributes.
+
+        Args:
+            path: File to write; its directory must exist. An existing file is replaced.
+        """
+        with h5py.File(path, "w") as file:
+            file.attrs.update(self.attributes)
+            file.create_dataset("t", data=self.time).attrs["unit"] = "s"
+            for name, signal in self.signals.items():
+                dataset = file.create_dataset(
+                    name, data=signal.values, compression="gzip", compression_opts=4, shuffle=True
+                )
+                dataset.attrs["unit"] = signal.unit
+                dataset.attrs.create("labels", signal.labels, dtype=h5py.string_dtype())
+                if signal.limits is not None:
+                    dataset.attrs["limits"] = signal.limits
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Reads a log that :meth:`write` wrote.
+
+        Args:
+            path: HDF5 file.
+
+        Returns:
+            The log.
+
+        Raises:
+            InputError: If the file cannot be read or is not such a log.
+        """
+        try:
+            with h5py.File(path, "r") as file:
+                signals = {
+                    name: _read_signal(dataset) for name, dataset in file.items() if name != "t"
+                }
+                attributes = {name: str(value) for name, value in file.attrs.items()}
+                return cls(file["t"][:], signals, attributes)
+        except (OSError, KeyError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"{path}: not a readable run log (HDF5 with 't'): {reason}") from None
+
+    def _check(self, name: str, signal: Signal) -> None:
+        """Refuses a signal whose number of samples is not that of the time axis."""
+        if signal.values.shape[0] != self.time.size:
+            raise ValueError(
+                f"signal {name!r} has {signal.values.shape[0]} samples, time has {self.time.size}"
+            )
+
+
+def _as_columns(values: ArrayLike) -> FloatArray:
+    """Values as [samples, dim]; a vector becomes one column. Integers stay integers (modes)."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu":
+        array = array.astype(float)
+    return array[:, np.newaxis] if array.ndim == 1 else array
+
+
+def _read_signal(dataset: h5py.Dataset) -> Signal:
+    """One signal from its dataset."""
+    labels = [str(label) for label in dataset.attrs["labels"]]
+    limits = dataset.attrs.get("limits")
+    return Signal(dataset[:], str(dataset.attrs["unit"]), labels, limits)

@@ -1,0 +1,273 @@
+"""The signals of a run, from what its station logged."""
+
+import numpy as np
+from pydrake.systems.framework import Context
+from scipy.spatial.transform import Rotation
+
+from diagrams.drawing.replay import RecordedMotion
+from diagrams.station import Station
+from experiments.results.run_log import RunLog
+from pfsc_drake.control.compliance.tool_load import joint_torque_function
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.linearization import path_output_function
+from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
+from pfsc_drake.robot.robot_model import pose_function
+
+
+def collect_log(station: Station, root: Context) -> RunLog:
+    """Return the signals of a run, named and with units as scripts expect them.
+
+    Joint state, tool pose and path coordinates are the true ones, those of the links, also
+    where the law acts on motor coordinates, on the errors from a moving reference point, or
+    on what imperfect encoders measure. What it acted on is beside them: ``xi_M``,
+    ``tracking_error``, ``q_J_measured``, ``xi_measured`` and so on.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context at the end.
+    """
+    times, raw = station.log.read(root)
+    log = RunLog(times)
+    measured = raw.get("joint_state_measured")
+    _add_joints(log, station, raw["joint_state"], raw["law"])
+    if measured is not None:
+        _add_joint_state(log, station, measured, "_measured")
+    pose = _tool_poses(station, raw["joint_state"])
+    log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
+    log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
+    linearization, layout = station.law.linearization, station.law.layout
+    Y = raw["law"][:, layout.manifold_state]
+    Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
+    points = raw["path_point"]
+    if linearization.time_driven or station.on_motors or measured is not None:
+        if linearization.time_driven:
+            log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
+        else:
+            _add_seen(log, Y[:, 0], "M" if station.on_motors else "measured")
+        points = _project(station, pose, linearization.relative_degree)
+        seen = _path_output(station, raw["joint_state"], points)
+        # the orientation errors of trajectory tracking stay those from the moving reference
+        replaced = slice(0, 3) if linearization.time_driven else slice(None)
+        Y[:, :2, replaced] = seen[:, : Y.shape[1], replaced]
+    log.add("theta", points[:, linearization.layout.theta], "1")
+    log.add("alpha", points[:, linearization.layout.alpha], "1")
+    _add_manifold(log, station, raw, Y)
+    _add_orientation(log, station, raw["path_point"], points, pose)
+    _add_forces(log, station, raw)
+    _add_drives(log, station, raw)
+    for name, length in station.further_lengths(pose[:, :3]).items():
+        log.add(name, length.values, "m", length.labels, length.limit)
+    return log
+
+
+def optional_signals(station: Station) -> set[str]:
+    """Return the signals that a station's log has beyond those of every log.
+
+    Args:
+        station: The station, simulated or not.
+    """
+    names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
+    if "desired_reference" in names:
+        names.add("xi_d")
+    if station.on_motors:
+        names.add("xi_M")
+    if station.law.linearization.num_outputs > 3:
+        names.add("phi")
+    return names
+
+
+def _add_seen(log: RunLog, y: np.ndarray, suffix: str) -> None:
+    """Add the path coordinates that the law acted on, shape (samples, m)."""
+    log.add(f"eta_{suffix}", y[:, 0], "m")
+    log.add(f"xi_{suffix}", y[:, 1:3], "m", [f"xi_{suffix}_1", f"xi_{suffix}_2"])
+    if y.shape[1] > 3 and suffix != "M":
+        log.add(f"phi_{suffix}", y[:, 3:], "rad", [f"phi_{suffix}_{axis}" for axis in "zyx"])
+
+
+def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
+    """Return ``[y_t, R_e]`` of the links, shape (samples, 12)."""
+    q_J = joint_state[:, : station.chain.dimension]
+    if len(q_J) == 0:
+        return np.zeros((0, 12))
+    return np.array(pose_function(station.chain).map(len(q_J))(q_J.T)).T
+
+
+def collect_motion(station: Station, root: Context, period: float) -> RecordedMotion:
+    """Return the motion of a run at the frames of a recording, as far as it is finite.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context at the end.
+        period: Time between frames [s].
+    """
+    times, raw = station.log.read(root)
+    finite = np.isfinite(np.hstack([raw["path_point"], raw["joint_state"]])).all(axis=1)
+    usable = np.flatnonzero(finite)
+    stride = max(1, round(period / station.controller.period))
+    frames = usable[::stride]
+    state = raw["joint_state"][frames]
+    states = [station.coordinates.plant_state(x) for x in state]
+    half = station.coordinates.num_states // 2
+    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
+    return RecordedMotion(
+        times[frames], positions, _tool_poses(station, state), raw["path_point"][frames]
+    )
+
+
+def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
+    chain, n = station.chain, station.chain.dimension
+    q_J, v_J, q_M, v_M = np.hsplit(state, 4)
+    effort, axes = _joint_units(station)[2], [str(i + 1) for i in range(n)]
+    _add_joint_state(log, station, state)
+    drive = law[:, station.law.layout.drive]
+    if station.law.linearization.relative_degree > 1:
+        labels = [f"tau_d_{axis}" for axis in axes]
+        log.add("tau_d", drive, effort, labels, station.law.limits)
+    if chain.is_elastic:
+        tau_J = chain.K_s * (q_M - q_J) + chain.K_d * (v_M - v_J)
+        log.add("tau_J", tau_J, effort, [f"tau_J_{axis}" for axis in axes])
+
+
+def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
+    angle, rate, _ = _joint_units(station)
+    names = ["q_J", "v_J"]
+    if np.isfinite(station.chain.K_s).any():  # motors of rigid joints move as the links do
+        names += ["q_M", "v_M"]
+    for name, values in zip(names, np.hsplit(state, 4), strict=False):
+        labels = [f"{name}{suffix}_{i + 1}" for i in range(station.chain.dimension)]
+        log.add(f"{name}{suffix}", values, angle if name.startswith("q") else rate, labels)
+
+
+def _joint_units(station: Station) -> tuple[str, str, str]:
+    is_revolute = station.chain.gather("is_revolute")
+    if is_revolute.all():
+        return "rad", "rad/s", "Nm"
+    if is_revolute.any():
+        return "rad or m", "rad/s or m/s", "Nm or N"
+    return "m", "m/s", "N"
+
+
+def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: np.ndarray) -> None:
+    law, layout, linearization = raw["law"], station.law.layout, station.law.linearization
+    m = linearization.num_outputs
+    Y_p = raw["reference"].reshape(len(law), -1, m)
+    parts = {"eta": slice(0, 1), "xi": slice(1, 3), "phi": slice(3, m)}
+    units = {"eta": "m", "xi": "m", "phi": "rad"}
+    labels = {"eta": ["eta"], "xi": ["xi_1", "xi_2"], "phi": ["phi_z", "phi_y", "phi_x"]}
+    for name, part in parts.items():
+        if part.start >= m:
+            continue
+        log.add(name, Y[:, 0, part], units[name], labels[name])
+        log.add(f"{name}_p", Y_p[:, 0, part], units[name], [f"{x}_p" for x in labels[name]])
+        if linearization.relative_degree > 1:
+            rates = [f"{x}_dot" for x in labels[name]]
+            log.add(f"{name}_dot", Y[:, 1, part], f"{units[name]}/s", rates)
+    log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{linearization.relative_degree}")
+    status = law[:, layout.status]
+    log.add("fault", status[:, 0].astype(int), "1", [fault.name.lower() for fault in Fault])
+    log.add("rcond", status[:, 1], "1")
+    log.add("saturated_drives", status[:, 2].astype(int), "1")
+
+
+def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.ndarray:
+    """Project a motion of the tool on the path, sample by sample; shape (samples, size)."""
+    path = station.path
+    evaluator = path.evaluator(relative_degree)
+    points = np.full((len(pose), evaluator.layout.size), np.nan)
+    theta = station.initial_theta
+    for k, y_t in enumerate(pose[:, :3]):
+        if np.isfinite(y_t).all():
+            points[k] = evaluator(y_t.tolist(), theta)
+            theta = points[k, 0]
+    return points
+
+
+def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the virtual output of the links and its rate, shape (samples, 2, m)."""
+    n, linearization = station.chain.dimension, station.law.linearization
+    function = path_output_function(station.chain, linearization.layout).map(len(points))
+    Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
+    return Y.T.reshape(len(points), 2, linearization.num_outputs)
+
+
+def _rotations(
+    layout: PathPointLayout, pose: np.ndarray, point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
+    finite = (np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))[:, None]
+    quaternion = np.where(finite, point[:, layout.quaternion][:, :4], [1.0, 0.0, 0.0, 0.0])
+    R_e = np.where(finite, pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
+    return R_e, quaternion_to_matrix(quaternion)
+
+
+def _add_orientation(
+    log: RunLog, station: Station, followed: np.ndarray, place: np.ndarray, pose: np.ndarray
+) -> None:
+    """Add the ZYX angles of the tool and of the reference that the law compares it with.
+
+    And how far that reference is away from the orientation that belongs to the tool's place.
+    """
+    linearization = station.law.linearization
+    if not linearization.layout.oriented:
+        return
+    point = followed if linearization.time_driven else place
+    R_e, R_d = _rotations(linearization.layout, pose, point)
+    _, R_place = _rotations(linearization.layout, pose, place)
+    unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
+    for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
+        angles = np.unwrap(matrix_to_zyx(R), axis=0)
+        angles[unknown] = np.nan
+        log.add(name, angles, "rad", ["z", "y", "x"])
+    lead = np.full(len(place), np.nan)
+    if not unknown.all():
+        between = np.swapaxes(R_place, 1, 2) @ R_d
+        lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
+    log.add("orientation_lead", lead, "rad")
+
+
+def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add what acts on the tool, what the sensor makes of it, and what the compliance asks for."""
+    m, effort = station.law.linearization.num_outputs, _joint_units(station)[2]
+    wrench = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
+    manifold = ["tau_par", "tau_perp", "tau_cross", "tau_z", "tau_y", "tau_x"][:m]
+    known = {
+        "wrench_ext": ("N, Nm", wrench),
+        "wrench_measured": ("N, Nm", wrench),
+        "manifold_force": ("N, Nm", manifold),
+        "tared": ("1", None),
+        "sensor_fault": ("1", None),
+    }
+    for name, (unit, labels) in known.items():
+        if name in raw:
+            log.add(name, raw[name], unit, labels)
+    if "wrench_ext" in raw:
+        labels = [f"tau_ext_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_ext", _joint_torques(station, raw), effort, labels)
+    if "desired_reference" in raw:
+        desired = raw["desired_reference"][:, :m]
+        log.add("eta_d", desired[:, 0], "m")
+        log.add("xi_d", desired[:, 1:3], "m", ["xi_d_1", "xi_d_2"])
+        if m > 3:
+            log.add("phi_d", desired[:, 3:], "rad", ["phi_d_z", "phi_d_y", "phi_d_x"])
+
+
+def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
+    """Return what the wrench on the tool means in the joints, shape (samples, N)."""
+    q_J, wrench = raw["joint_state"][:, : station.chain.dimension], raw["wrench_ext"]
+    if len(q_J) == 0:
+        return np.zeros_like(q_J)
+    return np.array(joint_torque_function(station.chain).map(len(q_J))(q_J.T, wrench.T)).T
+
+
+def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add the torques that a velocity servo gives, and what friction takes."""
+    effort = _joint_units(station)[2]
+    if "drive_torque" in raw:
+        limits = station.chain.gather("effort_limit")
+        labels = [f"tau_d_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_d", raw["drive_torque"], effort, labels, limits)
+        names = [fault.name.lower() for fault in Fault]
+        log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
+    if "friction_torque" in raw:
+        labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
+        log.add("tau_f", raw["friction_torque"], effort, labels)

@@ -1,0 +1,57 @@
+"""How long one tick of the controller takes, measured on the states of a run."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.station import Station
+from experiments.results.run_log import RunLog
+
+_SAMPLES = 1000
+_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
+
+
+def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
+    """Evaluate the controller chain, from the joint state to the drives, at logged states.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context, which is overwritten.
+        log: Log of the run.
+
+    Returns:
+        Wall clock time of each evaluation [s].
+    """
+    drive = station.controller.GetOutputPort(station.controller.drive_port)
+    sensor = _sensor(station, root)
+    controller = station.controller.GetMyContextFromRoot(root)
+    projector = station.projector.GetMyMutableContextFromRoot(root)
+    plant = station.plant.GetMyMutableContextFromRoot(root)
+    names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
+    states = np.hstack([log[name].values for name in names])
+    finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
+    usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
+    chosen = usable[:: max(1, len(usable) // _SAMPLES)]
+    plant_states = [station.coordinates.plant_state(x) for x in states[chosen]]
+    elapsed = []
+    for k, x in zip(chosen, plant_states, strict=True):
+        root.SetTime(log.time[k])
+        station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
+        station.place_robot(plant, x)
+        sensor()  # what the plant needs to know its forces is not the controller's time
+        begin = time.perf_counter()
+        drive.Eval(controller)
+        elapsed.append(time.perf_counter() - begin)
+    return np.array(elapsed)
+
+
+def _sensor(station: Station, root: Context) -> Callable[[], object]:
+    """Return what makes the plant work out the forces in its joints, if they are measured."""
+    name = "force_torque_sensor"
+    if not station.diagram.HasSubsystemNamed(name):
+        return lambda: None
+    sensor = station.diagram.GetSubsystemByName(name)
+    load, context = sensor.GetOutputPort("load"), sensor.GetMyContextFromRoot(root)
+    return lambda: load.Eval(context)

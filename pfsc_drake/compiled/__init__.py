@@ -1,0 +1,1 @@
+"""CasADi functions as machine code, bound to their arrays."""

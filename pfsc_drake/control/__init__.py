@@ -1,0 +1,1 @@
+"""What a controller knows: manifolds, laws, compliance, estimation."""

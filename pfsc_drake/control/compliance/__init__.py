@@ -1,0 +1,1 @@
+"""Compliance: tool load, forces along a manifold, impedance."""

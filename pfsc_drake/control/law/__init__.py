@@ -1,0 +1,1 @@
+"""The law: actuation, linearization, decoupling, stabilization, reference."""

@@ -1,0 +1,282 @@
+"""The path following law as a function of measurement, path and reference."""
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.control.law.decoupling import DecouplingInverse, DecouplingSolution
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PathStatus
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+
+# attributes of an enumeration are looked up slowly
+_NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(PathStatus.NOT_CONVERGED)
+
+
+class LawLayout:
+    """Where the results of a law lie in a flat array.
+
+    Attributes:
+        drive: Drive input within its limits, shape (N,) [Nm, or rad/s for servos].
+        manifold_state: Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
+        virtual_input: ``v``, shape (m,).
+        status: Fault (:class:`Fault`), reciprocal condition number of the decoupling
+            matrix, number of drives at their limit; shape (3,).
+        held: The part of the drive input that is extrapolated over the hold, shape (N,).
+        size: Length of the whole array.
+    """
+
+    def __init__(self, num_joints: int, num_outputs: int, relative_degree: int) -> None:
+        sizes = [num_joints, relative_degree * num_outputs, num_outputs, 3, num_joints]
+        ends = np.cumsum(sizes).tolist()
+        fields = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+        self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields
+        self.size: int = ends[-1]
+
+
+@dataclass(frozen=True)
+class SafeState:
+    """What the drives do after a fault: hold the links against gravity and brake.
+
+    ``tau_d = g_L(q) - damping v_M``; for velocity servos the reference is zero.
+
+    Attributes:
+        damping: Braking per drive [Nm s/rad], shape (N,).
+    """
+
+    damping: np.ndarray
+
+
+class PathLaw:
+    """The path following law (3.29), (3.50), (3.58), (3.65), (3.70) of one robot.
+
+    Evaluation writes into buffers that are made once; the object holds no state
+    of the controlled system.
+
+    Args:
+        robot: The robot.
+        linearization: The compiled relation between drives and virtual output.
+        stabilization: Gains of the virtual output's error dynamics.
+        inverse: Inverts the decoupling matrix.
+        limits: Magnitude limits of the drive input, shape (N,).
+        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller, below 1.
+        safe_state: What the drives do after a fault.
+
+    Attributes:
+        layout: Layout of the results.
+
+    Raises:
+        InputError: If dimensions do not match, or a limit is not positive.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        linearization: Linearization,
+        stabilization: Stabilization,
+        inverse: DecouplingInverse,
+        limits: np.ndarray,
+        max_alpha: float,
+        safe_state: SafeState,
+    ) -> None:
+        n = linearization.num_joints
+        if np.shape(limits) != (n,) or not np.all(np.asarray(limits) > 0.0):
+            raise InputError(f"drive limits: {limits}; must be {n} positive numbers")
+        if not 0.0 < max_alpha < 1.0:
+            raise InputError(f"max_alpha: {max_alpha}; must lie between 0 and 1")
+        if stabilization.relative_degree != linearization.relative_degree:
+            raise InputError(
+                f"gains of relative degree {stabilization.relative_degree} for a law of "
+                f"relative degree {linearization.relative_degree}"
+            )
+        coordinates = stabilization.proportional.shape[1]
+        if coordinates != linearization.num_outputs:
+            raise InputError(
+                f"gains of {coordinates} coordinates; "
+                f"the law has {linearization.num_outputs} outputs"
+            )
+        damping = np.asarray(safe_state.damping)
+        if damping.shape != (n,) or not np.all((damping >= 0.0) & np.isfinite(damping)):
+            raise InputError(
+                f"safe state damping: {safe_state.damping}; must be {n} finite numbers, "
+                "none negative"
+            )
+        self.linearization = linearization
+        self.stabilization = stabilization
+        self.limits = np.asarray(limits, dtype=float)
+        self._inverse = inverse
+        self._max_alpha = max_alpha
+        self._safe_state = safe_state
+        self._gravity = gravity_function(robot)
+        self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
+        self.function = _law_function(linearization, stabilization)
+        self._completion = _completion_function(linearization, self.limits)
+        self._fault_index = self.layout.status.start
+        self._alpha_index = linearization.layout.alpha.start
+        self._status_index = linearization.layout.status.start
+        self._bind_buffers()
+
+    def _bind_buffers(self) -> None:
+        """Give both functions one set of arrays, so that nothing is copied between them."""
+        first = BoundFunction(self.function)
+        arrays = first.arguments | first.results
+        second = BoundFunction(self._completion, **arrays)
+        arrays |= second.arguments | second.results
+        self._linearize, self._complete = first.evaluate, second.evaluate
+        self._state, self._point = arrays["state"], arrays["path_point"]
+        self._reference, self._integral = arrays["reference"], arrays["integral"]
+        self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
+        self._lead, self._rhs = arrays["lead"], arrays["rhs"]
+        # CasADi stores by columns
+        self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
+        self._solution, self._rcond = arrays["solution"], arrays["rcond"]
+        self._result, self._check = arrays["result"], arrays["check"]
+
+    def evaluate(
+        self,
+        state: np.ndarray,
+        point: np.ndarray,
+        reference: np.ndarray,
+        integral: np.ndarray,
+        last_held: np.ndarray | None = None,
+        tau_ext: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return the drive input of one tick and all that belongs to it.
+
+        Args:
+            state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+            point: Path point next to the tool, laid out by the linearization's layout.
+            reference: Derivatives 0..r of the virtual output's reference by rows,
+                shape ((r + 1) m,).
+            integral: Integral of the virtual output's error, shape (m,).
+            last_held: ``held`` of the last tick, shape (N,); if omitted nothing is
+                extrapolated.
+            tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
+
+        Returns:
+            New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
+        """
+        self._state[:] = state
+        self._point[:] = point
+        self._reference[:] = reference
+        self._integral[:] = integral
+        self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
+        self._linearize()
+        solution = self._inverse.solve(self._A, self._rhs)
+        self._solution[:] = solution.x
+        self._rcond[0] = solution.rcond
+        if last_held is None:
+            self._lead[0] = 0.0
+        else:
+            self._lead[0] = self.linearization.lead
+            self._last_held[:] = last_held
+        self._complete()
+        result = self._result.copy()
+        result[self._fault_index] = self._judge(solution)
+        return result
+
+    def _judge(self, solution: DecouplingSolution) -> Fault:
+        """Return what forbids the use of a result, the root cause first."""
+        alpha, status = self._point[self._alpha_index], self._point[self._status_index]
+        # written so that NaN is a fault
+        if (
+            self._inverse.accepts(solution)
+            and alpha < self._max_alpha
+            and status != _NOT_CONVERGED
+            and math.isfinite(self._check[0])
+        ):
+            return _NO_FAULT
+        inputs = (self._state, self._reference, self._integral, self._tau_ext)
+        if not all(np.isfinite(values).all() for values in inputs):
+            return Fault.INPUT_NOT_FINITE
+        if status == _NOT_CONVERGED:
+            return Fault.PROJECTION_FAILED
+        return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
+
+    def safe_drive(self, state: np.ndarray, last_good_state: np.ndarray) -> np.ndarray:
+        """Return the drive input of the safe state, shape (N,).
+
+        Args:
+            state: Measured ``[q_J, v_J, q_M, v_M]``; whatever is not finite is replaced.
+            last_good_state: The state before the fault.
+        """
+        n = self.linearization.num_joints
+        if self.linearization.relative_degree == 1:
+            return np.zeros(n)
+        trusted = state if np.isfinite(state).all() else last_good_state
+        holding = np.array(self._gravity(trusted[:n])).ravel()
+        braking = self._safe_state.damping * np.where(
+            np.isfinite(state[3 * n :]), state[3 * n :], 0.0
+        )
+        return np.clip(holding - braking, -self.limits, self.limits)
+
+
+def _law_function(linearization: Linearization, stabilization: Stabilization) -> ca.Function:
+    """Return everything up to the decoupling matrix's inverse as one function."""
+    n, m = linearization.num_joints, linearization.num_outputs
+    r = linearization.relative_degree
+    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
+    point = ca.SX.sym("path_point", linearization.layout.size)
+    reference, integral = ca.SX.sym("reference", (r + 1) * m), ca.SX.sym("integral", m)
+    y_p = ca.vertsplit(reference, m)
+    progress = []
+    if linearization.time_driven:
+        # the reference point moves with time, and the errors from it shall vanish
+        progress = [ca.vertcat(*[y[0] for y in y_p])]
+        y_p = [ca.SX(m, 1)] * (r + 1)
+    Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point, *progress)
+    v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
+    return ca.Function(
+        "path_law",
+        [state, point, reference, integral, tau_ext],
+        [Y, ca.densify(v), A, v - b, gain, drift, offset],
+        ["state", "path_point", "reference", "integral", "tau_ext"],
+        ["Y", "v", "A", "rhs", "gain", "drift", "offset"],
+    )
+
+
+def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:
+    """Return everything after the decoupling matrix's inverse as one function.
+
+    Its second result is finite only if all that went in and came out is: a sum is finite only if
+    all its terms are, and the limits of the drives turn NaN into numbers.
+    """
+    n, m = linearization.num_joints, linearization.num_outputs
+    r = linearization.relative_degree
+    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
+    solution, drift, offset, last_held = (ca.SX.sym(name, n) for name in "xdol")
+    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
+    v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
+    held = gain @ solution + drift
+    wanted = held + lead * (held - last_held) + offset
+    drive = ca.fmin(ca.fmax(wanted, -limits), limits)
+    saturated = ca.sum1(ca.fabs(wanted) > limits)
+    # the fault is judged outside
+    result = ca.vertcat(drive, ca.vec(Y), v, 0.0, rcond, saturated, held)
+    check = sum(ca.sum1(part) for part in (wanted, result, state, tau_ext))
+    arguments = {
+        "solution": solution,
+        "gain": gain,
+        "drift": drift,
+        "offset": offset,
+        "last_held": last_held,
+        "lead": lead,
+        "Y": Y,
+        "v": v,
+        "rcond": rcond,
+        "state": state,
+        "tau_ext": tau_ext,
+    }
+    return ca.Function(
+        "completion",
+        list(arguments.values()),
+        [ca.densify(result), ca.densify(check)],
+        list(arguments),
+        ["result", "check"],
+    )

@@ -1,0 +1,1 @@
+"""Curves over a parameter: Fourier series, polynomials, splines; positions and orientations."""

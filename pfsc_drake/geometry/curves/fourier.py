@@ -1,0 +1,136 @@
+"""Closed curves given by a Fourier series."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+
+
+class FourierCurve(Curve):
+    """sigma(theta) = c + sum_k a_k cos(k theta) + b_k sin(k theta), k = 1..harmonics.
+
+    Analytic and closed with the period 2 pi.
+
+    Args:
+        constant: c, shape [dimension].
+        cosine: a_k, shape [harmonics, dimension].
+        sine: b_k, shape [harmonics, dimension].
+
+    Raises:
+        InputError: the shapes do not fit or a value is not finite.
+    """
+
+    def __init__(self, constant: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> None:
+        c = np.array(constant, dtype=float)
+        a = np.array(cosine, dtype=float)
+        b = np.array(sine, dtype=float)
+        if c.ndim != 1 or a.ndim != 2 or a.shape != b.shape or a.shape[1:] != c.shape or not a.size:
+            raise InputError(
+                f"Fourier coefficients: shapes {c.shape}, {a.shape}, {b.shape};"
+                " [dimension], [harmonics, dimension], [harmonics, dimension] are required"
+            )
+        if not all(np.all(np.isfinite(values)) for values in (c, a, b)):
+            raise InputError("Fourier coefficients: not finite; finite values are required")
+        super().__init__(len(c), [0.0, 2.0 * math.pi], closed=True, smoothness=math.inf)
+        self.constant, self.cosine, self.sine = c, a, b
+
+    @classmethod
+    def circle(
+        cls,
+        center: ArrayLike,
+        radius: float,
+        axis_u: ArrayLike = (1.0, 0.0, 0.0),
+        axis_v: ArrayLike = (0.0, 1.0, 0.0),
+    ) -> "FourierCurve":
+        """Circle center + radius (u cos(theta) + v sin(theta)).
+
+        Args:
+            center: Centre [dimension], m.
+            radius: Radius, m, positive.
+            axis_u: Direction u of the point theta = 0, [dimension]; made a unit vector.
+            axis_v: Direction in the plane of the circle, [dimension]; its part
+                perpendicular to u, made a unit vector, is v.
+
+        Returns:
+            The closed curve.
+
+        Raises:
+            InputError: radius not positive, or u and v parallel or zero.
+        """
+        if not (0.0 < radius < math.inf):
+            raise InputError(f"circle radius: {radius}; a positive number of metres is required")
+        u, v = np.array(axis_u, dtype=float), np.array(axis_v, dtype=float)
+        size = float(np.linalg.norm(u) * np.linalg.norm(v))
+        u = u / (np.linalg.norm(u) or 1.0)
+        v = v - (u @ v) * u
+        if not float(np.linalg.norm(v)) > 1e-9 * size:
+            axes = f"u = {np.asarray(axis_u).tolist()}, v = {np.asarray(axis_v).tolist()}"
+            raise InputError(f"circle axes: {axes}; two linearly independent vectors are required")
+        v /= np.linalg.norm(v)
+        return cls(center, [radius * u], [radius * v])
+
+    @classmethod
+    def bent_lemniscate(
+        cls,
+        center: ArrayLike = (0.7, 0.2, 1.103),
+        width: float = 0.25,
+        height: float = 0.1,
+    ) -> "FourierCurve":
+        """Vertically bent lemniscate (3.87).
+
+        center + [width cos(theta), width sin(theta) cos(theta), height sin(theta)^2];
+        it crosses itself at theta = pi/2 and 3 pi/2.
+
+        Args:
+            center: Offset [3], m.
+            width: Half of the extent in x, m.
+            height: Height of the bend, m.
+
+        Returns:
+            The closed curve.
+        """
+        constant = np.add(center, (0.0, 0.0, height / 2.0))
+        cosine = [[width, 0.0, 0.0], [0.0, 0.0, -height / 2.0]]
+        sine = [[0.0, 0.0, 0.0], [0.0, width / 2.0, 0.0]]
+        return cls(constant, cosine, sine)
+
+    def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """See the base class."""
+        angles = self._checked(theta)[..., None] * np.arange(1, len(self.cosine) + 1)
+        basis = np.empty((*angles.shape[:-1], 2 * len(self.cosine) + 1))
+        basis[..., 0] = 1.0
+        basis[..., 1::2] = np.cos(angles)
+        basis[..., 2::2] = np.sin(angles)
+        return np.einsum("kdj,...j->...kd", self._table(order), basis)
+
+    def flat_sampler(self, order: int) -> Sampler:
+        """See the base class."""
+        harmonics = range(1, len(self.cosine) + 1)
+        matrix = self._table(order).reshape(-1, 2 * len(harmonics) + 1)
+        cos, sin = math.cos, math.sin
+
+        def sample_two_harmonics(theta: float) -> np.ndarray:
+            c, s = cos(theta), sin(theta)
+            return matrix.dot((1.0, c, s, c * c - s * s, 2.0 * s * c))
+
+        def sample_any(theta: float) -> np.ndarray:
+            basis = [1.0]
+            for k in harmonics:
+                basis += (cos(k * theta), sin(k * theta))
+            return matrix.dot(basis)
+
+        return sample_two_harmonics if len(harmonics) == 2 else sample_any
+
+    def _table(self, order: int) -> np.ndarray:
+        """Map from [1, cos, sin, cos 2, ...] to derivatives, [order + 1, dimension, terms]."""
+        table = np.zeros((check_order(order) + 1, self.dimension, 2 * len(self.cosine) + 1))
+        table[0, :, 0] = self.constant
+        a, b = self.cosine, self.sine
+        k = np.arange(1, len(a) + 1)[:, None]
+        for row in table:
+            row[:, 1::2], row[:, 2::2] = a.T, b.T
+            a, b = k * b, -k * a
+        return table

@@ -1,0 +1,176 @@
+"""Piecewise polynomial curves."""
+
+import math
+from bisect import bisect_right
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+
+# A jump counts if it exceeds this part of the largest derivative of its order ...
+_RELATIVE_JUMP = 1e-9
+# ... and would move the curve by more than this part of its size over one segment.
+_ROUNDING = 1e-12
+_FAST_TERMS = 8
+
+
+class PiecewisePolynomialCurve(Curve):
+    """sigma(theta) = sum_j c_sj (theta - theta_s)^j on segment s.
+
+    Args:
+        breakpoints: theta_s and the last end, shape [segments + 1], increasing.
+        coefficients: c_sj, shape [segments, degree + 1, dimension], lowest power first.
+        closed: True if theta is periodic.
+        known_smoothness: Class C^k that holds by construction; jumps of derivatives up
+            to this order are rounding errors and not looked at. The default measures all.
+
+    Raises:
+        InputError: wrong shapes, values that are not finite, or a curve that is not
+            even continuous.
+    """
+
+    def __init__(
+        self,
+        breakpoints: ArrayLike,
+        coefficients: ArrayLike,
+        *,
+        closed: bool = False,
+        known_smoothness: int = -1,
+    ) -> None:
+        table = np.array(coefficients, dtype=float)
+        if table.ndim != 3 or min(table.shape) < 1:
+            raise InputError(
+                f"coefficients: shape {table.shape}; [segments, degree + 1, dimension] is required"
+            )
+        super().__init__(table.shape[2], breakpoints, closed=closed, smoothness=math.inf)
+        if len(table) != len(self.breakpoints) - 1:
+            raise InputError(
+                f"coefficients: {len(table)} segments;"
+                f" {len(self.breakpoints)} breakpoints need {len(self.breakpoints) - 1}"
+            )
+        if not np.all(np.isfinite(table)):
+            segment = int(np.argwhere(~np.isfinite(table))[0, 0])
+            raise InputError(
+                f"coefficients: value not finite in the segment from"
+                f" theta = {self.breakpoints[segment]:.9g}"
+            )
+        table.setflags(write=False)
+        self.coefficients = table
+        self._lost_at = self._find_discontinuities(known_smoothness)
+        lost = [order for order, theta in enumerate(self._lost_at) if theta is not None]
+        if lost:
+            if lost[0] == 0:
+                raise InputError(
+                    f"curve: jump of position at theta = {self._lost_at[0]:.9g};"
+                    " a continuous curve is required"
+                )
+            self.smoothness = lost[0] - 1
+
+    @classmethod
+    def line(cls, start: ArrayLike, end: ArrayLike) -> "PiecewisePolynomialCurve":
+        """Straight line parametrized by arc length.
+
+        Args:
+            start: First point [dimension], m.
+            end: Last point [dimension], m.
+
+        Returns:
+            Open curve on the domain [0, |end - start|], m.
+
+        Raises:
+            InputError: the points coincide or are not finite.
+        """
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        if a.ndim != 1 or a.shape != b.shape:
+            raise InputError(f"line: shapes {a.shape} and {b.shape}; two equal vectors required")
+        length = float(np.linalg.norm(b - a))
+        if not (0.0 < length < math.inf):
+            raise InputError(
+                f"line: from {a.tolist()} to {b.tolist()}; two different finite points required"
+            )
+        return cls([0.0, length], [[a, (b - a) / length]])
+
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomials."""
+        return self.coefficients.shape[1] - 1
+
+    def first_discontinuity(self, order: int) -> float | None:
+        """See the base class."""
+        thetas = [theta for theta in self._lost_at[: check_order(order) + 1] if theta is not None]
+        return min(thetas, default=None)
+
+    def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """See the base class."""
+        values = self._checked(theta)
+        segment = np.searchsorted(self.breakpoints[1:-1], values, side="right")
+        local = values - self.breakpoints[segment]
+        powers = local[..., None] ** np.arange(self.degree + 1)
+        table = self._table(order, self.degree + 1)
+        return np.einsum("...kdj,...j->...kd", table[segment], powers)
+
+    def flat_sampler(self, order: int) -> Sampler:
+        """See the base class."""
+        terms = max(self.degree + 1, _FAST_TERMS)
+        table = self._table(order, terms)
+        matrices = list(table.reshape(len(table), -1, terms))
+        starts = self.breakpoints[:-1].tolist()
+        interior = self.breakpoints[1:-1].tolist()
+        begin, end = self.domain
+        period, closed = self.period, self.closed
+
+        def sample_fast(theta: float) -> np.ndarray:
+            if closed and not begin <= theta <= end:
+                theta = begin + (theta - begin) % period
+            segment = bisect_right(interior, theta)
+            u = theta - starts[segment]
+            u2 = u * u
+            u3 = u2 * u
+            u4 = u2 * u2
+            return matrices[segment].dot((1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4))
+
+        def sample_any_degree(theta: float) -> np.ndarray:
+            if closed and not begin <= theta <= end:
+                theta = begin + (theta - begin) % period
+            segment = bisect_right(interior, theta)
+            u = theta - starts[segment]
+            return matrices[segment].dot([u**j for j in range(terms)])
+
+        return sample_fast if terms == _FAST_TERMS else sample_any_degree
+
+    def _table(self, order: int, terms: int) -> np.ndarray:
+        """Map from powers to derivatives, [segments, order + 1, dimension, terms]."""
+        segments, count, dimension = self.coefficients.shape
+        table = np.zeros((segments, check_order(order) + 1, dimension, terms))
+        for k in range(min(order + 1, count)):
+            for j in range(k, count):
+                table[:, k, :, j - k] = math.perm(j, k) * self.coefficients[:, j, :]
+        return table
+
+    def _find_discontinuities(self, known_smoothness: int) -> list[float | None]:
+        """For each order 0..degree the first parameter at which that derivative jumps."""
+        lengths = np.diff(self.breakpoints)
+        table = self._table(self.degree, self.degree + 1)
+        powers = lengths[:, None] ** np.arange(self.degree + 1)
+        left = table[..., 0]
+        right = np.einsum("skdj,sj->skd", table, powers)
+        if self.closed:
+            jumps = np.roll(left, -1, axis=0) - right
+            width = np.minimum(lengths, np.roll(lengths, -1))
+        else:
+            jumps = left[1:] - right[:-1]
+            width = np.minimum(lengths[1:], lengths[:-1])
+        jump = np.abs(jumps).max(axis=2, initial=0.0)
+        scale = np.maximum(np.abs(left), np.abs(right)).max(axis=(0, 2))
+        size = max(float(scale[0]), float(np.finfo(float).tiny))
+        lost: list[float | None] = []
+        for k in range(self.degree + 1):
+            allowed = _RELATIVE_JUMP * scale[k] + _ROUNDING * size / width**k
+            if k == 0:
+                allowed = np.full_like(width, _RELATIVE_JUMP * size)
+            jumps_here = np.flatnonzero(jump[:, k] > allowed)
+            found = len(jumps_here) > 0 and k > known_smoothness
+            lost.append(float(self.breakpoints[jumps_here[0] + 1]) if found else None)
+        return lost

@@ -1,0 +1,211 @@
+"""Splines through waypoints."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline, make_interp_spline
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
+
+Parametrization = Literal["chord", "centripetal"]
+
+_MIN_SMOOTHNESS, _MAX_SMOOTHNESS = 2, 6
+# Waypoints closer than this part of the path's chord length are one point.
+_COINCIDENT = 1e-9
+
+
+def interpolate(
+    waypoints: ArrayLike,
+    *,
+    smoothness: int,
+    closed: bool = False,
+    parametrization: Parametrization = "chord",
+    parameters: ArrayLike | None = None,
+) -> PiecewisePolynomialCurve:
+    """Spline of degree smoothness + 1 through waypoints, of class C^smoothness.
+
+    Args:
+        waypoints: Points [n, dimension], m. If `closed`, the last one may repeat the first.
+        smoothness: k of the class C^k, 2..6 (3 for rigid, 5 for elastic joints, section 3.1).
+        closed: True for a periodic curve.
+        parametrization: "chord": theta is the accumulated distance of the waypoints, m;
+            "centripetal": increments are square roots of the distances, scaled to
+            the same total. Ignored if `parameters` is given.
+        parameters: theta of the waypoints, strictly increasing: [n], or [n + 1] with the
+            end of the period last if `closed` and the first waypoint is not repeated.
+
+    Returns:
+        The curve; its domain begins at 0 (or at the first of `parameters`).
+
+    Raises:
+        InputError: too few waypoints, coincident neighbours, values that are not finite,
+            or options that are not allowed.
+    """
+    points = _check_waypoints(waypoints)
+    check_smoothness(smoothness)
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    tiny = _COINCIDENT * float(chords.sum())
+    if closed and not np.linalg.norm(points[-1] - points[0]) <= tiny:
+        points = np.vstack([points, points[0]])
+        chords = np.append(chords, np.linalg.norm(points[-1] - points[-2]))
+    if np.any(chords <= tiny):
+        row = int(np.argmax(chords <= tiny))
+        raise InputError(
+            f"waypoints: rows {row} and {row + 1} (from 0) coincide at {points[row].tolist()};"
+            " neighbours must differ"
+        )
+    degree = smoothness + 1
+    distinct, needed = (len(points) - 1, 3) if closed else (len(points), degree + 1)
+    if distinct < needed:
+        kind = "closed" if closed else "open"
+        raise InputError(
+            f"waypoints: {distinct} distinct for {'a' if closed else 'an'} {kind} curve"
+            f" of class C^{smoothness}; at least {needed} are needed"
+        )
+    if parameters is None:
+        knots = accumulate(chords, parametrization)
+    else:
+        knots = check_parameters(parameters, len(points))
+    return interpolate_at(knots, points, degree, closed=closed)
+
+
+def interpolate_at(
+    parameters: np.ndarray, points: np.ndarray, degree: int, *, closed: bool
+) -> PiecewisePolynomialCurve:
+    """Spline of the degree given through points at given parameters.
+
+    Args:
+        parameters: theta [n], strictly increasing.
+        points: Points [n, dimension]; if `closed`, the last is the first again.
+        degree: Degree of the polynomials; an open curve needs n > degree.
+        closed: True for a periodic curve.
+
+    Returns:
+        The curve on [parameters[0], parameters[-1]], of class C^(degree - 1).
+    """
+    if closed:
+        spline, starts = _periodic_spline(parameters, points[:-1], degree)
+    else:
+        # Not-a-knot ends: the spline reproduces polynomials of its degree.
+        spline = make_interp_spline(parameters, points, k=degree)
+        starts = np.unique(spline.t[degree:-degree])[:-1]
+    # The piece to the right of its start is expanded there; in a periodic spline of even
+    # degree the first start lies inside the piece that crosses the seam.
+    sites = starts.copy()
+    if closed:
+        sites[starts < spline.t[degree]] += parameters[-1] - parameters[0]
+    coefficients = np.stack(
+        [spline(sites, nu=j) / math.factorial(j) for j in range(degree + 1)], axis=1
+    )
+    breakpoints = np.append(starts, parameters[-1])
+    return PiecewisePolynomialCurve(
+        breakpoints, coefficients, closed=closed, known_smoothness=degree - 1
+    )
+
+
+def _periodic_spline(
+    parameters: np.ndarray, points: np.ndarray, degree: int
+) -> tuple[BSpline, np.ndarray]:
+    """Periodic interpolating spline and the parameters at which its pieces start.
+
+    The knots of an even degree lie midway between the waypoints, in every interval:
+    SciPy's own periodic knots leave out one interval and put a knot on a waypoint, which
+    makes the curve depend on where the lap starts.
+    """
+    count = len(points)
+    period = parameters[-1] - parameters[0]
+    if degree % 2:
+        base, sites, values = parameters[:-1], parameters[:-1], points
+        starts = base
+    else:
+        base = (parameters[1:] + parameters[:-1]) / 2.0
+        sites, values = parameters[1:], np.roll(points, -1, axis=0)
+        starts = np.append(parameters[0], base)
+    index = np.arange(-degree, count + degree + 1)
+    knots = base[index % count] + period * (index // count)
+    unfolded = BSpline.design_matrix(sites, knots, degree).toarray()
+    folded = np.zeros((count, count))
+    for column in range(unfolded.shape[1]):
+        folded[:, column % count] += unfolded[:, column]
+    coefficients = np.linalg.solve(folded, values)
+    return BSpline(knots, coefficients[np.arange(count + degree) % count], degree), starts
+
+
+def accumulate(chords: np.ndarray, parametrization: Parametrization) -> np.ndarray:
+    """Parameters of waypoints from the distances of neighbours.
+
+    Args:
+        chords: Distances [n - 1], m, positive.
+        parametrization: "chord" or "centripetal".
+
+    Returns:
+        theta [n], from 0 to the sum of the chords, m.
+
+    Raises:
+        InputError: unknown parametrization.
+    """
+    if parametrization == "chord":
+        steps = chords
+    elif parametrization == "centripetal":
+        steps = np.sqrt(chords)
+    else:
+        raise InputError(
+            f"parametrization: '{parametrization}'; 'chord' or 'centripetal' is allowed"
+        )
+    return np.concatenate([[0.0], np.cumsum(steps)]) * (chords.sum() / steps.sum())
+
+
+def check_smoothness(smoothness: int) -> None:
+    """Refuse a class C^k that no spline here has.
+
+    Raises:
+        InputError: it is not an integer from 2 to 6.
+    """
+    if not isinstance(smoothness, int) or not _MIN_SMOOTHNESS <= smoothness <= _MAX_SMOOTHNESS:
+        raise InputError(
+            f"smoothness: {smoothness}; an integer from {_MIN_SMOOTHNESS} to {_MAX_SMOOTHNESS}"
+            " is required"
+        )
+
+
+def check_parameters(parameters: ArrayLike, count: int) -> np.ndarray:
+    """Parameters of waypoints as an array, strictly increasing.
+
+    Args:
+        parameters: theta [count].
+        count: Number of waypoints, the closing one of a closed curve included.
+
+    Returns:
+        Array [count].
+
+    Raises:
+        InputError: wrong number, not finite or not increasing.
+    """
+    values = np.asarray(parameters, dtype=float)
+    if values.shape != (count,):
+        raise InputError(
+            f"parameters: shape {values.shape}; one for each waypoint, ({count},), is required"
+        )
+    bad = ~(np.diff(values) > 0.0) | ~np.isfinite(values[1:]) | ~np.isfinite(values[:-1])
+    if np.any(bad):
+        row = int(np.argmax(bad))
+        raise InputError(
+            f"parameters {row} and {row + 1}: {values[row]:.9g} and {values[row + 1]:.9g};"
+            " they must be finite and strictly increase"
+        )
+    return values
+
+
+def _check_waypoints(waypoints: ArrayLike) -> np.ndarray:
+    points = np.array(waypoints, dtype=float)
+    if points.ndim != 2 or points.shape[0] < 2 or points.shape[1] < 1:
+        raise InputError(f"waypoints: shape {points.shape}; [2 or more, dimension] is required")
+    if not np.all(np.isfinite(points)):
+        row = int(np.argwhere(~np.isfinite(points))[0, 0])
+        raise InputError(
+            f"waypoints: row {row} (from 0) is {points[row].tolist()}; finite values are required"
+        )
+    return points

@@ -1,0 +1,190 @@
+"""Closest point on a curve."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
+
+_MAX_ITERATIONS = 60
+# All relative to the length of the domain.
+_TOLERANCE = 1e-12
+_STALLED = 1e-8
+_COARSE = 1e-7
+_MAX_STEP = 1.0 / 32.0
+
+_MIN_SAMPLES = 256
+_SAMPLES_PER_SEGMENT = 16
+_MAX_STARTS = 6
+
+
+class Projection(NamedTuple):
+    """Result of the orthogonal projection onto a curve, (3.6).
+
+    Attributes:
+        theta: Parameter of the closest point, unwrapped: it goes on over the laps.
+        alpha: (3.9); the point lies in the feasible neighbourhood if alpha < 1.
+        at_end: True if the curve is open and the point lies beyond one of its ends; theta
+            is then that end.
+        iterations: Number of evaluations of the curve.
+        converged: False if no strict minimum was found, also for input that is not finite.
+    """
+
+    theta: float
+    alpha: float
+    at_end: bool
+    iterations: int
+    converged: bool
+
+
+class Projector:
+    """Local minimum of J(theta) = |y - sigma(theta)|^2 near a guess, by Newton's method (3.72).
+
+    The step is limited, halved while J grows, and goes down the gradient, scaled by 1/|J''|,
+    where J'' = 2 |sigma'|^2 (1 - alpha) is not positive. Started from the last result it follows
+    its branch of the curve through self-intersections.
+
+    Args:
+        curve: Curve of class C^2, any dimension.
+    """
+
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+        self._begin, self._end = curve.domain
+        self._closed = curve.closed
+        self._terms = _terms_3(curve) if curve.dimension == 3 else _terms_any(curve)
+
+    def project(self, point: Sequence[float], theta_guess: float) -> Projection:
+        """Closest point near the guess.
+
+        Args:
+            point: y, [dimension], m.
+            theta_guess: Unwrapped parameter to start from, as a rule the last result.
+
+        Returns:
+            The projection; `converged` is False and nothing is raised if the point or the
+            guess is not finite.
+        """
+        begin, end, closed = self._begin, self._end, self._closed
+        terms = self._terms
+        length = end - begin
+        tolerance, coarse, limit = _TOLERANCE * length, _COARSE * length, _MAX_STEP * length
+        theta = theta_guess
+        if not -math.inf < theta < math.inf:
+            return Projection(theta_guess, math.nan, False, 0, False)
+        if not closed:
+            theta = min(max(theta, begin), end)
+        origin, step, least, alpha = theta, 0.0, math.inf, math.nan
+        for iteration in range(1, _MAX_ITERATIONS + 1):
+            cost, slope, square, bend = terms(theta, point)
+            if not cost < math.inf:
+                return Projection(theta_guess, math.nan, False, iteration, False)
+            if cost > least and (step > coarse or step < -coarse):
+                step *= 0.5
+                theta = origin + step
+                continue
+            curvature = square - bend
+            alpha = bend / square
+            step = slope / (abs(curvature) or square)
+            if step > limit:
+                step = limit
+            elif step < -limit:
+                step = -limit
+            if -tolerance < step < tolerance:
+                return Projection(theta + step, alpha, False, iteration, curvature > 0.0)
+            origin, least = theta, cost
+            theta += step
+            if not closed and not begin <= theta <= end:
+                theta = begin if theta < begin else end
+                step = theta - origin
+                if step == 0.0:
+                    return Projection(theta, alpha, True, iteration, True)
+        # Near alpha = 1 rounding errors of the slope can exceed the tolerance.
+        stalled = abs(step) < _STALLED * length and alpha < 1.0
+        return Projection(theta, alpha, False, _MAX_ITERATIONS, stalled)
+
+
+def project_globally(curve: Curve, point: ArrayLike, samples: int | None = None) -> Projection:
+    """Closest point of the whole curve, (3.6), by sampling and Newton's method (section 3.7.1).
+
+    Args:
+        curve: Curve of class C^2, any dimension.
+        point: y, [dimension], m.
+        samples: Number of samples over the domain; by default 16 on each segment, at
+            least 256.
+
+    Returns:
+        The projection, with theta in the domain.
+
+    Raises:
+        InputError: the point has the wrong dimension, or `samples` is below 4.
+    """
+    y = np.asarray(point, dtype=float)
+    if y.shape != (curve.dimension,):
+        raise InputError(f"point: shape {y.shape}; ({curve.dimension},) is required")
+    if samples is not None and samples < 4:
+        raise InputError(f"samples: {samples}; at least 4 are required")
+    count = samples or max(_MIN_SAMPLES, _SAMPLES_PER_SEGMENT * (len(curve.breakpoints) - 1))
+    theta = np.linspace(*curve.domain, count, endpoint=not curve.closed)
+    cost = np.sum((y - curve.derivatives(theta, 0)[:, 0]) ** 2, axis=1)
+    if curve.closed:
+        before, after = np.roll(cost, 1), np.roll(cost, -1)
+    else:
+        before, after = np.append(np.inf, cost[:-1]), np.append(cost[1:], np.inf)
+    valleys = np.flatnonzero((cost <= before) & (cost <= after))
+    starts = valleys[np.argsort(cost[valleys], kind="stable")][:_MAX_STARTS]
+    projector = Projector(curve)
+    values = y.tolist()
+    results = [projector.project(values, float(theta[start])) for start in starts]
+    if not results:
+        return Projection(curve.domain[0], math.nan, False, 0, False)
+
+    def distance(result: Projection) -> tuple[bool, float]:
+        reached = curve.derivatives(result.theta, 0)[0]
+        return not result.converged, float(np.sum((y - reached) ** 2))
+
+    best = min(results, key=distance)
+    return best._replace(theta=float(curve.wrap(best.theta)))
+
+
+Terms = Callable[[float, Sequence[float]], tuple[float, float, float, float]]
+
+
+def _terms_3(curve: Curve) -> Terms:
+    """J, -J'/2, |sigma'|^2 and (y - sigma) . sigma'' in R^3, in scalars for speed."""
+    sample = curve.flat_sampler(2)
+
+    def terms(theta: float, point: Sequence[float]) -> tuple[float, float, float, float]:
+        x, y, z, dx, dy, dz, cx, cy, cz = sample(theta).tolist()
+        x = point[0] - x
+        y = point[1] - y
+        z = point[2] - z
+        return (
+            x * x + y * y + z * z,
+            x * dx + y * dy + z * dz,
+            dx * dx + dy * dy + dz * dz,
+            x * cx + y * cy + z * cz,
+        )
+
+    return terms
+
+
+def _terms_any(curve: Curve) -> Terms:
+    """The same in any dimension."""
+    sample = curve.sampler(2)
+
+    def terms(theta: float, point: Sequence[float]) -> tuple[float, float, float, float]:
+        sigma, first, second = sample(theta)
+        error = np.asarray(point) - sigma
+        return (
+            float(error @ error),
+            float(error @ first),
+            float(first @ first),
+            float(error @ second),
+        )
+
+    return terms

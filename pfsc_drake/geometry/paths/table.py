@@ -1,0 +1,118 @@
+"""Everything that is a function of the path parameter alone, as one table of polynomials."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, fit_pieces, power_coefficients
+from pfsc_drake.geometry.paths.arc_length import ArcLength
+from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
+from pfsc_drake.geometry.paths.point import PathPointLayout
+
+_DEGREE = 7
+# Of each quantity, relative to its largest value on the path.
+_TOLERANCE = 1e-13
+_SCALE_SAMPLES = 512
+# Breakpoints closer than this part of the domain are one.
+_SAME = 1e-13
+
+
+class PathTable(NamedTuple):
+    """Polynomials of degree 7 in u = theta - theta_s on each piece s of a path.
+
+    A closed path with an orientation of two laps has a table of two laps.
+
+    Attributes:
+        breakpoints: theta_s and the last end, [pieces + 1].
+        rows: Coefficients of the path point, laid out by `PathPointLayout` with theta,
+            alpha and status left zero, [pieces, layout.size, 8], lowest power first.
+        slopes: Map from (1, y) to the coefficients of (sigma_t - y) . sigma_t', the slope of
+            half the squared distance from a point y, [pieces, 8, 4]. It approximates the
+            product of the rows, to about 1e-13 of its largest value.
+    """
+
+    breakpoints: np.ndarray
+    rows: np.ndarray
+    slopes: np.ndarray
+
+
+def tabulate(
+    position: Curve,
+    orientation: OrientationCurve | None,
+    arc_length: ArcLength,
+    frame: ParallelTransportFrame,
+    layout: PathPointLayout,
+) -> PathTable:
+    """Table of a path.
+
+    Each quantity agrees to 1e-13 of its largest value, or to the rounding errors of the curve
+    itself where these are larger (polynomials of high degree on long segments).
+
+    Args:
+        position: Curve sigma_t in R^3.
+        orientation: Curve of quaternions, or None.
+        arc_length: Arc length of `position`.
+        frame: Parallel transport frame of `position`.
+        layout: Which quantities, and where they go.
+    """
+    order = layout.order
+
+    def path_points(theta: np.ndarray) -> np.ndarray:
+        points = np.zeros((len(theta), layout.size))
+        points[:, layout.eta] = arc_length(theta)[:, None]
+        points[:, layout.normal] = frame.normals(theta)[0]
+        points[:, layout.position] = position.derivatives(theta, order + 1).reshape(len(theta), -1)
+        if orientation is not None:
+            q = orientation.derivatives(theta, order)
+            points[:, layout.quaternion] = q.reshape(len(theta), -1)
+        return points
+
+    breakpoints = _common_breakpoints(position, orientation, frame)
+    samples = np.linspace(breakpoints[0], breakpoints[-1], _SCALE_SAMPLES + 1)
+    scale = np.abs(path_points((samples[1:] + samples[:-1]) / 2.0)).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    breakpoints, coefficients = fit_pieces(
+        lambda theta: path_points(theta) / scale,
+        breakpoints,
+        degree=_DEGREE,
+        tolerance=_TOLERANCE,
+    )
+    rows = np.ascontiguousarray((coefficients * scale).transpose(0, 2, 1))
+    sigma, tangent = rows[:, layout.position][:, :3], rows[:, layout.position][:, 3:6]
+    return PathTable(breakpoints, rows, _slopes(np.diff(breakpoints), sigma, tangent))
+
+
+def _common_breakpoints(
+    position: Curve, orientation: OrientationCurve | None, frame: ParallelTransportFrame
+) -> np.ndarray:
+    """Where any of the quantities need not be smooth, [n]."""
+    begin, end = position.domain
+    parts = [position.breakpoints, frame.breakpoints]
+    if orientation is not None and not orientation.constant:
+        if position.closed and round(orientation.period / position.period) == 2:
+            parts += [part + position.period for part in parts]
+            end += position.period
+        parts.append(orientation.breakpoints)
+    merged = np.unique(np.concatenate(parts))
+    slack = _SAME * (end - begin)
+    inner = merged[(merged > begin + slack) & (merged < end - slack)]
+    inner = inner[np.diff(inner, prepend=begin) > slack]
+    return np.concatenate([[begin], inner, [end]])
+
+
+def _slopes(lengths: np.ndarray, sigma: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Map `PathTable.slopes` from coefficients of sigma_t and sigma_t', each [pieces, 3, 8]."""
+    count = sigma.shape[2]
+    local = chebyshev_nodes(np.zeros_like(lengths), lengths, count)
+    powers = local[..., None] ** np.arange(count)
+    # Distances from the begin of the piece lose no digits where the path is far from the origin.
+    start = sigma[:, :, :1]
+    moved = np.einsum("sdj,snj->snd", sigma, powers) - start.transpose(0, 2, 1)
+    product = np.sum(moved * np.einsum("sdj,snj->snd", tangent, powers), axis=2, keepdims=True)
+    slopes = np.empty((len(lengths), count, 4))
+    slopes[:, :, :1] = power_coefficients(product, lengths)
+    slopes[:, :, 0] += np.sum(start * tangent, axis=1)
+    slopes[:, :, 1:] = -tangent.transpose(0, 2, 1)
+    return slopes

@@ -1,0 +1,1 @@
+"""What a controller meets and does not know: friction, drives, sensors, hands, forces."""

@@ -1,0 +1,109 @@
+"""Forces over time, written down beforehand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+
+FRAMES = ("world", "manifold")
+
+
+def smooth_step(x: float) -> float:
+    """Return ``10 x^3 - 15 x^4 + 6 x^5``, 0 before x = 0 and 1 after x = 1; C^2."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+def smooth_step_slope(x: float) -> float:
+    """Return the derivative of :func:`smooth_step`."""
+    x = min(max(x, 0.0), 1.0)
+    return 30.0 * x * x * (1.0 - x) * (1.0 - x)
+
+
+def smooth_pulse(time: float, begin: float, end: float, ramp: float) -> float:
+    """Return 1 from ``begin + ramp`` to ``end - ramp``, 0 outside ``begin .. end``; C^2."""
+    return min(smooth_step((time - begin) / ramp), smooth_step((end - time) / ramp))
+
+
+@dataclass
+class ForcePulse:
+    """A wrench at the tool point that comes, stays and goes, smoothly (C^2 in time).
+
+    Attributes:
+        begin: When it leaves zero [s].
+        end: When it is zero again [s].
+        force: In between, shape (3,) [N].
+        torque: In between, shape (3,) [Nm].
+        ramp: Time from zero to full and back [s].
+        frame: ``world``: components along the world's axes; ``manifold``: along
+            ``e_par, e_perp, e_cross`` of the path next to the tool, so that
+            ``force = [-100, 0, 0]`` pushes against a motion with growing ``eta``.
+    """
+
+    begin: float = 0.0
+    end: float = 1.0
+    force: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    torque: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    ramp: float = 0.05
+    frame: str = "world"
+
+    def __post_init__(self) -> None:
+        self.force, self.torque = (np.asarray(x, dtype=float) for x in (self.force, self.torque))
+        for key in ("force", "torque"):
+            value = getattr(self, key)
+            if value.shape != (3,) or not np.all(np.isfinite(value)):
+                raise InputError(f"{key} = {value.tolist()}: must be 3 finite numbers")
+        if not (np.isfinite(self.begin) and self.begin < self.end < np.inf):
+            raise InputError(f"begin, end = {self.begin}, {self.end}: must be finite and ascending")
+        longest = (self.end - self.begin) / 2.0
+        if not 0.0 < self.ramp <= longest * (1.0 + 1e-9):
+            raise InputError(
+                f"ramp = {self.ramp}: must be positive and at most {longest:g}, half the pulse"
+            )
+        if self.frame not in FRAMES:
+            raise InputError(f"frame = {self.frame!r}: must be one of {', '.join(FRAMES)}")
+
+    def at(self, time: float) -> np.ndarray:
+        """Return ``[force, torque]`` in the pulse's own frame, shape (6,) [N, Nm]."""
+        scale = smooth_pulse(time, self.begin, self.end, self.ramp)
+        return scale * np.concatenate([self.force, self.torque])
+
+
+class ForceProfile:
+    """A sum of pulses.
+
+    Args:
+        pulses: The pulses; they may overlap, and so make stairs.
+    """
+
+    def __init__(self, pulses: Sequence[ForcePulse]) -> None:
+        self._by_frame = {
+            frame: [pulse for pulse in pulses if pulse.frame == frame] for frame in FRAMES
+        }
+        self._spans = [(pulse.begin, pulse.end) for pulse in pulses]
+
+    @property
+    def needs_path(self) -> bool:
+        """Whether a pulse is given in manifold coordinates."""
+        return bool(self._by_frame["manifold"])
+
+    def is_active(self, begin: float, end: float) -> bool:
+        """Return whether a pulse acts between two times, both included [s]."""
+        return any(first <= end and begin <= last for first, last in self._spans)
+
+    def at(self, time: float, axes: np.ndarray) -> np.ndarray:
+        """Return the wrench at the tool point in world axes, shape (6,) [N, Nm].
+
+        Args:
+            time: [s].
+            axes: See :func:`manifold_axes`, shape (3, 3).
+        """
+        if not self.is_active(time, time):
+            return np.zeros(6)
+        sums = {
+            frame: sum((pulse.at(time) for pulse in pulses), np.zeros(6)).reshape(2, 3)
+            for frame, pulses in self._by_frame.items()
+        }
+        return (sums["world"] + sums["manifold"] @ axes.T).ravel()

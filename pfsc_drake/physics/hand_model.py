@@ -1,0 +1,197 @@
+"""A human hand on the tool: a spring-damper towards a moving target."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_profile import FRAMES, smooth_step, smooth_step_slope
+
+# from coordinates and their rates, shape (3,) each, to position and velocity in the world
+Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+# sinusoids per axis, enough for an irregular tremor
+_TREMOR_LINES = 16
+
+
+@dataclass
+class HandWaypoint:
+    """Where the hand wants the tool point to be.
+
+    Attributes:
+        time: [s].
+        position: In the hand's frame, shape (3,) [m].
+    """
+
+    time: float = 0.0
+    position: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        self.position = np.asarray(self.position, dtype=float)
+        if self.position.shape != (3,) or not np.all(np.isfinite(self.position)):
+            raise InputError(f"position = {self.position.tolist()}: must be 3 finite numbers")
+
+
+@dataclass
+class HandParameters:
+    """Properties of a hand; stiffness and damping are of the order of a relaxed human arm's.
+
+    Attributes:
+        waypoints: Of the target, in ascending time.
+        frame: ``world``: positions are along the world's axes; ``manifold``: they are
+            ``eta, xi_1, xi_2`` of the path.
+        stiffness: K [N/m].
+        damping: D [N s/m].
+        rotational_damping: D_r [Nm s/rad], by which the grip resists turning.
+        force_limit: Largest magnitude of the force [N].
+        torque_limit: Largest magnitude of the torque [Nm].
+        reaction_delay: From seeing to pushing [s]; a multiple of the sampling time.
+        tremor: Standard deviation of the trembling force per axis [N].
+        tremor_band: Lowest and highest frequency of the tremor [Hz], shape (2,).
+        grip_ramp: Time in which the hand takes hold and lets go [s].
+        release: When the hand begins to let go [s]; infinite: never.
+        seed: Of the tremor.
+        source: Where the numbers are from.
+    """
+
+    waypoints: list[HandWaypoint] = field(default_factory=lambda: [HandWaypoint()])
+    frame: str = "world"
+    stiffness: float = 300.0
+    damping: float = 30.0
+    rotational_damping: float = 0.0
+    force_limit: float = 45.0
+    torque_limit: float = 3.0
+    reaction_delay: float = 0.0
+    tremor: float = 0.0
+    tremor_band: np.ndarray = field(default_factory=lambda: np.array([8.0, 12.0]))
+    grip_ramp: float = 0.2
+    release: float = np.inf
+    seed: int = 0
+    source: str = "assumed"
+
+    def __post_init__(self) -> None:
+        for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
+            _require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+        for key in ("damping", "rotational_damping", "reaction_delay", "tremor", "seed"):
+            value = getattr(self, key)
+            _require(0.0 <= value < np.inf, key, value, "zero or positive")
+        _require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
+        band = np.asarray(self.tremor_band, dtype=float)
+        fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
+        _require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
+        times = [waypoint.time for waypoint in self.waypoints]
+        ascending = bool(times) and bool(
+            np.all(np.diff(times) > 0.0) and np.all(np.isfinite(times))
+        )
+        _require(ascending, "waypoints", times, "one or more with ascending times")
+        _require(self.release > times[0], "release", self.release, f"after {times[0]:g} s")
+
+
+class HandModel:
+    """Force of a hand on the tool.
+
+    The hand wants ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and ``tau_c = -D_r w``, and
+    delivers, a reaction delay later, ``s (limit(f_c + tremor))`` and ``s limit(tau_c)``: s goes
+    from 0 to 1 while it takes hold and back when it lets go; limits are of the magnitude.
+
+    The target ``p_d`` moves from waypoint to waypoint with minimum jerk, at rest in each.
+    The tremor is a sum of sinusoids, whose frequencies and phases the seed determines.
+    Without delay, and up to its limits, a hand with a resting target is passive.
+
+    Args:
+        parameters: Its properties.
+        place: Where coordinates of the frame ``manifold`` are in the world.
+
+    Raises:
+        InputError: If the waypoints are in the frame ``manifold`` and there is no path.
+    """
+
+    def __init__(self, parameters: HandParameters, place: Place | None = None) -> None:
+        self._parameters, self._place = parameters, None
+        if parameters.frame == "manifold":
+            _require(place is not None, "frame", parameters.frame, "world without a path")
+            self._place = place
+        self._times = np.array([waypoint.time for waypoint in parameters.waypoints])
+        self._positions = np.array([waypoint.position for waypoint in parameters.waypoints])
+        random = np.random.default_rng(parameters.seed)
+        low, high = parameters.tremor_band
+        steps = np.arange(_TREMOR_LINES) + random.uniform(size=(3, _TREMOR_LINES))
+        self._pulsations = 2.0 * np.pi * (low + (high - low) * steps / _TREMOR_LINES)
+        self._phases = random.uniform(0.0, 2.0 * np.pi, (3, _TREMOR_LINES))
+        self._amplitude = parameters.tremor * np.sqrt(2.0 / _TREMOR_LINES)
+
+    def target(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``p_d`` [m] and ``p_d'`` [m/s], in the world, shape (3,) each."""
+        coordinates, rates = self._coordinates(time)
+        return (coordinates, rates) if self._place is None else self._place(coordinates, rates)
+
+    def _coordinates(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the target in the hand's own frame, and its rate, shape (3,) each."""
+        last = len(self._times) - 1
+        i = min(max(int(np.searchsorted(self._times, time, side="right")) - 1, 0), last)
+        if i == last:
+            return self._positions[last], np.zeros(3)
+        duration = self._times[i + 1] - self._times[i]
+        way = self._positions[i + 1] - self._positions[i]
+        x = (time - self._times[i]) / duration
+        return self._positions[i] + smooth_step(x) * way, smooth_step_slope(x) / duration * way
+
+    def tremor(self, time: float) -> np.ndarray:
+        """Return the trembling force, shape (3,) [N]."""
+        return self._amplitude * np.cos(self._pulsations * time + self._phases).sum(axis=1)
+
+    def grip(self, time: float) -> float:
+        """Return how firmly the hand holds the tool, from 0 to 1."""
+        ramp = self._parameters.grip_ramp
+        taking = smooth_step((time - self._times[0]) / ramp)
+        return taking * (1.0 - smooth_step((time - self._parameters.release) / ramp))
+
+    def wanted(self, time: float, y_t: np.ndarray, twist: np.ndarray) -> np.ndarray:
+        """Return ``[f_c, tau_c]``, world axes, shape (6,) [N, Nm].
+
+        Args:
+            time: [s].
+            y_t: Tool point [m], shape (3,).
+            twist: ``[y_t', w]``, world axes, shape (6,) [m/s, rad/s].
+        """
+        p_d, v_d = self.target(time)
+        hand = self._parameters
+        force = hand.stiffness * (p_d - y_t) + hand.damping * (v_d - twist[:3])
+        return np.concatenate([force, -hand.rotational_damping * twist[3:]])
+
+    def delivered(self, time: float, wanted: np.ndarray) -> np.ndarray:
+        """Return the wrench on the tool, world axes, shape (6,) [N, Nm].
+
+        Args:
+            time: [s].
+            wanted: What the hand wanted one reaction delay ago, shape (6,).
+        """
+        force = _limited(wanted[:3] + self.tremor(time), self._parameters.force_limit)
+        torque = _limited(wanted[3:], self._parameters.torque_limit)
+        return self.grip(time) * np.concatenate([force, torque])
+
+
+def observed_twist(before: np.ndarray, now: np.ndarray, period: float) -> np.ndarray:
+    """Return ``[y_t', w]`` between two tool poses, world axes, shape (6,) [m/s, rad/s].
+
+    ``w`` from the antisymmetric part of ``R_now R_before'``, for turns much below a radian.
+
+    Args:
+        before: ``[y_t, R_e by rows]``, shape (12,).
+        now: The same, later.
+        period: Time between them [s].
+    """
+    turn = now[3:].reshape(3, 3) @ before[3:].reshape(3, 3).T
+    S = (turn - turn.T) / 2.0
+    return np.concatenate([now[:3] - before[:3], [S[2, 1], S[0, 2], S[1, 0]]]) / period
+
+
+def _limited(vector: np.ndarray, limit: float) -> np.ndarray:
+    norm = float(np.linalg.norm(vector))
+    return vector if norm <= limit else vector * (limit / norm)
+
+
+def _require(condition: bool, key: str, value: object, allowed: str) -> None:
+    if not condition:
+        raise InputError(f"{key} = {value}: must be {allowed}")

@@ -1,0 +1,1 @@
+"""The DELTA robot."""

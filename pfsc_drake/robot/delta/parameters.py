@@ -1,0 +1,212 @@
+"""Physical parameters of a DELTA robot with linear drives, ``models/<robot>/parameters.yaml``.
+
+The inertial frame (0, x_0, y_0, z_0) has its origin in the centre of the base plate, x_0 points to
+the first drive and z_0 **down**, from the base to the end-effector (Sec. 2.2). Fig. 2.2 and
+Tab. 2.2 define the symbols.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.models.parameters import FrictionParameters
+from pfsc_drake.robot.parameter_checks import check_vector, require
+from pfsc_drake.yaml.typed import REQUIRED, load_file
+
+NUM_ARMS = 3
+SHIPPED_ROBOTS = ("festo_expt_45",)
+
+
+def _ones() -> np.ndarray:
+    return np.ones(NUM_ARMS)
+
+
+def _zeros() -> np.ndarray:
+    return np.zeros(NUM_ARMS)
+
+
+@dataclass
+class DeltaGeometry:
+    """Dimensions of the three equal arms.
+
+    Attributes:
+        l_BC: length of the rods [m].
+        l_A: distance of the rails' upper ends A_i from the base's centre 0 [m].
+        l_EC: distance of the rods' lower ends C_i from the end-effector's centre E [m].
+        h_P: height of the point P that all rails point to, below the base [m].
+    """
+
+    l_BC: float = field(default=1.0, metadata=REQUIRED)
+    l_A: float = field(default=1.0, metadata=REQUIRED)
+    l_EC: float = field(default=0.1, metadata=REQUIRED)
+    h_P: float = field(default=1.0, metadata=REQUIRED)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("l_BC", "l_A", "l_EC", "h_P"):
+            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+        require(self.l_EC < self.l_A, "l_EC", self.l_EC, f"less than l_A = {self.l_A!r}")
+
+    @property
+    def rail_length(self) -> float:
+        """Distance ``1 / k_D = sqrt(l_A^2 + h_P^2)`` from A_i to P [m]."""
+        return float(np.hypot(self.l_A, self.h_P))
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Rows e_xi, unit vectors from 0 to A_i, shape (3, 3)."""
+        angles = 2.0 * np.pi / NUM_ARMS * np.arange(NUM_ARMS)
+        return np.column_stack([np.cos(angles), np.sin(angles), np.zeros(NUM_ARMS)])
+
+    @property
+    def rails(self) -> np.ndarray:
+        """Rows ``c_i = k_D (l_A e_xi - h_P e_z)`` of (2.29), shape (3, 3).
+
+        Unit vectors from P to A_i; a slide moves along ``-c_i`` when q_i grows.
+        """
+        down = np.array([0.0, 0.0, self.h_P])
+        return (self.l_A * self.directions - down) / self.rail_length
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """Rows ``(l_A - l_EC) e_xi`` [m], shape (3, 3).
+
+        The rods are ``w_i = y_t - offset_i + q_i c_i`` (2.29).
+        """
+        return (self.l_A - self.l_EC) * self.directions
+
+
+@dataclass
+class DeltaMasses:
+    """Masses of the moving parts.
+
+    Attributes:
+        slide: m_s,i of each slide with what moves along with it [kg].
+        rod_pair: m_p of the two rods of an arm [kg].
+        plate: m_e of the end-effector plate [kg].
+        load: m_l of what the plate carries [kg].
+    """
+
+    slide: float = field(default=1.0, metadata=REQUIRED)
+    rod_pair: float = field(default=0.0, metadata=REQUIRED)
+    plate: float = field(default=1.0, metadata=REQUIRED)
+    load: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("slide", "plate"):
+            require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
+        for key in ("rod_pair", "load"):
+            allowed = "zero or positive"
+            require(0.0 <= getattr(self, key) < np.inf, key, getattr(self, key), allowed)
+
+    @property
+    def effective_slide(self) -> float:
+        """Mass ``m_q = m_s + 2/3 m_p`` of a slide with its share of the rods [kg], Sec. 2.4.5."""
+        return self.slide + 2.0 / 3.0 * self.rod_pair
+
+    @property
+    def effective_plate(self) -> float:
+        """Mass ``m_y = m_e + m_l + m_p`` of the end-effector with its share [kg], Sec. 2.4.5."""
+        return self.plate + self.load + NUM_ARMS * self.rod_pair / 3.0
+
+
+@dataclass
+class DeltaDrives:
+    """Limits of the three linear drives.
+
+    Attributes:
+        position_lower: ``[3]`` smallest slide positions [m], at least 0.
+        position_upper: ``[3]`` largest slide positions [m].
+        velocity: ``[3]`` largest absolute slide velocities [m/s].
+        effort: ``[3]`` largest absolute drive forces [N].
+    """
+
+    position_lower: np.ndarray = field(default_factory=_zeros, metadata=REQUIRED)
+    position_upper: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
+    velocity: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
+    effort: np.ndarray = field(default_factory=_ones, metadata=REQUIRED)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("position_lower", "position_upper", "velocity", "effort"):
+            check_vector(key, getattr(self, key), NUM_ARMS)
+        for key in ("velocity", "effort"):
+            value = getattr(self, key)
+            require(bool(np.all(value > 0.0)), key, value, "positive")
+        lower, upper = self.position_lower, self.position_upper
+        require(bool(np.all(lower >= 0.0)), "position_lower", lower, "zero or positive")
+        allowed = f"less than position_upper = {upper.tolist()}"
+        require(bool(np.all(lower < upper)), "position_lower", lower, allowed)
+
+
+@dataclass
+class DeltaWorkspace:
+    """How far the robot keeps from singular configurations.
+
+    Attributes:
+        min_rod_independence: smallest allowed singular value of the matrix of the three unit rod
+            vectors, between 0 (two rods parallel or all in one plane) and 1 (orthogonal).
+    """
+
+    min_rod_independence: float = field(default=0.1, metadata=REQUIRED)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        value = self.min_rod_independence
+        require(0.0 < value < 1.0, "min_rod_independence", value, "between 0 and 1")
+
+
+@dataclass
+class DeltaParameters:
+    """All physical parameters of a DELTA robot with linear drives.
+
+    Attributes:
+        name: of the robot.
+        geometry: dimensions.
+        masses: of the moving parts.
+        gravity: ``[3]`` gravitational acceleration in the inertial frame [m/s^2].
+        drives: limits of the drives.
+        friction: ``f_c`` [N] and ``f_v`` [Ns/m] of (2.34) for each drive.
+        workspace: distance from singular configurations.
+    """
+
+    name: str = field(default="unnamed", metadata=REQUIRED)
+    geometry: DeltaGeometry = field(default_factory=DeltaGeometry, metadata=REQUIRED)
+    masses: DeltaMasses = field(default_factory=DeltaMasses, metadata=REQUIRED)
+    gravity: np.ndarray = field(default_factory=_zeros, metadata=REQUIRED)
+    drives: DeltaDrives = field(default_factory=DeltaDrives, metadata=REQUIRED)
+    friction: FrictionParameters = field(
+        default_factory=lambda: FrictionParameters(_zeros(), _zeros()), metadata=REQUIRED
+    )
+    workspace: DeltaWorkspace = field(default_factory=DeltaWorkspace, metadata=REQUIRED)
+
+    def __post_init__(self) -> None:
+        require(bool(self.name), "name", self.name, "a name")
+        check_vector("gravity", self.gravity, NUM_ARMS)
+        for key in ("coulomb", "viscous"):
+            check_vector(f"friction.{key}", getattr(self.friction, key), NUM_ARMS)
+        upper, end = self.drives.position_upper, self.geometry.rail_length
+        allowed = f"less than the rails' length to P, {end:.6g} m"
+        require(bool(np.all(upper < end)), "drives.position_upper", upper, allowed)
+
+
+def load_delta_parameters(robot: str | Path = "festo_expt_45") -> DeltaParameters:
+    """Returns the parameters of a DELTA robot.
+
+    Args:
+        robot: the name of a shipped robot (``"festo_expt_45"``) or the path of a YAML file.
+
+    Raises:
+        InputError: if the file cannot be read or a key is unknown, missing or out of range.
+    """
+    path = Path(robot)
+    if not path.suffix:
+        if str(robot) not in SHIPPED_ROBOTS:
+            known = ", ".join(SHIPPED_ROBOTS)
+            raise InputError(f"DELTA robot {str(robot)!r}: must be a file or one of {known}")
+        path = models_directory() / path / "parameters.yaml"
+    return load_file(DeltaParameters, path)

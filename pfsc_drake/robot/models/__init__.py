@@ -1,0 +1,1 @@
+"""Model files and parameters of robots."""

@@ -1,0 +1,328 @@
+"""Physical parameters of a serial robot, as held by ``models/<robot>/parameters.yaml``.
+
+The dataclasses mirror the file, say what each key means and refuse what is out of range;
+``source`` always says where the numbers are from. :func:`load_parameters` reads the file.
+"""
+
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.parameter_checks import check_vector, require
+from pfsc_drake.robot.serial.denavit_hartenberg import DenavitHartenberg
+from pfsc_drake.yaml.typed import REQUIRED, load_file
+
+# Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
+_PLACEHOLDER_NAME = "unnamed"
+_POSITIVE = {**REQUIRED, "sign": "positive"}
+_NOT_NEGATIVE = {**REQUIRED, "sign": "not negative"}
+
+# by which the length of a unit vector may be off
+_UNIT_LENGTH = 1e-6
+
+
+def _zero() -> np.ndarray:
+    return np.zeros(1)
+
+
+def _one() -> np.ndarray:
+    return np.ones(1)
+
+
+def _origin() -> np.ndarray:
+    return np.zeros(3)
+
+
+@dataclass
+class DhParameters:
+    """The DH table of N revolute joints (Tab. 2.1), with one entry per joint.
+
+    Attributes:
+        d: offsets along z_{i-1} [m].
+        a: lengths along x_i [m].
+        alpha_deg: twists about x_i [deg].
+    """
+
+    d: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    a: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    alpha_deg: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.d.size)
+
+    def table(self) -> DenavitHartenberg:
+        """Returns the table with its direct kinematics."""
+        return DenavitHartenberg(self.d, self.a, np.deg2rad(self.alpha_deg))
+
+
+@dataclass
+class JointLimitParameters:
+    """Limits of the N joints (Tab. C.1), at the joint side.
+
+    Attributes:
+        position_lower_deg: smallest DH angles [deg].
+        position_upper_deg: largest DH angles [deg].
+        velocity_deg: largest absolute velocities [deg/s].
+        acceleration_deg: largest absolute accelerations [deg/s^2].
+        effort: largest absolute drive torques [Nm].
+    """
+
+    position_lower_deg: np.ndarray = field(default_factory=_zero, metadata=REQUIRED)
+    position_upper_deg: np.ndarray = field(default_factory=_one, metadata=REQUIRED)
+    velocity_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    acceleration_deg: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    effort: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        lower, upper = self.position_lower_deg, self.position_upper_deg
+        _check_entries(self, axes=lower.size)
+        allowed = f"less than position_upper_deg = {upper.tolist()}"
+        require(bool(np.all(lower < upper)), "position_lower_deg", lower, allowed)
+
+    @property
+    def position_lower(self) -> np.ndarray:
+        """``[N]`` smallest DH angles [rad]."""
+        return np.deg2rad(self.position_lower_deg)
+
+    @property
+    def position_upper(self) -> np.ndarray:
+        """``[N]`` largest DH angles [rad]."""
+        return np.deg2rad(self.position_upper_deg)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """``[N]`` largest absolute velocities [rad/s]."""
+        return np.deg2rad(self.velocity_deg)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """``[N]`` largest absolute accelerations [rad/s^2]."""
+        return np.deg2rad(self.acceleration_deg)
+
+
+@dataclass
+class BodyParameters:
+    """Mass properties of one rigid body, in its body frame (a link's DH frame).
+
+    Attributes:
+        name: of the body.
+        mass: [kg].
+        center_of_mass: ``[3]`` [m].
+        inertia: ``[6]``, about the center of mass: xx, yy, zz, xy, xz, yz [kg m^2].
+    """
+
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    mass: float = field(default=1.0, metadata=REQUIRED)
+    center_of_mass: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(6), metadata=REQUIRED)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        require(bool(self.name), "name", self.name, "a name")
+        require(0 < self.mass < np.inf, "mass", self.mass, "positive and finite")
+        check_vector("center_of_mass", self.center_of_mass, 3)
+        check_vector("inertia", self.inertia, 6)
+        principal = np.linalg.eigvalsh(self.inertia_matrix())
+        physical = principal[0] >= 0 and 2 * principal[2] <= principal.sum() * (1 + 1e-6)
+        allowed = "physical (no principal moment negative or above the sum of the other two)"
+        require(bool(physical), "inertia", self.inertia, allowed)
+
+    def inertia_matrix(self) -> np.ndarray:
+        """Returns the inertia about the center of mass, ``[3, 3]`` [kg m^2]."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@dataclass
+class ToolParameters(BodyParameters):
+    """The rigid body on the flange; its frame is DH frame N.
+
+    Attributes:
+        tool_point: ``[3]`` tool offset ``[x_NT, y_NT, z_NT]`` of (2.5) [m].
+    """
+
+    tool_point: np.ndarray = field(default_factory=_origin, metadata=REQUIRED)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_vector("tool_point", self.tool_point, 3)
+
+
+@dataclass
+class RotorParameters:
+    """The rotors of the N drives.
+
+    Attributes:
+        inertia: ``[N]`` I_M,zz about the spin axis, at the motor side [kg m^2].
+        gear_ratio: ``[N]`` 1/k_r, motor revolutions per joint revolution.
+        body_mass: of each rotor body in elastic models [kg]; a part of the carrying link's mass.
+        fixed_to_link: link that carries each rotor, 0 for the base (Tab. 2.3); or empty.
+        spin_axes: unit vector of each rotor's spin axis in the DH frame of that link, the last
+            column of R_i^{M,j} (Tab. 2.3); or empty.
+    """
+
+    inertia: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    gear_ratio: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    body_mass: float = 0.0
+    fixed_to_link: list[int] = field(default_factory=list)
+    spin_axes: list[list[float]] = field(default_factory=list)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        axes = self.inertia.size
+        _check_entries(self, axes)
+        require(0 <= self.body_mass < np.inf, "body_mass", self.body_mass, "at least 0 and finite")
+        links, spin_axes = self.fixed_to_link, self.spin_axes
+        for key, value in (("fixed_to_link", links), ("spin_axes", spin_axes)):
+            fits = len(value) == (axes if links or spin_axes else 0)
+            require(fits, key, value, f"one per rotor, {axes}, or both keys empty")
+        in_range = all(0 <= link <= axes for link in links)
+        require(in_range, "fixed_to_link", links, f"numbers from 0 (base) to {axes}")
+        for axis in spin_axes:
+            is_unit = len(axis) == 3 and abs(np.linalg.norm(axis) - 1.0) < _UNIT_LENGTH
+            require(bool(is_unit), "spin_axes", axis, "unit vectors, 3 numbers each")
+
+    @property
+    def reflected_inertia(self) -> np.ndarray:
+        """``[N]`` diagonal of D_M, ``I_M,zz / k_r^2``, eq. (2.63), at the joint side [kg m^2]."""
+        return self.inertia * self.gear_ratio**2
+
+
+@dataclass
+class ElasticityParameters:
+    """Elasticity of the first joints of a robot, eq. (2.66).
+
+    Attributes:
+        stiffness: diagonal of K_s [Nm/rad].
+        damping: diagonal of K_d [Nms/rad].
+    """
+
+    stiffness: np.ndarray = field(default_factory=_one, metadata=_POSITIVE)
+    damping: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.stiffness.size)
+
+
+@dataclass
+class FrictionParameters:
+    """Joint friction ``f_c sign(q') + f_v q'``, eq. (2.41), at the joint side.
+
+    Attributes:
+        coulomb: ``[N]`` f_c [Nm].
+        viscous: ``[N]`` f_v [Nms/rad].
+    """
+
+    coulomb: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    viscous: np.ndarray = field(default_factory=_zero, metadata=_NOT_NEGATIVE)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        _check_entries(self, axes=self.coulomb.size)
+
+
+@dataclass
+class VariantParameters:
+    """One model file that is written from the parameters.
+
+    Attributes:
+        name: of the model and of its file.
+        elasticity: a key of :attr:`RobotParameters.elasticities`, or empty for rigid joints.
+        fixed_deg: DH angles at which the last joints are welded [deg]; empty if all joints move.
+    """
+
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    elasticity: str = ""
+    fixed_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        require(bool(self.name), "name", self.name, "a name")
+        check_vector("fixed_deg", self.fixed_deg, self.fixed_deg.size)
+
+
+@dataclass
+class RobotParameters:
+    """All physical parameters of a serial robot with N revolute joints.
+
+    Attributes:
+        name: of the robot.
+        denavit_hartenberg: kinematics.
+        joint_limits: of the joints.
+        links: the N moving links, from the base on.
+        tool: the body on the flange, with the tool point.
+        rotors: the drives.
+        elasticities: named sets of joint elasticities.
+        friction: joint friction.
+        variants: the model files that are written from these parameters.
+    """
+
+    name: str = field(default=_PLACEHOLDER_NAME, metadata=REQUIRED)
+    denavit_hartenberg: DhParameters = field(default_factory=DhParameters, metadata=REQUIRED)
+    joint_limits: JointLimitParameters = field(
+        default_factory=JointLimitParameters, metadata=REQUIRED
+    )
+    links: list[BodyParameters] = field(
+        default_factory=lambda: [BodyParameters()], metadata=REQUIRED
+    )
+    tool: ToolParameters = field(default_factory=ToolParameters, metadata=REQUIRED)
+    rotors: RotorParameters = field(default_factory=RotorParameters, metadata=REQUIRED)
+    elasticities: dict[str, ElasticityParameters] = field(default_factory=dict)
+    friction: FrictionParameters = field(default_factory=FrictionParameters, metadata=REQUIRED)
+    variants: list[VariantParameters] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        axes = self.denavit_hartenberg.d.size
+        require(bool(self.name), "name", self.name, "a name")
+        for key in ("joint_limits", "rotors", "friction"):
+            _check_entries(getattr(self, key), axes, prefix=f"{key}.")
+        require(len(self.links) == axes, "links", len(self.links), f"{axes} links")
+        light = self.rotors.body_mass < min(link.mass for link in self.links)
+        require(light, "rotors.body_mass", self.rotors.body_mass, "below every link's mass")
+        for i, variant in enumerate(self.variants):
+            self._check_variant(f"variants[{i}]", variant, axes)
+
+    def _check_variant(self, key: str, variant: VariantParameters, axes: int) -> None:
+        moving = axes - variant.fixed_deg.size
+        require(moving > 0, f"{key}.fixed_deg", variant.fixed_deg, f"less than {axes} angles")
+        if variant.elasticity:
+            sets = [n for n, e in self.elasticities.items() if e.stiffness.size == moving]
+            allowed = f"empty or a set for {moving} joints: {', '.join(sets) or 'none'}"
+            require(variant.elasticity in sets, f"{key}.elasticity", variant.elasticity, allowed)
+
+
+def load_parameters(robot: str | Path) -> RobotParameters:
+    """Returns the parameters of a robot.
+
+    Args:
+        robot: the name of a shipped robot (``"comau_racer_1_4"``) or the path of a YAML file.
+
+    Raises:
+        InputError: if the file cannot be read or a key is unknown, missing or out of range.
+    """
+    path = Path(robot)
+    if not path.suffix:
+        path = models_directory() / path / "parameters.yaml"
+        if not path.is_file():
+            arms = {file.parent.name for file in models_directory().glob("*/*.sdf")}
+            known = sorted(arms)
+            raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
+    return load_file(RobotParameters, path)
+
+
+def _check_entries(group: Any, axes: int, prefix: str = "") -> None:
+    """Checks that every vector of a group has one entry per axis, with the sign of its field."""
+    for entry in fields(group):
+        key, value = prefix + entry.name, getattr(group, entry.name)
+        if isinstance(value, np.ndarray):
+            require(axes > 0, key, value, "one number per joint")
+            check_vector(key, value, axes)
+            sign = entry.metadata.get("sign", "")
+            fits = np.all(value > 0 if sign == "positive" else value >= 0) or not sign
+            require(bool(fits), key, value, sign)

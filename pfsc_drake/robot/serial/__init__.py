@@ -1,0 +1,1 @@
+"""Serial chains: kinematics, Newton-Euler on jets, and the chain of a MultibodyPlant."""

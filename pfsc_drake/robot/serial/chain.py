@@ -1,0 +1,38 @@
+"""A serial chain of revolute and prismatic joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial import newton_euler
+from pfsc_drake.robot.serial.links import Linkage
+
+
+@dataclass(frozen=True)
+class SerialChain(Linkage, RobotModel):
+    """A chain from the world to a tool point."""
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return len(self.links)
+
+    def gather(self, attribute: str) -> np.ndarray:
+        """Return one attribute of all links as an array, shape (N,) or (N, ...)."""
+        return np.array([getattr(link, attribute) for link in self.links])
+
+    def tool_pose(self, q: Sequence[Jet]) -> tuple[Jet, Jet]:
+        """Return tool point [m] and orientation, see :func:`newton_euler.tool_pose`."""
+        return newton_euler.tool_pose(self, newton_euler.link_motions(self, q))
+
+    def inverse_dynamics(self, q: Sequence[Jet]) -> list[Jet]:
+        """Return the link-side torques, see :func:`newton_euler.inverse_dynamics`."""
+        return newton_euler.inverse_dynamics(self, q)
+
+    def mass_matrix(self, q: ca.SX) -> ca.SX:
+        """Return the link-side mass matrix, see :func:`newton_euler.mass_matrix`."""
+        return newton_euler.mass_matrix(self, q)

@@ -1,0 +1,1 @@
+"""Drake LeafSystems: ports, state, events."""

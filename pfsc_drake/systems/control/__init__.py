@@ -1,0 +1,1 @@
+"""Systems of a controller: they see what is measured and believed."""

@@ -1,0 +1,1 @@
+"""Systems that draw in Meshcat."""

@@ -1,0 +1,1 @@
+"""Systems of the world: plants, drives, friction, sensors, hands, forces."""

@@ -1,0 +1,86 @@
+"""Elastic robot with the inertia coupling of rotors and links."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.rotor_coupling import RotorMount, full_dynamics_function
+
+
+class FullElasticPlant(LeafSystem):
+    """The full model (2.64) of a serial robot with elastic joints, without approximation.
+
+    ``[[D_E, U], [U', D_M]] q'' + [[C_E, C_1], [C_2, 0]] q' + g = [tau_J + tau_ext, tau_d - tau_J]``
+    with ``q = [q_J, q_M]`` and ``tau_J`` of (2.66); see
+    :mod:`~pfsc_drake.robot.serial.rotor_coupling`.
+    A MultibodyPlant with reflected inertias obeys (2.65) instead, where U, C_1 and C_2 are
+    zero. There is no geometry, no contact, no friction and no limit in this plant;
+    :class:`~pfsc_drake.systems.physics.joint_friction.JointFriction` has the port
+    ``resistance``, too.
+
+    Ports:
+        drive_torque (input): ``tau_d`` at the motors, joint side [Nm or N], shape (N,).
+        resistance (input): ``-tau_fM``, adds to ``tau_d`` [Nm or N], shape (N,); 0 if not
+            connected.
+        external_torque (input): ``tau_ext`` at the links [Nm or N], shape (N,); 0 if not
+            connected.
+        joint_state (output): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+
+    State:
+        Continuous: ``[q_J, q_M]`` and ``[v_J, v_M]``, shape (4N,), all 0 at the start; see
+        :meth:`set_joint_state`.
+
+    Args:
+        chain: A robot with elastic joints; N joints.
+        mounts: Where its N rotors sit.
+
+    Raises:
+        InputError: If a joint is rigid or has no rotor inertia, or the mounts do not fit.
+    """
+
+    def __init__(self, chain: SerialChain, mounts: Sequence[RotorMount]) -> None:
+        super().__init__()
+        n = chain.dimension
+        dynamics = full_dynamics_function(chain, mounts)
+        self.DeclareContinuousState(2 * n, 2 * n, 0)
+        self._drive = self.DeclareVectorInputPort("drive_torque", n)
+        self._resistance = self.DeclareVectorInputPort("resistance", n)
+        self._external = self.DeclareVectorInputPort("external_torque", n)
+        # from [q_J, q_M, v_J, v_M] to [q_J, v_J, q_M, v_M] and back
+        self._order = np.arange(4 * n).reshape(4, n)[[0, 2, 1, 3]].ravel()
+        self.DeclareVectorOutputPort(
+            "joint_state",
+            4 * n,
+            self._calc_joint_state,
+            prerequisites_of_calc={self.xc_ticket()},
+        )
+        self._half = 2 * n
+        function = BoundFunction(dynamics)
+        self._state, self._tau_d, self._tau_ext = function.arguments.values()
+        self._acceleration, self._evaluate = function.results["acceleration"], function.evaluate
+
+    def set_joint_state(self, context: Context, joint_state: np.ndarray) -> None:
+        """Put the robot into a state.
+
+        Args:
+            context: Context of this system.
+            joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        """
+        context.SetContinuousState(np.asarray(joint_state)[self._order])
+
+    def _calc_joint_state(self, context: Context, output: BasicVector) -> None:
+        state = context.get_continuous_state_vector().CopyToVector()
+        output.SetFromVector(state[self._order])
+
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """Calculate velocities and accelerations; the framework calls this."""
+        self._state[:] = context.get_continuous_state_vector().CopyToVector()
+        self._tau_d[:] = self._drive.Eval(context)
+        if self._resistance.HasValue(context):
+            self._tau_d += self._resistance.Eval(context)
+        self._tau_ext[:] = self._external.Eval(context) if self._external.HasValue(context) else 0.0
+        self._evaluate()
+        derivatives.SetFromVector(np.concatenate([self._state[self._half :], self._acceleration]))

@@ -1,0 +1,1 @@
+"""Typed YAML with messages for people."""

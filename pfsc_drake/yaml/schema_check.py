@@ -1,0 +1,218 @@
+"""Walks data along a dataclass schema and reports the first key that does not fit."""
+
+import collections.abc
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.reading import TAG_KEY
+
+REQUIRED = {"required": True}  # metadata of a field whose key may not be left out
+
+_SCALAR_NAMES: dict[Any, str] = {
+    bool: "true or false",
+    int: "an integer",
+    float: "a number",
+    str: "text",
+    Path: "a path (text)",
+}
+
+
+def check_schema(schema: type, data: Any, source: str) -> None:
+    """Checks data against a schema, by the rules of Drake's ``yaml_load_typed``.
+
+    Args:
+        schema: Dataclass. Its fields are keys; a field without default, or with
+            ``metadata=REQUIRED``, must be there.
+        data: As :func:`pfsc_drake.yaml.reading.read_yaml` returns it.
+        source: Name of the file, for messages.
+
+    Raises:
+        InputError: One line that names source, key path, value and what is allowed.
+    """
+    _Checker(source).check(schema, data, "")
+
+
+class _Checker:
+    """The walk; ``key`` is the path so far, e.g. ``controller.gains.eta[1]``."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+
+    def check(self, schema: Any, value: Any, key: str) -> None:
+        """Checks one value against the type of its field."""
+        origin, arguments = typing.get_origin(schema), typing.get_args(schema)
+        if dataclasses.is_dataclass(schema):
+            self._check_dataclass(schema, value, key)
+        elif schema in _SCALAR_NAMES:
+            if not _is_scalar(schema, value):
+                self._refuse(value, key, _expected(schema))
+        elif schema is np.ndarray:
+            self._check_array(value, key)
+        elif origin in (typing.Union, types.UnionType):
+            self._check_union(arguments, value, key)
+        elif origin is list:
+            if not isinstance(value, list):
+                self._refuse(value, key, _expected(schema))
+            for index, item in enumerate(value):
+                self.check(arguments[0], item, f"{key}[{index}]")
+        elif origin in (dict, collections.abc.Mapping):
+            if not isinstance(value, dict):
+                self._refuse(value, key, _expected(schema))
+            for name, item in value.items():
+                if not isinstance(name, str):
+                    self._refuse(name, f"{key}.{name}", "a key that is text")
+                self.check(arguments[1], item, f"{key}.{name}")
+
+    def _check_dataclass(self, schema: Any, value: Any, key: str) -> None:
+        """Checks the keys of a mapping, then their values."""
+        hints = typing.get_type_hints(schema)
+        fields = {field.name: field for field in dataclasses.fields(schema)}
+        if not isinstance(value, dict):
+            self._refuse(value, key, f"a mapping with the keys {', '.join(fields)}")
+        prefix = f"{key}." if key else ""
+        for name, item in value.items():
+            if name == TAG_KEY:
+                self._refuse(item, key, "a mapping without a tag")
+            if name not in fields:
+                nearest = difflib.get_close_matches(str(name), fields, n=1)
+                hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+                allowed = ", ".join(fields) or "no keys"
+                raise InputError(
+                    f"{self._source}: unknown key '{prefix}{name}' = {_shown(item)}:"
+                    f" {hint}allowed: {allowed}"
+                )
+            self.check(hints[name], item, prefix + name)
+        for name, field in fields.items():
+            if name not in value and _is_required(field):
+                raise InputError(
+                    f"{self._source}: missing key '{prefix}{name}':"
+                    f" expected {_expected(hints[name])}"
+                )
+
+    def _check_union(self, members: tuple[Any, ...], value: Any, key: str) -> None:
+        """Checks an optional value, a choice of scalars, or of dataclasses by tag."""
+        choices = [member for member in members if member is not type(None)]
+        if value is None:
+            if len(choices) == len(members):
+                self._refuse(value, key, " or ".join(_alternatives(members)))
+        elif len(choices) == 1:
+            self.check(choices[0], value, key)
+        elif isinstance(value, dict) and TAG_KEY in value:
+            by_tag = {f"!{getattr(choice, '__name__', choice)}": choice for choice in choices}
+            tag = str(value[TAG_KEY])
+            if tag not in by_tag:
+                allowed = ", ".join(by_tag)
+                raise InputError(
+                    f"{self._source}: key {key!r}: unknown tag {tag}: allowed: {allowed}"
+                )
+            content = {name: item for name, item in value.items() if name != TAG_KEY}
+            self.check(by_tag[tag], content, key)
+        elif isinstance(value, (dict, list)):
+            self._check_untagged(choices, value, key)
+        elif type(value) not in choices and not _is_scalar(choices[0], value):
+            self._refuse(value, key, " or ".join(_alternatives(members)))
+
+    def _check_untagged(self, choices: list[Any], value: Any, key: str) -> None:
+        """Checks a mapping or list without tag, which is read as the first choice."""
+        try:
+            self.check(choices[0], value, key)
+        except InputError as error:
+            others = [f"!{choice.__name__}" for choice in choices[1:] if isinstance(choice, type)]
+            hint = f" (without a tag {key!r} is !{getattr(choices[0], '__name__', choices[0])};"
+            raise InputError(f"{error}{hint} other tags: {', '.join(others)})") from None
+
+    def _check_array(self, value: Any, key: str) -> None:
+        """Checks a vector, or a matrix as a list of equally long rows."""
+        if not isinstance(value, list):
+            self._refuse(value, key, _expected(np.ndarray))
+        rows = [item for item in value if isinstance(item, list)]
+        if rows and len({len(row) if isinstance(row, list) else -1 for row in value}) > 1:
+            self._refuse(value, key, "rows of equal length")
+        for index, item in enumerate(value):
+            if isinstance(item, list):
+                self._check_array(item, f"{key}[{index}]")
+            elif not _is_scalar(float, item):
+                self._refuse(item, f"{key}[{index}]", _expected(float))
+
+    def _refuse(self, value: Any, key: str, expected: str) -> NoReturn:
+        """Raises the error of a value that does not fit."""
+        where = f"key {key!r}" if key else "the root"
+        raise InputError(f"{self._source}: {where} is {_shown(value)}: expected {expected}")
+
+
+def _is_scalar(schema: Any, value: Any) -> bool:
+    """Whether Drake converts the YAML value to the scalar type; NaN is refused."""
+    kind = type(value)
+    if schema is bool:
+        return kind is bool or value in ("true", "false")
+    if schema is int:
+        return kind is int or _parses(int, value) or (kind is float and value.is_integer())
+    if schema is float:
+        return (kind in (int, float) or _parses(float, value)) and not math.isnan(float(value))
+    return schema in (str, Path) and kind is str
+
+
+def _parses(kind: type, value: Any) -> bool:
+    """Whether text is a number of this kind; YAML 1.1 reads ``1e-3`` as text."""
+    if not isinstance(value, str):
+        return False
+    try:
+        kind(value)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_required(field: "dataclasses.Field[Any]") -> bool:
+    """Whether a key may not be left out."""
+    no_default = field.default is field.default_factory is dataclasses.MISSING
+    return no_default or bool(field.metadata.get("required"))
+
+
+def _expected(schema: Any) -> str:
+    """What a field allows, in words."""
+    if schema in _SCALAR_NAMES:
+        return _SCALAR_NAMES[schema]
+    if schema is np.ndarray:
+        return "a list of numbers"
+    if schema is type(None):
+        return "null"
+    origin, arguments = typing.get_origin(schema), typing.get_args(schema)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(_alternatives(arguments))
+    if origin is list:
+        return f"a list (each item {_expected(arguments[0])})"
+    if origin in (dict, collections.abc.Mapping):
+        return f"a mapping (each value {_expected(arguments[1])})"
+    if dataclasses.is_dataclass(schema):
+        return f"a mapping with the keys {', '.join(f.name for f in dataclasses.fields(schema))}"
+    return str(schema)
+
+
+def _alternatives(members: tuple[Any, ...]) -> list[str]:
+    """What each member of a union allows, in words."""
+    several = sum(dataclasses.is_dataclass(member) for member in members) > 1
+    return [
+        f"!{member.__name__} {{...}}"
+        if several and isinstance(member, type) and dataclasses.is_dataclass(member)
+        else _expected(member)
+        for member in members
+    ]
+
+
+def _shown(value: Any) -> str:
+    """A value as written in YAML, shortened to fit a line."""
+    if value is None:
+        return "empty (null)"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,85 @@
+"""Typed YAML: files and data into dataclasses, with errors a person can act on.
+
+Drake's ``yaml_load_typed`` does the loading. Its messages name neither file nor key path, so the
+schema is walked first (:mod:`~pfsc_drake.yaml.schema_check`) and the loaded object is validated
+after.
+``pydrake`` is imported only when something is loaded.
+"""
+
+import dataclasses
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.reading import dump_yaml, read_yaml
+from pfsc_drake.yaml.schema_check import REQUIRED, check_schema
+
+__all__ = ["REQUIRED", "load_file", "load_typed"]
+
+Schema = TypeVar("Schema")
+
+
+def load_file(schema_class: type[Schema], path: str | Path) -> Schema:
+    """Loads a YAML file into a schema of mutable dataclasses; see :func:`load_typed`.
+
+    Raises:
+        InputError: if the file cannot be read (:func:`pfsc_drake.yaml.reading.read_yaml`) or does
+            not fit; one line that names the file.
+    """
+    return load_typed(schema_class, read_yaml(Path(path)), str(path))
+
+
+def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) -> Schema:
+    """Loads data into a schema of mutable dataclasses.
+
+    Fields may be bool, int, float, str, Path, numpy array, list, ``dict[str, T]``, Optional, nested
+    dataclasses and unions of dataclasses (chosen by a YAML tag, the first member without one).
+    ``__post_init__`` runs once on the defaults and again on the loaded values, innermost first;
+    there it checks what types cannot express by raising InputError.
+
+    Args:
+        schema_class: Dataclass. Every field has a default, because Drake builds a schema without
+            arguments before it fills it in; a key that may not be left out is declared as
+            ``field(default=..., metadata=REQUIRED)`` with a placeholder that
+            ``__post_init__`` accepts.
+        data: As :func:`pfsc_drake.yaml.reading.read_yaml` returns it.
+        source: Name of the file, for messages.
+
+    Returns:
+        An instance of ``schema_class``.
+
+    Raises:
+        InputError: One line that names source, key path, value and what is allowed.
+    """
+    from pydrake.common.yaml import yaml_load_typed
+
+    check_schema(schema_class, data, source)
+    try:
+        result = yaml_load_typed(schema=schema_class, data=dump_yaml(data))
+    except NotImplementedError:  # a schema that Drake cannot load is a fault of the program
+        raise
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"{source}: {' '.join(str(error).split())}") from None
+    _validate(result, source, "")
+    return result
+
+
+def _validate(value: Any, source: str, key: str) -> None:
+    """Runs ``__post_init__`` of every dataclass in the loaded object, innermost first."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _validate(item, source, f"{key}.{name}")
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _validate(item, source, f"{key}[{index}]")
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            prefix = f"{key}." if key else ""
+            _validate(getattr(value, field.name), source, prefix + field.name)
+        post_init = getattr(value, "__post_init__", None)
+        if post_init is not None:
+            try:
+                post_init()
+            except InputError as error:
+                where = f"key {key!r}: " if key else ""
+                raise InputError(f"{source}: {where}{' '.join(str(error).split())}") from None

@@ -1,0 +1,89 @@
+"""A recorded motion in Meshcat."""
+
+import base64
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.systems.analysis import Simulator
+
+from diagrams.drawing.replay import RecordedMotion, build_replay, record
+from diagrams.scenario.schema import Line, PathParameters, RobotParameters
+from diagrams.tasks.parts import make_path
+from pfsc_drake.geometry import PathPointLayout
+
+MODEL = "comau_racer_1_4_elastic_3r"
+PERIOD = 0.04
+LAYOUT = PathPointLayout(2, oriented=False)
+DRAWING = ("path", "frame", "frame/axis_0", "frame/axis_1", "frame/axis_2")
+
+
+@pytest.fixture(scope="module")
+def meshcat():
+    return Meshcat(MeshcatParams(host="localhost"))
+
+
+@pytest.fixture(scope="module")
+def path():
+    return make_path(PathParameters(Line([0.8, 0.0, 1.0], [0.8, 0.3, 1.0])), "rigid", None)
+
+
+@pytest.fixture(scope="module")
+def motion(path):
+    """Four frames: the first motor turns by 0.3 rad, the tool goes along the path."""
+    times = PERIOD * np.arange(4)
+    positions = np.zeros((4, 6))
+    positions[:, 0] = np.linspace(0.0, 0.3, 4)
+    evaluator = path.evaluator(2)
+    points = [evaluator([0.8, 0.1 * i, 1.0], 0.1 * i) for i in range(4)]
+    poses = [np.concatenate([[0.8, 0.1 * i, 1.0], np.eye(3).ravel()]) for i in range(4)]
+    return RecordedMotion(times, positions, np.array(poses), np.array(points))
+
+
+def build(path, motion, meshcat):
+    meshcat.Delete()
+    robot = RobotParameters(MODEL)
+    return build_replay(robot, Path(), path, LAYOUT, motion, meshcat, PERIOD)
+
+
+def test_draws_robot_path_and_frame(path, motion, meshcat):
+    simulator = Simulator(build(path, motion, meshcat))
+    simulator.Initialize()
+    assert meshcat.HasPath(f"/drake/visualizer/{MODEL}/link_3")
+    for name in DRAWING:
+        assert meshcat.HasPath(f"/drake/path_following/{name}")
+    assert not meshcat.HasPath("/drake/path_following/trail")
+    simulator.AdvanceTo(motion.times[-1])
+    assert meshcat.HasPath("/drake/path_following/trail")
+
+
+def test_robot_is_where_the_recording_says(path, motion, meshcat, load_arm):
+    diagram = build(path, motion, meshcat)
+    context = diagram.CreateDefaultContext()
+    context.SetTime(1.5 * PERIOD)  # halfway between two frames
+    scene_graph = diagram.GetSubsystemByName("scene_graph")
+    query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
+    inspector = query.inspector()
+    (frame,) = [f for f in inspector.GetAllFrameIds() if inspector.GetName(f).endswith("link_3")]
+    arm = load_arm(MODEL)
+    arm.set_state(np.concatenate([[0.15, 0, 0, 0, 0, 0], np.zeros(6)]))
+    expected = arm.plant.GetBodyByName("link_3").EvalPoseInWorld(arm.context)
+    drawn = query.GetPoseInWorld(frame)
+    np.testing.assert_allclose(drawn.GetAsMatrix4(), expected.GetAsMatrix4(), atol=1e-12)
+
+
+def test_recording_is_one_page_with_the_animation(path, motion, meshcat):
+    page = record(build(path, motion, meshcat), meshcat, motion.times[-1], PERIOD)
+    assert "</html>" in page
+    assert not re.search(r'<script[^>]+src="http', page)
+    chunks = [
+        base64.b64decode(chunk)
+        for chunk in re.findall(r"data:application/octet-binary;base64,([A-Za-z0-9+/=]+)", page)
+    ]
+    (animation,) = [chunk for chunk in chunks if b"set_animation" in chunk]
+    for name in (f"visualizer/{MODEL}/link_3", "path_following/frame", "path_following/trail"):
+        assert name.encode() in animation
+    path_line = [chunk for chunk in chunks if b"path_following/path" in chunk]
+    assert path_line

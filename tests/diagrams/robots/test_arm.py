@@ -1,0 +1,194 @@
+"""Arms whose model the scenario changes: rotor coupling (2.64) and joint damping."""
+
+import copy
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.path_following import build_path_following
+from diagrams.scenario.delta import DeltaFollowingScenario
+from diagrams.scenario.schema import JointFrictionParameters, PathFollowingScenario, RobotParameters
+from experiments.results.run_signals import collect_log, collect_motion
+from experiments.simulation import simulate
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_profile import ForcePulse
+from pfsc_drake.systems.physics.full_elastic_plant import FullElasticPlant
+from pfsc_drake.yaml.typed import load_typed
+
+COMAU = "comau_racer_1_4"
+
+
+@pytest.fixture
+def settings(load_scenario) -> PathFollowingScenario:
+    """Three elastic axes; a law that is compiled fast."""
+    settings = load_scenario("pfc_elastic_3r")
+    settings.controller.law = "singular_perturbation"
+    return settings
+
+
+@pytest.fixture
+def coupled(settings):
+    settings.robot.rotor_coupling = COMAU
+    return settings
+
+
+def run(settings, duration):
+    station = build_path_following(settings, Path())
+    result = simulate(station, settings.simulation, duration, lambda *_: None)
+    assert result.fault is None
+    return station, result.root, collect_log(station, result.root)
+
+
+def uncoupled_parameters(folder):
+    """Write parameters with rotors on the base, which does not turn."""
+    text = (Path("models") / COMAU / "parameters.yaml").read_text(encoding="utf-8")
+    path = folder / "uncoupled.yaml"
+    on_base = text.replace("[1, 1, 3, 3, 4, 5]", "[0, 0, 0, 0, 0, 0]")
+    assert on_base != text
+    path.write_text(on_base, encoding="utf-8")
+    return path
+
+
+def test_rotors_on_the_base_make_no_difference(settings, tmp_path):
+    """All connections of the other plant: drives, friction, a force on the tool, start."""
+    settings.start.offset = [0.005, 0.0]
+    settings.friction = JointFrictionParameters(f_c=[20.0, 20.0, 10.0], f_v=[5.0, 5.0, 5.0])
+    settings.forces = [ForcePulse(0.05, 0.2, np.array([30.0, -40.0, 50.0]), ramp=0.02)]
+    _, _, expected = run(settings, 0.25)
+    settings.robot.rotor_coupling = str(uncoupled_parameters(tmp_path))
+    station, _, got = run(settings, 0.25)
+    assert isinstance(station.plant, FullElasticPlant)
+    assert expected.signals.keys() == got.signals.keys()
+    assert np.ptp(expected["q_J"].values, axis=0).max() > 1e-3
+    for name in ("q_J", "v_J", "q_M", "v_M", "tau_d", "tau_J", "tau_f", "tau_ext", "xi"):
+        scale = np.abs(expected[name].values).max()
+        # the wrench follows the joints within a step here, and is applied to a body there
+        tolerance = 1e-6 * scale
+        np.testing.assert_allclose(got[name].values, expected[name].values, rtol=0, atol=tolerance)
+
+
+def test_the_coupling_disturbs_the_elastic_law(settings):
+    """The exact law of the simplified model is not exact any more, but far from failing."""
+    settings.controller.law = "elastic"
+    deviation = {}
+    for rotors in ("", COMAU):
+        settings.robot.rotor_coupling = rotors
+        _, _, log = run(settings, 1.0)
+        xi = np.linalg.norm(log["xi"].values, axis=1)
+        deviation[rotors] = xi[log.time > 0.35].max()
+    assert deviation[""] < 2e-5
+    assert 5.0 * deviation[""] < deviation[COMAU] < 5e-4
+
+
+def test_the_coupling_hardly_matters_to_singular_perturbation(settings):
+    """What that law neglects anyway is a hundred times as much."""
+    deviation = {}
+    for rotors in ("", COMAU):
+        settings.robot.rotor_coupling = rotors
+        _, _, log = run(settings, 1.0)
+        deviation[rotors] = np.linalg.norm(log["xi"].values[log.time > 0.35], axis=1)
+    assert deviation[""].max() > 3e-3
+    change = np.abs(deviation[COMAU] - deviation[""]).max()
+    assert 1e-5 < change < 0.05 * deviation[""].max()
+
+
+def test_start_and_replay(coupled):
+    station, root, log = run(coupled, 0.05)
+    assert np.abs(log["v_J"].values[0]).max() < 1e-15
+    np.testing.assert_allclose(log["xi"].values[0], [0.01, 0.0], atol=1e-9)
+    motion = collect_motion(station, root, 0.01)
+    model = station.arm.model
+    context = model.CreateDefaultContext()
+    for positions, pose in zip(motion.positions, motion.tool_pose, strict=True):
+        model.SetPositions(context, positions)
+        y_t = station.arm.tool.CalcPoseInWorld(context).translation()
+        np.testing.assert_allclose(y_t, pose[:3], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "rotors", "part"),
+    [
+        ("comau_racer_1_4_3r", COMAU, "must have finite stiffness"),
+        ("comau_racer_1_4_elastic_3r", "nobody", "must be a file or one of"),
+        ("comau_racer_1_4_elastic_3r", "none.yaml", "none.yaml"),
+    ],
+)
+def test_robots_that_cannot_be_coupled(settings, model, rotors, part):
+    settings.controller.law = "rigid"
+    settings.robot.model, settings.robot.rotor_coupling = model, rotors
+    with pytest.raises(InputError, match=part) as caught:
+        build_path_following(settings, Path())
+    assert str(caught.value).startswith("robot.rotor_coupling: ")
+
+
+def test_the_full_model_has_no_sensor(coupled, load_scenario):
+    coupled.compliance = copy.deepcopy(load_scenario("pfc_compliant_6r").compliance)
+    with pytest.raises(InputError, match=r"robot\.rotor_coupling: .*no force/torque sensor"):
+        build_path_following(coupled, Path())
+
+
+def test_joint_damping_is_the_models_but_for_its_damping(settings, load_arm):
+    settings.controller.law = "elastic"
+    settings.robot.joint_damping = [10.0, 20.0, 30.0]
+    station = build_path_following(settings, Path())
+    np.testing.assert_array_equal(station.chain.K_d, [10.0, 20.0, 30.0])
+    arm = load_arm(settings.robot.model)
+    np.testing.assert_array_equal(arm.chain.K_d, np.zeros(3))
+    for ours, theirs in zip(station.chain.links, arm.chain.links, strict=True):
+        for field in dataclasses.fields(ours):
+            if field.name != "damping":
+                value = getattr(theirs, field.name)
+                np.testing.assert_array_equal(getattr(ours, field.name), value)
+    # the plant has it too, axis by axis
+    damped, undamped = station.plant, arm.plant
+    x = station.initial_state.copy()
+    x[damped.num_positions() :] = 0.1 * np.arange(1.0, 7.0)
+    torques = []
+    for plant in (damped, undamped):
+        context = plant.CreateDefaultContext()
+        plant.SetPositionsAndVelocities(context, x)
+        plant.get_actuation_input_port().FixValue(context, np.zeros(3))
+        a = plant.EvalTimeDerivatives(context).CopyToVector()[6:]
+        # M a = forces; M is the same
+        torques.append(plant.CalcMassMatrix(context) @ a)
+    flex = [damped.GetJointByName(f"flex_{i}").velocity_start() for i in (1, 2, 3)]
+    expected = np.zeros(6)
+    expected[flex] = -np.array([10.0, 20.0, 30.0]) * x[6:][flex]
+    np.testing.assert_allclose(torques[0] - torques[1], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("model", "damping", "part"),
+    [
+        ("comau_racer_1_4_elastic_3r", [1.0], "1 values; .* has 3 elastic joints"),
+        ("comau_racer_1_4_3r", [1.0, 1.0, 1.0], "3 values; .* has 0 elastic joints"),
+    ],
+)
+def test_joint_damping_of_another_robot(settings, model, damping, part):
+    settings.robot.model, settings.robot.joint_damping = model, damping
+    with pytest.raises(InputError, match=rf"robot\.joint_damping: {part}"):
+        build_path_following(settings, Path())
+
+
+@pytest.mark.parametrize("damping", [[-1.0, 1.0, 1.0], [np.nan, 1.0, 1.0], [np.inf]])
+def test_joint_damping_out_of_range(damping):
+    with pytest.raises(InputError, match=r"joint_damping = .*finite numbers, none negative"):
+        RobotParameters(joint_damping=damping)
+
+
+@pytest.mark.parametrize("option", [{"rotor_coupling": COMAU}, {"joint_damping": [1.0]}])
+def test_a_delta_robot_has_neither(option):
+    data = {"robot": {"model": "festo_expt_45", **option}}
+    with pytest.raises(InputError, match=rf"robot\.{next(iter(option))}"):
+        load_typed(DeltaFollowingScenario, data, "mine.yaml")
+
+
+def test_the_visco_elastic_law_converges(load_scenario):
+    settings = load_scenario("pfc_viscoelastic_3r")
+    _, _, log = run(settings, 1.6)
+    xi = np.linalg.norm(log["xi"].values, axis=1)
+    assert xi[0] == pytest.approx(0.01, abs=1e-9)
+    assert xi[log.time > 0.5].max() < 2e-5
+    assert np.abs(log["eta_dot"].values).max() > 0.9

@@ -1,0 +1,199 @@
+"""Servos, bus, friction and encoders of a path following station."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+
+from diagrams.path_following import build_path_following
+from diagrams.scenario.schema import GainParameters, LawGains, PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.models.parameters import load_parameters
+
+KNOWN = load_parameters("comau_racer_1_4").friction
+TICK = 1e-3
+
+
+@pytest.fixture
+def settings(load_scenario) -> PathFollowingScenario:
+    """Three rigid axes, at rest on the path."""
+    settings = load_scenario("pfc_elastic_3r")
+    settings.robot.model = "comau_racer_1_4_3r"
+    settings.controller.law = "rigid"
+    poles, slow = GainParameters(poles=[-50.0, -50.0]), GainParameters(poles=[-20.0])
+    settings.controller.gains = {"rigid": LawGains(poles, poles)}
+    settings.controller.gains["velocity_servo"] = LawGains(slow, slow)
+    settings.start.offset = [0.0, 0.0]
+    settings.reference.points, settings.reference.dwell = [0.96, 0.90], 0.05
+    settings.reference.velocity, settings.reference.acceleration = 0.2, 2.0
+    return settings
+
+
+def build(settings):
+    return build_path_following(settings, Path())
+
+
+def run(settings, duration):
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    configuration = SimulatorConfig(
+        integration_scheme="runge_kutta3", max_step_size=TICK, use_error_control=False
+    )
+    ApplySimulatorConfig(configuration, simulator)
+    station.set_start(simulator.get_mutable_context())
+    simulator.Initialize()
+    simulator.AdvanceTo(duration)
+    return station, *station.log.read(simulator.get_context())
+
+
+def names(station):
+    return {system.get_name() for system in station.diagram.GetSystems()}
+
+
+def deviation(station, signals):
+    m = station.law.linearization.num_outputs
+    y = signals["law"][:, station.law.layout.manifold_state][:, :m]
+    return np.abs(y - signals["reference"][:, :m]).max(axis=0)
+
+
+def test_nothing_is_added_unless_asked_for(settings):
+    assert not names(build(settings)) & {
+        "velocity_servo",
+        "bus_delay",
+        "joint_friction",
+        "encoder_increments",
+        "force_torque_sensor",
+        "impedance_filter",
+    }
+
+
+def test_velocity_servos_follow_the_path(settings):
+    settings.controller.law = "velocity_servo"
+    station, t, signals = run(settings, 0.4)
+    assert t[-1] == pytest.approx(0.4)
+    n = station.chain.dimension
+    wanted = signals["law"][:, station.law.layout.drive]
+    # the default bandwidth of 200 rad/s at up to 1 rad/s^2
+    assert np.abs(wanted - signals["joint_state"][:, 3 * n :])[t > 0.01].max() < 0.02
+    assert np.abs(wanted).max() > 0.1
+    assert deviation(station, signals).max() < 1e-3
+    limits = station.chain.gather("effort_limit")
+    assert (np.abs(signals["drive_torque"]) <= limits).all()
+
+
+def test_servos_hold_the_weight_at_the_start(settings, load_arm):
+    settings.controller.law = "velocity_servo"
+    station, _, signals = run(settings, 2 * TICK)
+    arm = load_arm("comau_racer_1_4_3r")
+    weight = arm.weight(station.initial_state[:3])
+    np.testing.assert_allclose(signals["drive_torque"][0], weight, atol=1e-6)
+
+
+def test_a_bus_delays_by_its_time(settings):
+    """A velocity law that starts off the path: the first wanted velocity arrives 3 ticks late."""
+    settings.controller.law = "velocity_servo"
+    settings.servo.bus_delay = 3 * TICK
+    simulator = Simulator((station := build(settings)).diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    bus = station.diagram.GetSubsystemByName("bus_delay")
+    delivered = []
+    for tick in range(80):
+        simulator.AdvanceTo((tick + 0.5) * TICK)
+        inner = bus.GetMyContextFromRoot(root)
+        delivered.append(bus.GetOutputPort("delivered").Eval(inner))
+    _, signals = station.log.read(root)
+    sent = signals["law"][:, station.law.layout.drive]
+    assert np.abs(np.diff(sent[-20:], axis=0)).max() > 1e-5
+    np.testing.assert_array_equal(delivered[3:], sent[: len(delivered) - 3])
+
+
+def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
+    settings.controller.law = "velocity_servo"
+    settings.servo.period = 0.25 * TICK
+    station, _, signals = run(settings, 0.3)
+    assert "velocity_hold" in names(station)
+    assert deviation(station, signals).max() < 1e-3
+
+
+def test_friction_acts_against_the_motion(settings):
+    """Law and drives as without friction, but the drives carry it: tau_d = g + friction."""
+    settings.friction.f_c, settings.friction.f_v = [40.0, 100.0, 20.0], [15.0, 90.0, 40.0]
+    _, _, signals = run(settings, 0.3)
+    velocity = signals["joint_state"][:, 9:]
+    torque = signals["friction_torque"]
+    moving = np.abs(velocity) > 0.03
+    assert moving.sum(axis=0).max() > 50
+    expected = np.array([40.0, 100.0, 20.0]) * np.sign(velocity)
+    expected += np.array([15.0, 90.0, 40.0]) * velocity
+    np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
+
+
+def test_friction_reaches_the_joints(settings):
+    """It takes the power off the arm: the same drives accelerate less."""
+    without, _, _ = run(settings, 0.01)
+    settings.friction.f_v = [10.0, 20.0, 30.0]
+    settings.friction.f_c = [0.0, 0.0, 0.0]
+    station = build(settings)
+    root = station.diagram.CreateDefaultContext()
+    x = without.initial_state.copy()
+    x[3:] = [0.3, -0.2, 0.1]
+    station.plant.SetPositionsAndVelocities(station.plant.GetMyMutableContextFromRoot(root), x)
+    force = station.plant.get_applied_generalized_force_input_port()
+    applied = force.Eval(station.plant.GetMyContextFromRoot(root))
+    np.testing.assert_allclose(applied, [-3.0, 4.0, -3.0], atol=1e-12)
+
+
+def test_friction_of_the_robot_itself(settings):
+    settings.friction.file = "comau_racer_1_4"
+    by_name = run(settings, 0.1)[2]["friction_torque"]
+    settings.friction.file = str(models_directory() / "comau_racer_1_4" / "parameters.yaml")
+    by_path = run(settings, 0.1)[2]["friction_torque"]
+    settings.friction.file = ""
+    settings.friction.f_c, settings.friction.f_v = list(KNOWN.coulomb[:3]), list(KNOWN.viscous[:3])
+    np.testing.assert_array_equal(by_name, run(settings, 0.1)[2]["friction_torque"])
+    np.testing.assert_array_equal(by_name, by_path)
+    assert np.abs(by_name).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"friction.f_c": [1.0]}, r"friction\.f_c: 1 values; the robot has 3"),
+        ({"friction.file": "unknown"}, "unknown.*comau_racer_1_4"),
+        ({"friction.f_v": [1.0] * 3, "simulation.integrator": "explicit_euler"}, "integrator"),
+        ({"controller.law": "velocity_servo", "servo.bandwidth": 2000.0}, "bandwidth.*1000"),
+        ({"encoders.link_increments": [1.0, 2.0]}, "link_increments"),
+    ],
+)
+def test_what_does_not_fit(settings, changes, part):
+    for key, value in changes.items():
+        group, name = key.split(".")
+        setattr(getattr(settings, group), name, value)
+    with pytest.raises(InputError, match=part):
+        build(settings)
+
+
+def test_encoders_count(settings):
+    settings.encoders.link_increments = [10_000.0]
+    settings.encoders.motor_increments = [1e6]
+    _, _, signals = run(settings, 0.2)
+    q_J, v_J, q_M, _ = np.hsplit(signals["joint_state_measured"], 4)
+    for q, increments in ((q_J, 1e4), (q_M, 1e6)):
+        counts = q * increments / (2.0 * np.pi)
+        np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+    # exact velocities do not show increments
+    assert np.abs(np.diff(q_J, axis=0)).max() > 0.0
+    assert np.unique(v_J[100:]).size > 250
+
+
+def test_encoders_differentiate(settings):
+    settings.encoders.motor_increments = [1e8]
+    settings.encoders.link_increments = [1e8]
+    settings.encoders.difference_quotient = True
+    _, _, signals = run(settings, 0.2)
+    q_J, v_J, _, _ = np.hsplit(signals["joint_state_measured"], 4)
+    np.testing.assert_allclose(v_J[1:], np.diff(q_J, axis=0) / TICK, atol=1e-9)

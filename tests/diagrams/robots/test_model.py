@@ -1,0 +1,86 @@
+"""The robot in a diagram."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from pydrake.geometry import Role
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.robots.model import add_robot, add_visible_robot, tool_frame
+from diagrams.scenario.schema import RobotParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import resolve_model
+
+SHIPPED = "comau_racer_1_4_elastic_3r"
+
+
+def add(model, folder=Path()):
+    return add_robot(DiagramBuilder(), RobotParameters(model), folder)
+
+
+@pytest.mark.parametrize(
+    ("model", "positions", "drives"),
+    [
+        ("comau_racer_1_4", 6, 6),
+        ("comau_racer_1_4_elastic", 12, 6),
+        ("comau_racer_1_4_3r", 3, 3),
+        ("comau_racer_1_4_elastic_3r", 6, 3),
+    ],
+)
+def test_shipped_robots_are_continuous_and_without_geometry(model, positions, drives):
+    builder = DiagramBuilder()
+    plant = add_robot(builder, RobotParameters(model), Path())
+    assert plant.num_positions() == plant.num_velocities() == positions
+    assert plant.num_actuators() == drives
+    assert plant.is_finalized()
+    assert plant.time_step() == 0.0
+    assert not plant.geometry_source_is_registered()
+    assert builder.HasSubsystemNamed("plant")
+
+
+def test_visible_robot_has_pictures_and_nothing_to_collide():
+    builder = DiagramBuilder()
+    plant, scene_graph = add_visible_robot(builder, RobotParameters(SHIPPED), Path())
+    inspector = scene_graph.model_inspector()
+    assert inspector.NumGeometriesWithRole(Role.kIllustration) > 10
+    assert inspector.NumGeometriesWithRole(Role.kProximity) == 0
+    assert plant.geometry_source_is_registered()
+    assert builder.HasSubsystemNamed("scene_graph")
+    assert not builder.HasSubsystemNamed("plant")  # positions come from the recording
+
+
+def test_a_file_is_relative_to_the_folder(tmp_path, monkeypatch):
+    (tmp_path / "mine").mkdir()
+    shutil.copy(resolve_model(SHIPPED), tmp_path / "mine" / "arm.sdf")
+    assert add("mine/arm.sdf", tmp_path).num_positions() == 6
+    monkeypatch.chdir(tmp_path / "mine")
+    with pytest.raises(InputError, match=r"arm\.sdf': no such file"):
+        add("mine/arm.sdf", tmp_path / "mine")
+
+
+def test_file_names_that_do_not_depend_on_the_folder(tmp_path):
+    address = "package://pfsc_models/comau_racer_1_4/comau_racer_1_4_elastic_3r.sdf"
+    assert add(address, tmp_path).num_positions() == 6
+    absolute = str(resolve_model(SHIPPED).resolve())
+    assert add(absolute, tmp_path).num_positions() == 6
+
+
+@pytest.mark.parametrize("content", ["no robot", "<sdf version='1.9'><model name='x'>", ""])
+@pytest.mark.parametrize("suffix", ["sdf", "urdf"])
+def test_unreadable_model(tmp_path, suffix, content):
+    file = tmp_path / f"arm.{suffix}"
+    file.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        add(file.name, tmp_path)
+    assert str(caught.value).startswith(f"robot.model: {file}: cannot be read: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_tool_frame():
+    plant = add(SHIPPED)
+    assert tool_frame(plant, RobotParameters(SHIPPED)).name() == "tool_point"
+    with pytest.raises(InputError) as caught:
+        tool_frame(plant, RobotParameters(SHIPPED, "gripper"))
+    for part in ("robot.tool_frame", SHIPPED, "'gripper'"):
+        assert part in str(caught.value)

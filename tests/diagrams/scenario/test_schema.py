@@ -1,0 +1,78 @@
+"""What a scenario file may say."""
+
+import math
+
+import pytest
+
+from diagrams.scenario.schema import PathFollowingScenario
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.typed import load_typed
+
+INFINITE = math.inf
+
+
+def load(**data):
+    return load_typed(PathFollowingScenario, data, "mine.yaml")
+
+
+def test_everything_has_a_default():
+    settings = load()
+    assert settings.duration == 0.0
+    assert settings.controller.sampling_time == 1e-3
+    assert settings.simulation.max_step <= settings.controller.sampling_time
+
+
+@pytest.mark.parametrize(
+    ("data", "key"),
+    [
+        ({"start": {"offset": [0.1]}}, "offset"),
+        ({"start": {"rotation_deg": [1.0, 2.0]}}, "rotation_deg"),
+        ({"path": {"orientation": {"keyframes": [{"angles_deg": [1.0]}]}}}, "angles_deg"),
+        ({"path": {"orientation": {"convention": "xyz"}}}, "convention"),
+        ({"path": {"shape": {"_tag": "!Line", "start": [1.0, 2.0]}}}, "start"),
+        ({"path": {"shape": {"_tag": "!Line", "end": [1.0, 2.0, 3.0, 4.0]}}}, "end"),
+        ({"path": {"shape": {"_tag": "!Circle", "center": [1.0, 2.0]}}}, "center"),
+        ({"path": {"shape": {"_tag": "!Circle", "axis_u": [1.0, 0.0]}}}, "axis_u"),
+        ({"path": {"shape": {"_tag": "!Circle", "axis_v": [1.0, 0.0]}}}, "axis_v"),
+        ({"path": {"shape": {"_tag": "!Waypoints", "smoothness": 7}}}, "smoothness"),
+        ({"path": {"shape": {"_tag": "!Waypoints", "parametrization": "x"}}}, "parametrization"),
+        ({"controller": {"law": "magic"}}, "law"),
+        ({"controller": {"gains": {"magic": {}}}}, "gains"),
+        (
+            {"controller": {"gains": {"rigid": {"eta": {"poles": [-1.0], "integral": 1.0}}}}},
+            "poles",
+        ),
+        ({"controller": {"sampling_time": 0.0}}, "sampling_time"),
+        ({"controller": {"sampling_time": INFINITE}}, "sampling_time"),
+        ({"controller": {"effort_scale": -1.0}}, "effort_scale"),
+        ({"controller": {"brake_damping": -1.0}}, "brake_damping"),
+        ({"controller": {"brake_damping": INFINITE}}, "brake_damping"),
+        ({"reference": {"points": []}}, "points"),
+        ({"reference": {"points": [0.1]}}, "points"),
+        ({"simulation": {"integrator": "magic"}}, "integrator"),
+        ({"simulation": {"max_step": 0.0}}, "max_step"),
+        ({"simulation": {"max_step": -1.0}}, "max_step"),
+        ({"simulation": {"accuracy": -1e-6}}, "accuracy"),
+        ({"simulation": {"accuracy": INFINITE}}, "accuracy"),
+        # stale caches after a rejected step: silently a hundred times less accurate
+        ({"simulation": {"integrator": "runge_kutta5", "accuracy": 1e-6}}, "accuracy"),
+        ({"simulation": {"frame_period": 0.0}}, "frame_period"),
+        ({"simulation": {"frame_period": -1.0}}, "frame_period"),
+        ({"duration": -1.0}, "duration"),
+        ({"duration": INFINITE}, "duration"),
+        ({"settling_tolerance": -1.0}, "settling_tolerance"),
+        ({"targets": {"magic": {}}}, "targets"),
+    ],
+)
+def test_refused_with_file_and_key(data, key):
+    with pytest.raises(InputError) as caught:
+        load(**data)
+    message = str(caught.value)
+    assert message.startswith("mine.yaml: ")
+    assert key in message
+    assert "allowed: " in message
+
+
+def test_error_control_where_it_works():
+    settings = load(simulation={"integrator": "runge_kutta3", "accuracy": 1e-6})
+    assert settings.simulation.accuracy == 1e-6

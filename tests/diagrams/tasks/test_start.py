@@ -1,0 +1,192 @@
+"""The state in which a run starts, against Drake's kinematics and dynamics."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from diagrams.scenario.schema import Circle, Line
+from diagrams.tasks.parts import make_path
+from diagrams.tasks.start import start_state
+from pfsc_drake.errors import InputError
+
+THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
+LINE = Line([0.8, -0.1, 1.0], [0.8, 0.3, 1.0])
+
+
+@pytest.fixture
+def start(load_arm):
+    """Return path, theta and robot, put at the start of a scenario."""
+
+    def put(settings):
+        arm = load_arm(settings.robot.model)
+        path = make_path(settings.path, settings.controller.law, None)
+        x, theta = start_state(settings, path, arm.chain, arm.coordinates)
+        arm.set_state(x)
+        return path, theta, arm, x
+
+    return put
+
+
+@pytest.fixture
+def on_line(load_scenario):
+    """Return the three-axis scenario on a line along y, 0.05 m after its begin."""
+
+    def load(model="comau_racer_1_4_elastic_3r"):
+        settings = load_scenario(THREE)
+        settings.robot.model = model
+        settings.path.shape = LINE
+        settings.reference.points = [0.05, 0.4]
+        return settings
+
+    return load
+
+
+@pytest.mark.parametrize("model", ["comau_racer_1_4_3r", "comau_racer_1_4_elastic_3r"])
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (0.03, 0.0), (0.0, 0.02), (-0.01, -0.04)])
+def test_tool_is_beside_a_line_by_the_offset(on_line, start, model, offset):
+    settings = on_line(model)
+    settings.start.offset = list(offset)
+    _, theta, arm, _ = start(settings)
+    # e_par = y, e_perp = z (the normal next to the vertical), e_cross = y x z = x
+    expected = [0.8 + offset[1], -0.05, 1.0 + offset[0]]
+    np.testing.assert_allclose(arm.tool_pose()[0], expected, atol=1e-8)
+    assert theta == pytest.approx(0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", [THREE, SIX])
+def test_tool_is_beside_the_lemniscate(load_scenario, start, name):
+    settings = load_scenario(name)
+    settings.start.offset = [0.01, -0.02]
+    path, theta, arm, _ = start(settings)
+    y_t, _ = arm.tool_pose()
+    sigma, slope = path.position.derivatives(theta, 1)
+    e_perp, e_cross = path.frame.normals(theta)
+    assert slope @ (y_t - sigma) == pytest.approx(0.0, abs=1e-8)
+    assert e_perp @ (y_t - sigma) == pytest.approx(0.01, abs=1e-8)
+    assert e_cross @ (y_t - sigma) == pytest.approx(-0.02, abs=1e-8)
+    assert path.arc_length.at(theta) == pytest.approx(settings.reference.points[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (3.0, -2.0, 1.0)])
+def test_tool_is_turned_away_by_the_rotation(load_scenario, start, angles):
+    settings = load_scenario(SIX)
+    settings.start.rotation_deg = list(angles)
+    path, theta, arm, _ = start(settings)
+    deviation = path.orientation.rotation_matrix(theta).T @ arm.tool_pose()[1]
+    reached = Rotation.from_matrix(deviation).as_euler("ZYX", degrees=True)
+    np.testing.assert_allclose(reached, angles, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "twin"), [(THREE, "comau_racer_1_4_3r"), (SIX, "comau_racer_1_4")]
+)
+def test_elastic_joints_carry_the_weight(load_scenario, load_arm, start, name, twin):
+    """With the drives holding the weight nothing moves: Drake's derivatives vanish."""
+    _, _, arm, x = start(load_scenario(name))
+    q_J = arm.angles("motor") + arm.angles("flex")
+    weight = load_arm(twin).weight(q_J)
+    assert np.abs(weight).max() > 50.0
+    actuation = np.zeros(arm.plant.num_actuators())
+    for i, torque in enumerate(weight, start=1):
+        joint = arm.plant.GetJointByName(f"motor_{i}")
+        actuators = [arm.plant.get_joint_actuator(k) for k in arm.plant.GetJointActuatorIndices()]
+        (actuator,) = [a for a in actuators if a.joint().index() == joint.index()]
+        actuation[actuator.input_start()] = torque
+    context = arm.plant.CreateDefaultContext()
+    arm.plant.SetPositionsAndVelocities(context, x)
+    arm.plant.get_actuation_input_port().FixValue(context, actuation)
+    rates = arm.plant.EvalTimeDerivatives(context).CopyToVector()
+    # accelerations; without the deflection they are beyond 1 rad/s^2
+    assert np.abs(rates).max() < 1e-5
+
+
+def test_rigid_joints_do_not_bend(on_line, start):
+    _, _, _, x = start(on_line("comau_racer_1_4_3r"))
+    assert x.shape == (6,)
+    np.testing.assert_array_equal(x[3:], 0.0)
+
+
+def test_posture_chooses_the_branch(load_scenario, start):
+    """The wrist reaches a pose in two ways: axis 5 bent to one side or to the other."""
+    settings = load_scenario(SIX)
+    postures = {1.0: [25, 115, -40, -5, 95, -17], -1.0: [25, 115, -40, 175, -95, 163]}
+    poses = []
+    for sign, posture in postures.items():
+        settings.start.posture_deg = posture
+        _, _, arm, _ = start(settings)
+        np.testing.assert_allclose(np.rad2deg(arm.angles("motor")), posture, atol=15.0)
+        assert np.sign(arm.angles("motor")[4]) == sign
+        poses.append(arm.tool_pose())
+    for one, other in zip(*poses, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-7)
+
+
+def test_start_without_posture(on_line, start):
+    settings = on_line()
+    settings.start.posture_deg = []
+    _, _, arm, _ = start(settings)
+    np.testing.assert_allclose(arm.tool_pose()[0], [0.8, -0.05, 1.01], atol=1e-8)
+    lower, upper = arm.chain.gather("position_limits").T
+    assert np.all((lower <= arm.angles("motor")) & (arm.angles("motor") <= upper))
+
+
+@pytest.mark.parametrize("laps", [-1, 1, 2])
+def test_start_laps_later(load_scenario, start, laps):
+    """A closed path counts its laps; the place is the same."""
+    settings = load_scenario(THREE)
+    path, theta, arm, _ = start(settings)
+    y_t, _ = arm.tool_pose()
+    settings.reference.points = [0.96 + laps * path.length, 0.3]
+    _, later, _, _ = start(settings)
+    assert later == pytest.approx(theta + 2.0 * math.pi * laps, abs=1e-9)
+    np.testing.assert_allclose(arm.tool_pose()[0], y_t, atol=1e-8)
+
+
+def refused(start, settings, *parts):
+    with pytest.raises(InputError) as caught:
+        start(settings)
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def test_start_beyond_the_centre_of_curvature(load_scenario, start):
+    """e_cross of this circle points outwards; 0.06 m inwards is beyond its centre."""
+    settings = load_scenario(THREE)
+    settings.path.shape = Circle(radius=0.05)
+    settings.reference.points = [0.0, 0.1]
+    settings.start.offset = [0.0, -0.04]  # alpha = 0.8
+    start(settings)
+    settings.start.offset = [0.0, -0.048]  # alpha = 0.96
+    refused(start, settings, "start.offset", "-0.048", "alpha = 0.96", "below 0.95")
+    settings.start.offset = [0.0, -0.06]
+    refused(start, settings, "start.offset", "-0.06", "feasible neighbourhood")
+
+
+def test_unreachable_start(on_line, start):
+    settings = on_line()
+    settings.path.shape = Line([2.0, 0.0, 1.0], [2.0, 0.4, 1.0])
+    refused(start, settings, "start", "2.0", "unreachable", "joint limits")
+
+
+@pytest.mark.parametrize("points", [[-0.01, 0.1], [0.0, 0.41], [0.0, math.inf]])
+def test_reference_beyond_the_ends_of_an_open_path(on_line, start, points):
+    settings = on_line()
+    settings.reference.points = points
+    wrong = next(p for p in points if not 0.0 <= p <= 0.4)
+    refused(start, settings, "reference.points", f"{wrong:g} m", "open", "0.4 m long")
+
+
+def test_the_ends_of_an_open_path_are_allowed(on_line, start):
+    settings = on_line()
+    settings.reference.points = [0.4, 0.0]
+    _, _, arm, _ = start(settings)
+    np.testing.assert_allclose(arm.tool_pose()[0], [0.8, 0.3, 1.01], atol=1e-8)
+
+
+@pytest.mark.parametrize("posture", [[1.0], [1.0, 2.0, 3.0, 4.0]])
+def test_posture_of_another_robot(on_line, start, posture):
+    settings = on_line()
+    settings.start.posture_deg = posture
+    refused(start, settings, "start.posture_deg", str(len(posture)), "3 joints")

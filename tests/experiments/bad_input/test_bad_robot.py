@@ -1,0 +1,85 @@
+"""Wrong robots, laws that do not suit them and impossible starts through the command line.
+
+Status 2, one line on stderr that names the file, the thing, the value and what is allowed; nothing
+is simulated.
+"""
+
+import pytest
+
+from pfsc_drake.robot.models.files import resolve_model
+
+SIX = "pfc_elastic_6r"
+
+
+def test_missing_model(refused, mine, tmp_path):
+    refused(mine(), "'nope'", "comau_racer_1_4_elastic", changes=["robot.model=nope"])
+    file = tmp_path / "nope.sdf"
+    refused(mine(), "no such file", changes=["robot.model=nope.sdf"], file=file)
+
+
+@pytest.mark.parametrize(
+    "content", ["no robot", "<sdf version='1.9'><model name='x'>", "<robot name='x'/>"]
+)
+def test_unreadable_model(refused, mine, tmp_path, content):
+    file = tmp_path / "arm.sdf"
+    file.write_text(content, encoding="utf-8")
+    refused(mine(), "robot.model", changes=["robot.model=arm.sdf"], file=file)
+
+
+def test_no_such_tool_frame(refused, mine):
+    parts = ("robot.tool_frame", "comau_racer_1_4_elastic_3r", "'gripper'")
+    refused(mine(), *parts, changes=["robot.tool_frame=gripper"])
+
+
+def test_a_tool_that_does_not_move(refused, mine):
+    refused(mine(), "'base'", "no moving joint", changes=["robot.tool_frame=base"])
+
+
+def test_a_joint_without_drive(refused, mine, tmp_path):
+    text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
+    lame = text.replace("<effort>900</effort>", "<effort>0</effort>")
+    assert lame != text
+    (tmp_path / "lame.sdf").write_text(lame, encoding="utf-8")
+    refused(mine(), "robot.model", "actuator", changes=["robot.model=lame.sdf"])
+
+
+@pytest.mark.parametrize("law", ["elastic", "singular_perturbation"])
+def test_law_for_elastic_joints_on_a_rigid_robot(refused, mine, law):
+    changes = ["robot.model=comau_racer_1_4_3r", f"controller.law={law}"]
+    refused(mine(), f"'{law}'", "elastic joints", "joint_1", changes=changes)
+
+
+def test_as_many_outputs_as_joints(refused, mine):
+    parts = ("6 joints", "3 outputs", "position only")
+    refused(mine(SIX), *parts, changes=["path.orientation.keyframes=[]"])
+    parts = ("3 joints", "6 outputs", "position and orientation")
+    refused(mine(), *parts, changes=["path.orientation.keyframes=[{theta: 0}]"])
+
+
+def test_a_servo_that_does_not_fit_the_controller(refused, mine):
+    gains = "{eta: {poles: [-10]}, xi: {poles: [-10]}}"
+    changes = ["controller.law=velocity_servo", f"controller.gains.velocity_servo={gains}"]
+    parts = ("servo.period", "0.0003", "controller.sampling_time", "0.001")
+    refused(mine(), *parts, changes=[*changes, "servo.period=0.0003"])
+    parts = ("delay", "0.0015", "multiple of the period")
+    refused(mine(), *parts, changes=[*changes, "servo.bus_delay=0.0015"])
+
+
+def test_start_outside_the_feasible_neighbourhood(refused, mine):
+    """60 mm inwards on a circle of 50 mm: e_cross points outwards."""
+    changes = ["path.shape=!Circle {radius: 0.05}", "reference.points=[0, 0.1]"]
+    parts = ("start.offset", "-0.06", "feasible neighbourhood", "alpha", "below 0.95")
+    refused(mine(), *parts, changes=[*changes, "start.offset=[0, -0.06]"])
+
+
+def test_unreachable_start(refused, mine):
+    changes = ["path.shape=!Line {start: [3, 0, 1], end: [3, 1, 1]}", "reference.points=[0, 0.5]"]
+    refused(mine(), "start", "3.0", "unreachable", "joint limits", changes=changes)
+    # the place is in reach, the orientation is not
+    # with the tool pointing away from the robot the place is in reach, but not back towards it
+    changes = [
+        "path.shape=!Line {start: [1.3, 0, 1], end: [1.3, 0.6, 1]}",
+        "reference.points=[0, 0.5]",
+        "path.orientation.keyframes=[{angles_deg: [0, -90, 0]}]",
+    ]
+    refused(mine(SIX), "start", "pose", "unreachable", changes=changes)

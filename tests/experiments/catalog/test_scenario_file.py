@@ -1,0 +1,91 @@
+"""Reading scenario files and overriding keys of them."""
+
+import pytest
+
+from experiments.catalog.scenario_file import load_scenario_data, read_scenario
+from pfsc_drake import InputError
+
+TEXT = """\
+_template: &gains {a: 1, b: [1.0, 2.0]}
+name: made_up
+duration: 2.0
+path: !Lemniscate {size: 0.25}
+controller:
+  law: elastic
+  first: *gains
+  second: *gains
+points: [[1, 2], [3, 4]]
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    path = tmp_path / "made_up.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+def test_tags_survive_and_private_keys_do_not(scenario):
+    data = load_scenario_data(scenario, [])
+    assert data["path"] == {"_tag": "!Lemniscate", "size": 0.25}
+    assert "_template" not in data
+    assert data["controller"]["second"] == {"a": 1, "b": [1.0, 2.0]}
+
+
+@pytest.mark.parametrize(
+    ("override", "keys", "value"),
+    [
+        ("duration=0.5", ["duration"], 0.5),
+        ("controller.law=rigid", ["controller", "law"], "rigid"),
+        ("points.1.0=-7", ["points", 1, 0], -7),
+        ("points=[[0, 0]]", ["points"], [[0, 0]]),
+        ("path=!Circle {radius: 1}", ["path"], {"_tag": "!Circle", "radius": 1}),
+        ("path.size=2", ["path"], {"_tag": "!Lemniscate", "size": 2}),
+        ("plant.tool.mass=1.5", ["plant", "tool", "mass"], 1.5),
+        ("note=a=b", ["note"], "a=b"),
+        ("note=", ["note"], None),
+    ],
+)
+def test_overrides(scenario, override, keys, value):
+    data = load_scenario_data(scenario, [override])
+    for key in keys:
+        data = data[key]
+    assert data == value
+
+
+def test_later_override_wins_and_the_rest_stays(scenario):
+    data = load_scenario_data(scenario, ["duration=1", "duration=3"])
+    assert data["duration"] == 3
+    assert data["name"] == "made_up"
+
+
+def test_override_changes_one_place_of_an_alias(scenario):
+    data = load_scenario_data(scenario, ["controller.first.b.0=9"])
+    assert data["controller"]["first"]["b"] == [9, 2.0]
+    assert data["controller"]["second"]["b"] == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("duration", "--set duration: malformed; allowed: key.path=value"),
+        ("=3", "--set =3: malformed"),
+        ("a..b=3", "--set a..b=3: malformed"),
+        ("points.2.0=1", "points is a list, '2' is no index of it; allowed: 0 to 1"),
+        ("points.x=1", "points is a list, 'x' is no index of it; allowed: 0 to 1"),
+        ("controller.law.x=1", "controller.law is 'elastic' and has no key 'x'"),
+        ("duration=[1", "--set duration=[1: invalid YAML in line 1"),
+    ],
+)
+def test_malformed_overrides(scenario, override, message):
+    with pytest.raises(InputError) as caught:
+        load_scenario_data(scenario, [override])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_read_scenario_knows_its_name(scenario):
+    assert read_scenario(str(scenario), []).name == "made_up"
+    scenario.write_text("duration: 1\n")
+    loaded = read_scenario(str(scenario), ["duration=4"])
+    assert (loaded.name, loaded.path, loaded.data) == ("made_up", scenario, {"duration": 4})

@@ -1,0 +1,99 @@
+"""Figures: written where the log has the signals, at a readable size, not empty."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from experiments.figures import style as figure_style
+from experiments.figures.all import draw_figures, write_figures
+from experiments.results.run_log import RunLog
+
+PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
+NAMES = [
+    "path",
+    "progress",
+    "transversal",
+    "orientation",
+    "angles",
+    "forces",
+    "velocities",
+    "drive_torques",
+    "friction",
+    "deflection",
+]
+
+
+def names(log):
+    return [drawing.name for drawing in draw_figures(log, PATH)]
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Few pixels, where it only matters that something is drawn."""
+    monkeypatch.setattr(figure_style, "DPI", 30)
+    monkeypatch.setitem(figure_style.STYLE, "figure.constrained_layout.use", False)
+
+
+def test_all_figures_are_written(drawn_log, tmp_path):
+    figures = write_figures(drawn_log, PATH, tmp_path / "figures")
+    assert [figure.path.stem for figure in figures] == NAMES
+    assert sorted(path.stem for path in (tmp_path / "figures").iterdir()) == sorted(NAMES)
+    for figure in figures:
+        assert figure.title
+        assert figure.caption.endswith(".")
+        with Image.open(figure.path) as image:
+            width, height = image.size
+            pixels = np.asarray(image.convert("L"))
+        assert width == 1800
+        assert 500 <= height <= 2600
+        assert pixels.std() > 5.0  # not an empty sheet
+
+
+@pytest.mark.parametrize(
+    ("signals", "expected"),
+    [
+        ([], []),
+        (["y_t"], ["path"]),
+        (["eta"], ["progress"]),
+        (["xi", "q_M"], ["transversal"]),
+        (["v_J", "tau_d"], ["velocities", "drive_torques"]),
+        (["tau_f"], []),
+        (["tau_f", "v_J"], ["velocities", "friction"]),
+        (["angles_e"], []),
+        (["angles_e", "angles_d"], ["angles"]),
+        (["manifold_force"], ["forces"]),
+        (["wrench_ext"], ["forces"]),
+        (["tared", "sensor_fault"], []),
+    ],
+)
+def test_missing_signals_are_skipped(drawn_log, signals, expected):
+    drawn_log.signals = {name: drawn_log[name] for name in signals}
+    assert names(drawn_log) == expected
+
+
+def test_no_forces_no_figure(drawn_log):
+    drawn_log.signals = {"wrench_ext": drawn_log["wrench_ext"]}
+    drawn_log["wrench_ext"].values[:] = 0.0
+    assert names(drawn_log) == []
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log, tmp_path):
+    for signal in drawn_log.signals.values():
+        if signal.values.dtype.kind == "f":
+            signal.values[150:] = np.nan
+    assert len(write_figures(drawn_log, PATH, tmp_path)) == len(NAMES)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_log_of_one_sample_can_be_drawn(drawn_log, tmp_path):
+    for signal in drawn_log.signals.values():
+        signal.values = signal.values[100:101]
+    drawn_log.time = drawn_log.time[100:101]
+    assert len(write_figures(drawn_log, PATH, tmp_path)) == len(NAMES)
+
+
+def test_a_log_without_samples_has_no_figures():
+    log = RunLog(np.zeros(0))
+    log.add("eta", np.zeros((0, 1)), "m")
+    assert names(log) == []

@@ -1,0 +1,151 @@
+"""Report: one self-contained page with everything of the run, nothing of it as markup."""
+
+import base64
+from html.parser import HTMLParser
+
+import pytest
+from PIL import Image
+
+from experiments.figures.style import Figure
+from experiments.pages.report import write_report
+from experiments.results.metrics import Metrics
+
+VOID = {"meta", "br", "img", "link", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Tags with attributes and all text of a page; fails on tags that do not match."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self._open: list[str] = []
+        self.feed(html)
+        assert self._open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        if not self._open or self._open[-1] != "style":
+            self.text += data
+
+    def values(self, tag: str, attribute: str) -> list[str]:
+        return [a[attribute] for t, a in self.tags if t == tag and a.get(attribute)]
+
+
+@pytest.fixture
+def run(tmp_path):
+    image = tmp_path / "figures" / "path.png"
+    image.parent.mkdir()
+    Image.new("RGB", (20, 10), "red").save(image)
+    metrics = Metrics()
+    metrics.add("max_path_deviation", 4.32e-5, "m", "< 0.05e-3", "Sec. <b>3.8.3")
+    metrics.add("controller_tick_us_p99", 271.0, "us", "<= 250")
+    metrics.add("peak_torque_1", 775.0, "Nm")
+    return {
+        "directory": tmp_path,
+        "title": "pfc_<b>elastic</b>",
+        "description": "Follow a & b",
+        "scenario_yaml_text": "name: x\nnote: '</pre><script>alert(1)</script>'\n",
+        "metrics": metrics,
+        "figures": [Figure(image, "The <path>", 'A "caption"')],
+        "log_attributes": {"git_revision": "abc+dirty", "drake_version": "1.51.1"},
+    }
+
+
+def read(path) -> tuple[Page, str]:
+    html = path.read_text(encoding="utf-8")
+    return Page(html), html
+
+
+def test_everything_is_on_the_page(run):
+    page, _ = read(write_report(**run))
+    for text in (
+        "pfc_<b>elastic</b>",
+        "Follow a & b",
+        "</pre><script>alert(1)</script>",
+        "The <path>",
+        'A "caption"',
+        "Sec. <b>3.8.3",
+        "abc+dirty",
+        "1.51.1",
+        "43.2\u202fµm",
+        "<\u202f50\u202fµm",
+        "completed",
+        "1 of 2 targets met",
+        "Max path deviation",
+        "Controller tick p99",
+        "peak_torque_1",
+    ):
+        assert text in page.text, text
+
+
+def test_nothing_of_the_run_becomes_markup_and_nothing_is_fetched(run):
+    page, html = read(write_report(**run, recording=run["directory"] / "recording.html"))
+    assert {tag for tag, _ in page.tags}.isdisjoint({"script", "b", "path", "link"})
+    assert "http:" not in html
+    assert "https:" not in html
+    assert "$" not in html  # every placeholder was filled in
+    (source,) = page.values("img", "src")
+    assert base64.b64decode(source.split(",")[1]) == run["figures"][0].path.read_bytes()
+
+
+def test_linear_drives_have_forces(run):
+    run["metrics"].add("peak_torque_2", 120.0, "N")
+    page, _ = read(write_report(**run))
+    assert "Peak force 2" in page.text
+    assert "peak_torque_2" in page.text  # the name in metrics.json
+    assert "Peak torque 1" in page.text
+
+
+def test_targets_are_judged(run):
+    page, html = read(write_report(**run))
+    assert html.count("✓ met") == html.count("✗ missed") == 2  # card and table
+    assert page.text.index("43.2") < page.text.index("271")
+
+
+def test_cards_without_targets_show_the_first_metrics(run):
+    for metric in run["metrics"].values():
+        metric.target = None
+    page, html = read(write_report(**run))
+    assert html.count('class="card"') == 3
+    assert "targets met" not in page.text
+
+
+def test_fault(run):
+    page, _ = read(write_report(**run, fault="singular at <A>"))
+    assert "stopped by fault" in page.text
+    assert "singular at <A>" in page.text
+    assert "completed" not in page.text
+
+
+def test_recording_is_linked_relative_to_the_page(run):
+    recording = run["directory"] / "a folder" / "recording.html"
+    page, _ = read(write_report(**run, recording=recording))
+    assert page.values("iframe", "src") == ["a%20folder/recording.html"]
+    assert page.values("a", "href") == ["a%20folder/recording.html"]
+    page, _ = read(write_report(**run))
+    assert page.values("iframe", "src") == []
+
+
+def test_diagram_is_an_image(run):
+    svg = "<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>"
+    page, _ = read(write_report(**run, diagram_svg=svg))
+    source = page.values("img", "src")[1]
+    assert source.startswith("data:image/svg+xml;base64,")
+    assert base64.b64decode(source.split(",")[1]).decode() == svg
+    assert "Block diagram" in page.text
+
+
+def test_works_without_metrics_and_figures(run):
+    run.update(metrics=Metrics(), figures=[])
+    page, _ = read(write_report(**run))
+    assert "All metrics" not in page.text
+    assert "Scenario as resolved" in page.text

@@ -1,0 +1,182 @@
+"""Metrics of path following against logs whose answers are known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from experiments.results.path_metrics import (
+    max_distance_from_notch_axis,
+    max_external_force,
+    max_manifold_force,
+    max_orientation_error_after,
+    max_path_deviation_after,
+    max_path_deviation_while_moving,
+    max_tangential_force,
+    metric_names,
+    path_distance,
+    path_following_metrics,
+    peak_speed,
+    peak_torque,
+    rms_path_deviation,
+    saturation_count,
+    settling_time,
+    static_path_deviation,
+    tangential_error,
+)
+from experiments.results.run_log import RunLog
+
+RATE = 8.0  # 1/s
+START = 0.01  # m
+STEP = 1e-3  # s
+
+
+def decaying_log() -> RunLog:
+    """Distance START exp(-RATE t), shared 3:4 by the two coordinates, over 2 s."""
+    time = STEP * np.arange(2001)
+    log = RunLog(time)
+    log.add("xi", START * np.exp(-RATE * time)[:, None] * [0.6, -0.8], "m")
+    return log
+
+
+def test_distance_is_euclidean():
+    log = decaying_log()
+    np.testing.assert_allclose(path_distance(log), START * np.exp(-RATE * log.time), rtol=1e-14)
+
+
+def test_settling_time_of_an_exponential():
+    tolerance = 0.05e-3
+    exact = math.log(START / tolerance) / RATE
+    # The first sample at or after the exact instant.
+    assert settling_time(decaying_log(), tolerance) == pytest.approx(
+        math.ceil(exact / STEP) * STEP, abs=1e-12
+    )
+
+
+def test_settling_time_counts_the_last_exit():
+    log = RunLog(np.arange(6.0))
+    log.add("xi", np.array([[5, 0], [0, 0], [0, 3], [0, 0], [0, 0], [0, 0]]) * 1e-3, "m")
+    assert settling_time(log, 1e-3) == 3.0
+    assert settling_time(log, 4e-3) == 1.0
+    assert settling_time(log, 5e-3) == 0.0
+
+
+@pytest.mark.parametrize("last", [2e-3, math.nan])
+def test_never_settled_is_nan(last):
+    log = RunLog(np.arange(3.0))
+    log.add("xi", [[0, 0], [0, 0], [last, 0]], "m")
+    assert math.isnan(settling_time(log, 1e-3))
+
+
+def test_deviation_after():
+    log = decaying_log()
+    assert max_path_deviation_after(log, 0.5) == pytest.approx(START * math.exp(-RATE * 0.5))
+    assert math.isnan(max_path_deviation_after(log, 3.0))
+
+
+def test_deviation_while_moving():
+    log = RunLog(np.arange(5.0))
+    log.add("xi", np.array([[9, 0], [1, 0], [0, 2], [0, 7], [8, 0]]) * 1e-3, "m")
+    log.add("eta_dot", [0.0, 1.0, -1.0, 0.2, 0.0], "m/s")
+    assert max_path_deviation_while_moving(log, 0.5) == pytest.approx(2e-3)
+    assert max_path_deviation_while_moving(log, 0.1) == pytest.approx(7e-3)
+    assert math.isnan(max_path_deviation_while_moving(log, 0.5, t=2.5))
+
+
+def test_rms_of_an_exponential():
+    log = decaying_log()
+    # Mean of START^2 exp(-2 RATE t) over [0, 2]; the sum over samples differs by O(STEP).
+    exact = START * math.sqrt((1 - math.exp(-4 * RATE)) / (4 * RATE))
+    assert rms_path_deviation(log) == pytest.approx(exact, rel=5e-3)
+    assert rms_path_deviation(log, 1.0) < 1e-3 * exact
+
+
+def test_static_deviation_is_the_mean_of_the_end():
+    time = 0.1 * np.arange(11)
+    log = RunLog(time)
+    log.add("xi", np.where(time[:, None] > 0.75, [3e-3, 4e-3], [1.0, 0.0]), "m")
+    assert static_path_deviation(log, 0.2001) == pytest.approx(5e-3)
+    assert static_path_deviation(log, 0.3001) == pytest.approx((1.0 + 3 * 5e-3) / 4)
+
+
+def test_orientation_speed_and_tangential_error():
+    log = RunLog(np.arange(4.0))
+    log.add("phi", np.array([[9, 0, 0], [1, 2, 2], [0, 0, 1], [0, 0, 0]]) * 1e-3, "rad")
+    log.add("eta_dot", [0.1, -1.5, 1.2, 0.0], "m/s")
+    log.add("eta", [0.0, 1.0, 2.0, 3.0], "m")
+    log.add("eta_p", [0.0, 1.3, 1.9, 3.0], "m")
+    assert max_orientation_error_after(log, 1.0) == pytest.approx(3e-3)
+    assert peak_speed(log) == 1.5
+    assert tangential_error(log) == pytest.approx(0.3)
+    assert tangential_error(log, 2.0) == pytest.approx(0.1)
+
+
+def test_torques_and_saturation():
+    torque = np.array([[1.0, -5.0], [-3.0, 2.0], [2.9, 5.0 * (1 - 1e-12)], [0.0, 4.9]])
+    log = RunLog(np.arange(4.0))
+    log.add("tau_d", torque, "Nm", limits=[3.0, 5.0])
+    np.testing.assert_allclose(peak_torque(log), [3.0, 5.0])
+    assert saturation_count(log) == 3
+    log.add("tau_d", torque, "Nm")
+    assert saturation_count(log) == 0
+
+
+def test_forces_count_once_the_sensor_is_tared():
+    log = RunLog(np.arange(4.0))
+    forces = [[90, 0, 0], [2, 3, 6], [-5, 0, 0], [0, 4, 0]]
+    log.add("manifold_force", np.hstack([forces, np.full((4, 3), 50.0)]), "N, Nm")
+    assert max_manifold_force(log) == 90.0
+    log.add("tared", [0, 1, 1, 1], "1")
+    assert max_manifold_force(log) == pytest.approx(7.0)  # sqrt(4 + 9 + 36)
+    assert max_tangential_force(log) == 5.0
+    log.add("tared", np.zeros(4), "1")
+    assert math.isnan(max_manifold_force(log))
+    assert math.isnan(max_tangential_force(log))
+
+
+def test_external_force():
+    log = RunLog(np.arange(3.0))
+    forces = [[0, 0, 0], [3, -4, 12], [5, 0, 0]]
+    log.add("wrench_ext", np.hstack([forces, np.full((3, 3), 50.0)]), "N, Nm")
+    assert max_external_force(log) == pytest.approx(13.0)
+
+
+def test_distance_from_the_notch_axis():
+    log = RunLog(np.arange(3.0))
+    log.add("notch_position", [[0, 0], [-3e-3, -4e-3], [4e-3, 0]], "m")
+    assert max_distance_from_notch_axis(log) == pytest.approx(5e-3)
+
+
+def test_names_are_those_of_the_collection():
+    log = decaying_log()
+    samples = len(log.time)
+    log.add("xi_p", np.zeros((samples, 2)), "m")
+    for name in ("eta", "eta_p", "eta_dot"):
+        log.add(name, np.zeros(samples), "m")
+    log.add("tau_d", np.ones((samples, 3)), "N")
+    assert list(path_following_metrics(log, 5e-5, 0.5, 0.1)) == metric_names(3, [])
+    log.add("xi_d", np.zeros((samples, 2)), "m")
+    log.add("xi_M", np.zeros((samples, 2)), "m")
+    log.add("phi", np.zeros((samples, 3)), "rad")
+    log.add("manifold_force", np.ones((samples, 6)), "N, Nm")
+    log.add("wrench_ext", np.ones((samples, 6)), "N, Nm")
+    log.add("notch_position", np.ones((samples, 2)), "m")
+    metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
+    assert list(metrics) == metric_names(3, log.signals)
+    for name in ("max_manifold_force", "max_tangential_force", "max_external_force"):
+        assert metrics[name].unit == "N"
+
+
+def test_collection_has_what_the_log_allows():
+    log = decaying_log()
+    names = {"settling_time", "max_path_deviation", "rms_path_deviation", "static_path_deviation"}
+    assert set(path_following_metrics(log, 5e-5, 0.5, 0.1)) == names
+    log.add("tau_d", np.full((2001, 3), 2.0), "Nm", limits=2.0)
+    log.add("eta_dot", np.full(2001, 0.2), "m/s")
+    metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
+    assert metrics["peak_torque_3"].value == 2.0
+    assert metrics["saturated_samples"].value == 2001
+    assert metrics["max_path_deviation_while_moving"].value == pytest.approx(
+        START * math.exp(-RATE * 0.5)
+    )
+    assert metrics["settling_time"].unit == "s"

@@ -1,0 +1,205 @@
+"""Projection: constructed feet, dense samples, laps, crossings, ends."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import (
+    FourierCurve,
+    PiecewisePolynomialCurve,
+    Projector,
+    interpolate,
+    project_globally,
+)
+from pfsc_drake.geometry.curves.curve import Curve
+
+LEMNISCATE = FourierCurve.bent_lemniscate()
+COORDINATE = st.floats(-0.5, 0.5)
+
+
+def _spline(seed: int, closed: bool = False) -> PiecewisePolynomialCurve:
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, 5.5, 10)
+    points = np.stack([np.cos(angle), np.sin(angle), 0.1 * angle], axis=1)
+    return interpolate(points + 0.1 * rng.normal(size=points.shape), smoothness=3, closed=closed)
+
+
+def _check_against_samples(curve: Curve, point: np.ndarray) -> None:
+    result = project_globally(curve, point)
+    theta = np.linspace(*curve.domain, 20001)
+    least = np.linalg.norm(curve.derivatives(theta, 0)[:, 0] - point, axis=1).min()
+    sigma, first, second = curve.derivatives(result.theta, 2)
+    found = np.linalg.norm(point - sigma)
+    assert result.converged
+    assert found <= least + 1e-12
+    slope = (point - sigma) @ first / (first @ first)
+    assert result.alpha == pytest.approx((point - sigma) @ second / (first @ first), abs=1e-8)
+    if result.at_end:
+        assert result.theta in curve.domain
+        assert slope * (1.0 if result.theta == curve.domain[1] else -1.0) > 0.0
+    else:
+        assert abs(slope) < 1e-10
+        assert result.alpha < 1.0
+
+
+@given(COORDINATE, COORDINATE, COORDINATE)
+@settings(max_examples=60, deadline=None)
+def test_global_projection_on_the_lemniscate(x: float, y: float, z: float) -> None:
+    # Not on the curve's planes of symmetry, where two minima are equal or merge.
+    point = np.array([0.7013 + x, 0.2007 + y, 1.153 + z])
+    _check_against_samples(LEMNISCATE, point)
+
+
+@given(st.integers(0, 20), COORDINATE, COORDINATE, COORDINATE, st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_global_projection_on_splines(
+    seed: int, x: float, y: float, z: float, closed: bool
+) -> None:
+    _check_against_samples(_spline(seed, closed), np.array([2 * x, 2 * y, z]))
+
+
+def _beside(curve: Curve, theta: float, distance: float, angle: float) -> np.ndarray:
+    """Point whose projection is theta by construction: off the curve across its tangent."""
+    sigma, first = curve.derivatives(theta, 1)
+    tangent = first / np.linalg.norm(first)
+    u = np.cross(tangent, [0.3, -0.5, 0.8])
+    u /= np.linalg.norm(u)
+    v = np.cross(tangent, u)
+    return sigma + distance * (math.cos(angle) * u + math.sin(angle) * v)
+
+
+@given(
+    theta=st.floats(-20.0, 20.0),
+    distance=st.floats(0.0, 0.02),
+    angle=st.floats(0.0, 6.3),
+    offset=st.floats(-0.05, 0.05),
+)
+@settings(max_examples=150, deadline=None)
+def test_warm_start_finds_the_constructed_foot(
+    theta: float, distance: float, angle: float, offset: float
+) -> None:
+    point = _beside(LEMNISCATE, theta, distance, angle)
+    result = Projector(LEMNISCATE).project(point.tolist(), theta + offset)
+    assert result.converged
+    assert not result.at_end
+    assert result.theta == pytest.approx(theta, abs=1e-10)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_tracks_laps_and_the_crossing_without_changing_the_branch(direction: float) -> None:
+    projector = Projector(LEMNISCATE)
+    theta = 0.3
+    for step in range(1, 3000):
+        truth = 0.3 + direction * 3 * 2 * math.pi * step / 3000
+        point = _beside(LEMNISCATE, truth, 0.01, 0.02 * step)
+        theta = projector.project(point.tolist(), theta).theta
+        assert theta == pytest.approx(truth, abs=1e-10)
+    assert abs(theta) > 18.0
+
+
+def test_crossing_itself_belongs_to_two_branches() -> None:
+    crossing = LEMNISCATE.derivatives(math.pi / 2, 0)[0].tolist()
+    projector = Projector(LEMNISCATE)
+    assert projector.project(crossing, 1.5).theta == pytest.approx(math.pi / 2, abs=1e-12)
+    assert projector.project(crossing, 4.8).theta == pytest.approx(1.5 * math.pi, abs=1e-12)
+
+
+def test_far_guess_descends_to_a_minimum() -> None:
+    projector = Projector(LEMNISCATE)
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        point = LEMNISCATE.derivatives(rng.uniform(0, 6.28), 0)[0] + 0.2 * rng.normal(size=3)
+        guess = rng.uniform(-10, 10)
+        result = projector.project(point.tolist(), guess)
+        sigma, first, _ = LEMNISCATE.derivatives(result.theta, 2)
+        before = np.linalg.norm(point - LEMNISCATE.derivatives(guess, 0)[0])
+        assert result.converged
+        assert result.alpha < 1.0
+        assert abs((point - sigma) @ first) < 1e-11
+        assert np.linalg.norm(point - sigma) <= before + 1e-12
+
+
+def test_long_steps_do_not_skip_laps() -> None:
+    # J'' is nearly zero at the guess: a full step of Newton's method is 5e5 rad long.
+    circle = FourierCurve.circle([0, 0, 0], 1.0)
+    for lap in (-1, 0, 2):
+        guess = math.pi / 2 - 2e-6 + 2 * math.pi * lap
+        result = Projector(circle).project([0.5, 0.0, 0.0], guess)
+        assert result.theta == pytest.approx(2 * math.pi * lap, abs=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distance_never_grows_on_a_winding_curve(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(0.1 * rng.normal(size=(15, 3)) + [0.1, 0, 0], axis=0)
+    curve = interpolate(points, smoothness=4)
+    projector = Projector(curve)
+    for _ in range(250):
+        point = points.mean(axis=0) + 0.3 * rng.normal(size=3)
+        guess = rng.uniform(*curve.domain)
+        result = projector.project(point.tolist(), guess)
+        reached = curve.derivatives([guess, result.theta], 0)[:, 0]
+        before, after = np.linalg.norm(reached - point, axis=1)
+        assert result.converged
+        assert after <= before + 1e-12
+
+
+def test_open_ends_clamp() -> None:
+    line = PiecewisePolynomialCurve.line([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    projector = Projector(line)
+    inside = projector.project([0.9999, 0.1, 0.0], 0.2)
+    assert (inside.at_end, inside.converged) == (False, True)
+    assert inside.theta == pytest.approx(0.9999, abs=1e-14)
+    beyond = projector.project([1.001, 0.1, 0.0], 0.2)
+    assert beyond[0] == 1.0
+    assert (beyond.at_end, beyond.converged) == (True, True)
+    before = projector.project([-5.0, 0.1, 0.0], 0.2)
+    assert (before.theta, before.at_end, before.converged) == (0.0, True, True)
+    exactly = projector.project([1.0, 0.3, 0.0], 0.999)
+    assert exactly.theta == pytest.approx(1.0, abs=1e-12)
+    assert not exactly.at_end
+    assert not projector.project([0.5, 0.0, 0.0], 1.0).at_end
+    assert projector.project([0.5, 0.0, 0.0], 30.0).theta == pytest.approx(0.5, abs=1e-12)
+
+
+def test_centre_of_a_circle_is_not_a_strict_minimum() -> None:
+    result = Projector(FourierCurve.circle([0, 0, 0], 1.0)).project([0.0, 0.0, 0.0], 0.4)
+    assert not result.converged
+    assert result.alpha == pytest.approx(1.0)
+
+
+def test_maximum_is_left() -> None:
+    circle = FourierCurve.circle([0, 0, 0], 1.0)
+    result = Projector(circle).project([0.5, 0.0, 0.0], math.pi - 0.01)
+    assert result.converged
+    assert result.theta == pytest.approx(0.0, abs=1e-11)
+
+
+def test_other_dimensions() -> None:
+    plane = FourierCurve([0.0, 0.0], [[2.0, 0.0]], [[0.0, 1.0]])
+    result = project_globally(plane, [5.0, 0.0])
+    assert result.theta % (2 * math.pi) == pytest.approx(0.0, abs=1e-10)
+    four = PiecewisePolynomialCurve.line([0, 0, 0, 0], [1, 1, 1, 1])
+    assert Projector(four).project([1.0, 0, 0, 0], 0.1).theta == pytest.approx(0.5, abs=1e-12)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_input_that_is_not_finite_does_not_raise(closed: bool, bad: float) -> None:
+    curve = _spline(0, closed)
+    projector = Projector(curve)
+    assert not projector.project([0.0, bad, 0.0], 1.0).converged
+    assert not projector.project([0.0, 0.0, 0.0], bad).converged
+    assert not Projector(LEMNISCATE).project([0.0, 0.0, 0.0], bad).converged
+    assert not project_globally(curve, [0.0, bad, 0.0]).converged
+
+
+def test_errors() -> None:
+    with pytest.raises(InputError, match=r"point: shape \(2,\); \(3,\)"):
+        project_globally(LEMNISCATE, [0.0, 0.0])
+    with pytest.raises(InputError, match="samples: 2"):
+        project_globally(LEMNISCATE, [0.0, 0.0, 0.0], samples=2)

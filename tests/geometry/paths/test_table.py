@@ -1,0 +1,121 @@
+"""The table of polynomials against the curves, the arc length and the frame it is made of."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.geometry import (
+    FourierCurve,
+    OrientationCurve,
+    Path,
+    PathPointLayout,
+    PiecewisePolynomialCurve,
+    interpolate,
+    interpolate_orientation,
+    zyx_to_quaternion,
+)
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.paths.table import PathTable, tabulate
+
+
+def _table(path: Path, order: int) -> tuple[PathTable, PathPointLayout]:
+    layout = PathPointLayout(order, path.orientation is not None)
+    table = tabulate(path.position, path.orientation, path.arc_length, path.frame, layout)
+    return table, layout
+
+
+def _rows(table: PathTable, theta: np.ndarray) -> np.ndarray:
+    piece = np.searchsorted(table.breakpoints[1:-1], theta, side="right")
+    powers = (theta - table.breakpoints[piece])[:, None] ** np.arange(8)
+    return np.einsum("mnj,mj->mn", table.rows[piece], powers)
+
+
+def _turning(curve: Curve, laps: int) -> OrientationCurve:
+    """Orientation on other breakpoints than the curve's; `laps` turns a lap."""
+    part = np.linspace(0.0, 1.0, 14)
+    turn = laps * 2.0 * np.pi * part
+    angles = np.stack([turn, 0.2 * np.sin(2 * np.pi * part), 0.0 * part], axis=1)
+    theta = curve.domain[0] + curve.period * part
+    quaternions = zyx_to_quaternion(angles)
+    return interpolate_orientation(quaternions, theta, smoothness=4, closed=curve.closed)
+
+
+@pytest.mark.parametrize("name", ["lemniscate", "twisted", "bumps", "open_spline"])
+@pytest.mark.parametrize("turns", [None, 0, 1])
+def test_rows_agree_with_the_parts(
+    name: str, turns: int | None, request: pytest.FixtureRequest
+) -> None:
+    curve = request.getfixturevalue(name)
+    path = Path(curve, None if turns is None else _turning(curve, turns))
+    table, layout = _table(path, 4)
+    laps = 2 if curve.closed and turns == 1 else 1
+    begin, end = curve.domain[0], curve.domain[0] + laps * curve.period
+    assert table.breakpoints[0] == begin
+    assert table.breakpoints[-1] == pytest.approx(end, rel=1e-15)
+    theta = np.random.default_rng(0).uniform(begin, end, 3000)
+    found = _rows(table, theta)
+    eta = np.array([path.arc_length.at(value) for value in theta.tolist()])
+    np.testing.assert_allclose(found[:, 1], eta, rtol=0.0, atol=1e-13 * eta.max())
+    # The powers that make up the bumps cancel: the curve's own tangent is rough by 1e-12.
+    atol = 2e-12 if name == "bumps" else 3e-13
+    e_perp = path.frame.normals(theta)[0]
+    np.testing.assert_allclose(found[:, layout.normal], e_perp, rtol=0.0, atol=atol)
+    for part, expected in (
+        (layout.position, curve.derivatives(theta, 5)),
+        (layout.quaternion, path.orientation and path.orientation.derivatives(theta, 4)),
+    ):
+        if expected is not None:
+            scale = np.maximum(np.abs(expected).max(axis=(0, 2), keepdims=True), 1e-300)
+            error = found[:, part].reshape(expected.shape) - expected
+            assert np.abs(error / scale).max() < atol
+    assert not table.rows[:, [0, 2, 3]].any()
+
+
+@pytest.mark.parametrize("shift", [0.0, 100.0])
+@pytest.mark.parametrize("name", ["twisted", "bumps", "open_spline"])
+def test_slopes_agree_with_the_product(
+    name: str, shift: float, request: pytest.FixtureRequest
+) -> None:
+    """(sigma - y) . sigma' itself, on a path near the origin and on one far away."""
+    curve = request.getfixturevalue(name)
+    if shift and isinstance(curve, FourierCurve):
+        curve = FourierCurve(curve.constant + shift, curve.cosine, curve.sine)
+    elif shift:
+        moved = curve.coefficients.copy()
+        moved[:, 0] += shift
+        curve = PiecewisePolynomialCurve(curve.breakpoints, moved)
+    table, _ = _table(Path(curve), 2)
+    rng = np.random.default_rng(1)
+    theta = rng.uniform(*curve.domain, 1000)
+    sigma, tangent = curve.derivatives(theta, 1).transpose(1, 0, 2)
+    y = sigma + 0.05 * rng.normal(size=sigma.shape)
+    piece = np.searchsorted(table.breakpoints[1:-1], theta, side="right")
+    powers = (theta - table.breakpoints[piece])[:, None] ** np.arange(8)
+    ones_y = np.column_stack([np.ones(len(y)), y])
+    found = np.einsum("mj,mji,mi->m", powers, table.slopes[piece], ones_y)
+    size = np.linalg.norm(tangent, axis=1).max()
+    expected = np.sum((sigma - y) * tangent, axis=1)
+    np.testing.assert_allclose(found, expected, atol=(1e-12 + 1e-14 * shift) * size)
+
+
+def test_a_polynomial_path_is_tabulated_exactly() -> None:
+    """On a spline of degree 4 even the slope, of degree 7, is no approximation."""
+    rng = np.random.default_rng(5)
+    curve = interpolate(np.cumsum(rng.uniform(0.1, 0.2, (9, 3)), axis=0), smoothness=3)
+    table, layout = _table(Path(curve), 2)
+    theta = rng.uniform(*curve.domain, 500)
+    expected = curve.derivatives(theta, 3)
+    scale = np.abs(expected).max(axis=(0, 2), keepdims=True)
+    found = _rows(table, theta)[:, layout.position].reshape(expected.shape)
+    np.testing.assert_allclose(found / scale, expected / scale, atol=3e-14)
+
+
+def test_breakpoints_that_differ_by_rounding_are_one() -> None:
+    curve = PiecewisePolynomialCurve(
+        [0.0, 0.5, 1.0], [[[0, 0, 0], [1, 0, 0]], [[0.5, 0, 0], [1, 0, 0]]]
+    )
+    halves = np.array([[[1.0, 0, 0, 0], [0.2, 0.1, 0, 0]], [[1.1, 0.05, 0, 0], [0.2, 0, 0, 0]]])
+    orientation = OrientationCurve(PiecewisePolynomialCurve([0.0, 0.5 + 2e-16, 1.0], halves))
+    table, _ = _table(Path(curve, orientation), 1)
+    assert np.diff(table.breakpoints).min() > 1e-7
+    table, _ = _table(Path(curve), 1)
+    np.testing.assert_allclose(_rows(table, np.array([0.25]))[0, 1], 0.25, atol=1e-15)

@@ -1,0 +1,270 @@
+"""The law as a system: parts of the output, memory, faults that hold."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
+
+from pfsc_drake.control.law.decoupling import DecouplingInverse
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.linearization import linearize_path
+from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+
+PERIOD = 1e-3
+THETA = 0.6
+
+
+class Bench:
+    """A controller in a context, its inputs beside the path."""
+
+    def __init__(self, arm, path, law):
+        self.law = law
+        self.system = PathFollowingController(law, PERIOD)
+        self.context = self.system.CreateDefaultContext()
+        sigma = path.position.derivatives(THETA, 0)[0]
+        q = arm.reach(sigma + np.array([0.004, -0.006, 0.005]))
+        v = np.array([0.1, -0.2, 0.15])
+        self.state = np.concatenate([q, v, q, v])
+        r = law.linearization.relative_degree
+        self.point = path.evaluator(r)(arm.pose(q)[:3].tolist(), THETA)
+        self.reference = np.zeros(3 * (r + 1))
+        self.reference[0] = self.point[1] + 0.01
+        self.fix()
+
+    def fix(self, **inputs):
+        names = {"joint_state": "state", "path_point": "point", "reference": "reference"}
+        for port, name in names.items():
+            value = inputs.get(name, getattr(self, name))
+            self.system.GetInputPort(port).FixValue(self.context, value)
+
+    def start(self):
+        self.simulator = Simulator(self.system, self.context)
+        self.simulator.Initialize()
+
+    def tick(self, count=1):
+        # the update of the last instant happens when time leaves it
+        ticks = round(self.context.get_time() / PERIOD) + count
+        self.simulator.AdvanceTo(ticks * PERIOD)
+
+    def output(self, name):
+        return self.system.GetOutputPort(name).Eval(self.context).copy()
+
+    def with_nan(self):
+        state = self.state.copy()
+        state[1] = np.nan
+        return state
+
+
+@pytest.fixture(name="bench")
+def fixture_bench(arm, path, make_law):
+    return Bench(arm, path, make_law())
+
+
+def test_parts_are_the_laws_own(bench):
+    law = bench.law
+    result = law.evaluate(bench.state, bench.point, bench.reference, np.zeros(3))
+    assert np.array_equal(bench.output("law"), result)
+    assert np.array_equal(bench.output("drive_torque"), result[law.layout.drive])
+    for name in ("manifold_state", "virtual_input", "status"):
+        assert np.array_equal(bench.output(name), result[getattr(law.layout, name)])
+    assert bench.system.fault(bench.context) == Fault.NONE
+
+
+def test_the_integral_of_the_error_accumulates(arm, path, make_law):
+    bench = Bench(arm, path, make_law(integral=500.0))
+    before = bench.output("virtual_input")
+    error = bench.output("manifold_state")[:3] - bench.reference[:3]
+    bench.start()
+    bench.tick(10)
+    expected = -500.0 * 10 * PERIOD * error
+    assert np.abs(expected).min() > 1e-3
+    assert np.allclose(bench.output("virtual_input") - before, expected, rtol=1e-9)
+
+
+def test_without_integral_part_nothing_accumulates(bench):
+    before = bench.output("drive_torque")
+    bench.start()
+    bench.tick(10)
+    assert np.array_equal(bench.output("drive_torque"), before)
+
+
+def test_a_fault_shows_at_once_and_holds(bench, arm):
+    bench.start()
+    bench.tick(2)
+    bench.fix(state=bench.with_nan())
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
+    bench.tick()
+    bench.fix()
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
+    bench.tick(3)
+    assert bench.output("status")[0] == Fault.INPUT_NOT_FINITE
+    # the measurement is back: the links are held where they are, and braked
+    weight = arm.weight(bench.state[:3])
+    expected = weight - 30.0 * bench.state[9:]
+    assert np.allclose(bench.output("drive_torque"), expected, rtol=0, atol=1e-9)
+
+
+def test_a_fault_without_measurement_holds_the_last_good_position(bench, arm):
+    bench.start()
+    bench.tick(2)
+    bench.fix(state=np.full(12, np.nan))
+    assert np.allclose(bench.output("drive_torque"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
+    bench.tick(2)
+    assert np.allclose(bench.output("drive_torque"), arm.weight(bench.state[:3]), rtol=0, atol=1e-9)
+
+
+def test_a_later_fault_does_not_replace_the_first(bench):
+    bench.start()
+    point = bench.point.copy()
+    point[bench.law.linearization.layout.alpha] = 0.95
+    bench.fix(point=point)
+    bench.tick(2)
+    bench.fix(state=bench.with_nan())
+    assert bench.system.fault(bench.context) == Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
+
+
+def test_the_integral_rests_during_a_fault(arm, path, make_law):
+    bench = Bench(arm, path, make_law(integral=500.0))
+    bench.start()
+    bench.tick(2)
+    memory = bench.context.get_discrete_state_vector().value()[:3].copy()
+    bench.fix(state=bench.with_nan())
+    bench.tick(3)
+    assert np.array_equal(bench.context.get_discrete_state_vector().value()[:3], memory)
+
+
+def test_a_new_context_knows_no_fault(bench):
+    bench.start()
+    bench.fix(state=bench.with_nan())
+    bench.tick(2)
+    other = bench.system.CreateDefaultContext()
+    bench.context = other
+    bench.fix()
+    assert bench.system.fault(other) == Fault.NONE
+
+
+def test_the_last_ticks_drive_is_extrapolated(path):
+    """The first tick of the elastic law has nothing to extrapolate, the next ones have."""
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_elastic_3r")))
+    plant.Finalize()
+    chain, _ = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
+    linearization = linearize_path(chain, "elastic", oriented=False)
+    gains = Stabilization([gains_from_poles([-20.0] * 4)] * 3, 4, ["eta", "xi_1", "xi_2"])
+    inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(3, 30.0))
+    law = PathLaw(chain, linearization, gains, inverse, np.full(3, 1e9), 0.9, safe)
+    system = PathFollowingController(law, PERIOD)
+    context = system.CreateDefaultContext()
+    q = np.array([0.2, 1.4, -0.4])
+    states = [np.concatenate([q, [v, -v, v], q + 1e-3, np.zeros(3)]) for v in (0.1, 0.15)]
+    point, reference = path.evaluator(4).evaluate_at(THETA), np.zeros(15)
+    system.GetInputPort("path_point").FixValue(context, point)
+    system.GetInputPort("reference").FixValue(context, reference)
+    simulator = Simulator(system, context)
+    last_held = None
+    for i, state in enumerate(states):
+        system.GetInputPort("joint_state").FixValue(context, state)
+        expected = law.evaluate(state, point, reference, np.zeros(3), last_held)
+        assert expected[law.layout.status][0] == Fault.NONE
+        assert np.array_equal(system.GetOutputPort("law").Eval(context), expected)
+        simulator.AdvanceTo((i + 1) * PERIOD)
+        last_held = expected[law.layout.held]
+    assert np.abs(law.evaluate(state, point, reference, np.zeros(3)) - expected).max() > 1.0
+
+
+def test_every_output_depends_on_every_input_at_once(bench):
+    system = bench.system
+    for output in ("law", "drive_torque", "manifold_state", "virtual_input", "status"):
+        port = int(system.GetOutputPort(output).get_index())
+        for name in ("joint_state", "path_point", "reference"):
+            assert system.HasDirectFeedthrough(int(system.GetInputPort(name).get_index()), port)
+
+
+def closed_loop(arm, path, law, theta):
+    """Return a diagram of the arm under the law, without any hold, and the controller."""
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_3r")))
+    plant.Finalize()
+    chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
+    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
+    r = law.linearization.relative_degree
+    reference = np.zeros(3 * (r + 1))
+    reference[0] = path.arc_length.at(theta)
+    measured = builder.AddSystem(MatrixGain(rows))
+    kinematics = builder.AddSystem(ToolKinematics(chain))
+    projector = builder.AddSystem(PathProjector(path, r, PERIOD))
+    controller = builder.AddSystem(PathFollowingController(law, PERIOD))
+    source = builder.AddSystem(ConstantVectorSource(reference))
+    builder.Connect(plant.get_state_output_port(), measured.get_input_port())
+    builder.Connect(measured.get_output_port(), kinematics.GetInputPort("joint_state"))
+    builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))
+    builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
+    builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
+    builder.Connect(source.get_output_port(), controller.GetInputPort("reference"))
+    # the plant's state does not depend on the torque at once, so nothing is algebraic
+    builder.Connect(controller.GetOutputPort("drive_torque"), plant.get_actuation_input_port())
+    return builder.Build(), plant, controller
+
+
+def test_the_loop_over_a_plant_is_not_algebraic_and_converges(arm, path, make_law):
+    """Double poles at -20: from rest the errors obey e_0 (1 + 20 t) exp(-20 t)."""
+    diagram, plant, controller = closed_loop(arm, path, make_law(), THETA)
+    context = diagram.CreateDefaultContext()
+    sigma = path.position.derivatives(THETA, 0)[0]
+    q = arm.reach(sigma + np.array([0.004, -0.006, 0.005]))
+    plant.SetPositions(plant.GetMyMutableContextFromRoot(context), q)
+    simulator = Simulator(diagram, context)
+    simulator.get_mutable_integrator().set_target_accuracy(1e-8)
+    simulator.Initialize()
+    inner = controller.GetMyContextFromRoot(context)
+    output = controller.GetOutputPort("manifold_state")
+    before = output.Eval(inner)[:3].copy()
+    eta_p = path.arc_length.at(THETA)
+    simulator.AdvanceTo(0.1)
+    expected = (before - [eta_p, 0.0, 0.0]) * 3.0 * np.exp(-2.0)
+    assert np.abs(expected).min() > 1e-4
+    error = output.Eval(inner)[:3] - [eta_p, 0.0, 0.0]
+    assert np.allclose(error, expected, rtol=0, atol=1e-7)
+    assert controller.fault(inner) == Fault.NONE
+
+
+def test_a_loop_from_the_drives_to_the_measurement_is_refused(bench):
+    """The torque acts at once; Drake sees a loop that has no solution in time."""
+    builder = DiagramBuilder()
+    controller = builder.AddSystem(bench.system)
+    gain = builder.AddSystem(MatrixGain(np.ones((12, 3))))
+    builder.Connect(controller.GetOutputPort("drive_torque"), gain.get_input_port())
+    builder.Connect(gain.get_output_port(), controller.GetInputPort("joint_state"))
+    with pytest.raises(RuntimeError, match="algebraic loop"):
+        builder.Build()
+
+
+def test_external_torques_reach_the_law(bench):
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, [3.0, -2.0, 1.0])
+    expected = bench.law.evaluate(
+        bench.state,
+        bench.point,
+        bench.reference,
+        np.zeros(3),
+        tau_ext=np.array([3.0, -2.0, 1.0]),
+    )
+    assert np.array_equal(bench.output("law"), expected)
+    # a rigid joint's drive bears the torque itself (3.29)
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, np.zeros(3))
+    difference = expected[bench.law.layout.drive] - bench.output("drive_torque")
+    assert np.allclose(difference, [-3.0, 2.0, -1.0], rtol=0, atol=1e-9)
+
+
+def test_external_torque_that_is_not_finite_is_a_fault(bench):
+    bench.system.GetInputPort("tau_ext").FixValue(bench.context, [0.0, np.nan, 0.0])
+    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE

@@ -1,0 +1,89 @@
+"""Samples arrive late by exactly the bus's delay, and none is made up."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import ZeroOrderHold
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.systems.physics.bus_delay import BusDelay, add_bus_delay
+
+T = 1e-3
+
+
+class Clock(LeafSystem):
+    """Sends ``[7 + t, -t]``."""
+
+    def __init__(self):
+        super().__init__()
+        self.DeclareVectorOutputPort("out", 2, self._calc)
+
+    def _calc(self, context, output):
+        output.SetFromVector([7.0 + context.get_time(), -context.get_time()])
+
+
+def build(delay, period=T):
+    builder = DiagramBuilder()
+    bus = add_bus_delay(builder, builder.AddSystem(Clock()).get_output_port(), delay, period)
+    hold = builder.AddSystem(ZeroOrderHold(period, 2))
+    builder.Connect(bus.GetOutputPort("delivered"), hold.get_input_port())
+    simulator = Simulator(builder.Build())
+    return simulator, bus, hold
+
+
+@pytest.mark.parametrize("periods", [1, 2, 5])
+def test_delay_for_readers_between_and_at_the_ticks(periods):
+    simulator, bus, hold = build(periods * T)
+    simulator.Initialize()
+    root = simulator.get_context()
+    for k in range(12):
+        simulator.AdvanceTo(k * T + 0.4 * T)
+        # between the ticks, and as sampled by a discrete update at the tick before
+        for system in (bus, hold):
+            got = system.get_output_port().Eval(system.GetMyContextFromRoot(root))
+            sent = max(k - periods, 0) * T
+            assert np.allclose(got, [7.0 + sent, -sent], rtol=0, atol=1e-12)
+
+
+def test_delivers_the_present_input_from_the_start():
+    simulator, bus, _ = build(2e-3)
+    simulator.get_mutable_context().SetTime(3.0)
+    simulator.Initialize()
+    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    assert np.allclose(got, [10.0, -3.0], rtol=0, atol=1e-12)
+    # a run may start between two ticks
+    simulator.get_mutable_context().SetTime(3.0004)
+    simulator.Initialize()
+    simulator.AdvanceTo(3.0008)
+    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    assert np.allclose(got, [10.0004, -3.0004], rtol=0, atol=1e-12)
+
+
+def test_no_direct_feedthrough():
+    assert not BusDelay(3, 2e-3, 1e-3).HasAnyDirectFeedthrough()
+
+
+def test_contexts_do_not_share_samples():
+    bus = BusDelay(1, 2e-3, 1e-3)
+    simulators = [Simulator(bus) for _ in range(2)]
+    for value, simulator in enumerate(simulators):
+        context = simulator.get_mutable_context()
+        bus.GetInputPort("sent").FixValue(context, [float(value)])
+        simulator.Initialize()
+    for value, simulator in enumerate(simulators):
+        assert bus.get_output_port().Eval(simulator.get_context())[0] == value
+
+
+@pytest.mark.parametrize(
+    ("delay", "period"),
+    [(1.5e-3, 1e-3), (0.0, 1e-3), (-2e-3, 1e-3), (np.nan, 1e-3), (np.inf, 1e-3), (1e-4, 1e-3)],
+)
+def test_delay_must_be_whole_periods(delay, period):
+    with pytest.raises(InputError, match=r"must be a positive multiple of the period 0.001 s"):
+        BusDelay(1, delay, period)
+
+
+def test_period_must_be_positive():
+    with pytest.raises(InputError, match=r"period = 0.0 s; must be positive"):
+        BusDelay(1, 2e-3, 0.0)

@@ -1,0 +1,210 @@
+"""The hand as a system, on prescribed motions, on a free mass and on the robot."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import LogVectorOutput, MatrixGain
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.physics.external_wrench import ExternalWrench
+from pfsc_drake.systems.physics.operator_hand import OperatorHand
+
+PERIOD = 1e-3
+UPRIGHT = np.eye(3).ravel()
+
+
+class FreeMass(LeafSystem):
+    """A point mass with viscous friction, as a tool."""
+
+    def __init__(self, mass, friction):
+        super().__init__()
+        self._mass, self._friction = mass, friction
+        self.DeclareContinuousState(3, 3, 0)
+        self._wrench = self.DeclareVectorInputPort("wrench", 6)
+        self.DeclareVectorOutputPort(
+            "tool_pose",
+            12,
+            lambda context, output: output.SetFromVector(
+                np.append(context.get_continuous_state_vector().CopyToVector()[:3], UPRIGHT)
+            ),
+            prerequisites_of_calc={self.xc_ticket()},
+        )
+
+    def DoCalcTimeDerivatives(self, context, derivatives):
+        v = context.get_continuous_state_vector().CopyToVector()[3:]
+        force = self._wrench.Eval(context)[:3] - self._friction * v
+        derivatives.get_mutable_vector().SetFromVector(np.append(v, force / self._mass))
+
+
+class Pose(LeafSystem):
+    """A tool pose over time."""
+
+    def __init__(self, position):
+        super().__init__()
+        self.DeclareVectorOutputPort(
+            "tool_pose",
+            12,
+            lambda context, output: output.SetFromVector(
+                np.append(position(context.get_time()), UPRIGHT)
+            ),
+            prerequisites_of_calc={self.time_ticket()},
+        )
+
+
+def hand(waypoint=(0.0, 0.0, 0.0), **changes):
+    values = {"waypoints": [HandWaypoint(0.0, waypoint)], "grip_ramp": 1e-6, **changes}
+    return HandParameters(**values)
+
+
+def watch(position, parameters, duration):
+    """Return the wrenches for a prescribed motion; sample k is from before the tick at k T."""
+    builder = DiagramBuilder()
+    tool = builder.AddSystem(Pose(position))
+    system = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    builder.Connect(tool.get_output_port(), system.get_input_port())
+    log = LogVectorOutput(system.get_output_port(), builder, PERIOD)
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(duration)
+    return log.FindLog(simulator.get_context()).data().T
+
+
+def guide_mass(parameters, duration, mass=4.0, friction=20.0, start=(0.0, 0.0, 0.0)):
+    """Return positions, velocities and wrenches of a mass in the hand."""
+    builder = DiagramBuilder()
+    tool = builder.AddSystem(FreeMass(mass, friction))
+    system = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    builder.Connect(tool.get_output_port(), system.get_input_port())
+    builder.Connect(system.get_output_port(), tool.get_input_port())
+    log = LogVectorOutput(system.get_output_port(), builder, PERIOD)
+    pose = LogVectorOutput(tool.get_output_port(), builder, PERIOD)
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    tool.GetMyMutableContextFromRoot(root).SetContinuousState(np.append(start, np.zeros(3)))
+    simulator.AdvanceTo(duration)
+    y = pose.FindLog(root).data().T[:, :3]
+    return y, log.FindLog(root).data().T
+
+
+def moving(t):
+    return np.array([0.01 * np.sin(30.0 * t), 0.02 * t, 0.0])
+
+
+@pytest.mark.parametrize("samples", [0, 1, 25])
+def test_the_delay_is_the_given_number_of_samples(samples):
+    prompt = watch(moving, hand(), 0.2)
+    late = watch(moving, hand(reaction_delay=samples * PERIOD), 0.2)
+    assert np.array_equal(late[samples + 2 :], prompt[2 : len(prompt) - samples])
+    assert not np.any(late[: samples + 1])
+    assert np.any(prompt[3])
+
+
+def test_a_delay_between_samples_is_refused():
+    message = r"^reaction_delay = 0.0105 s: must be a multiple of the sampling time 0.001 s$"
+    with pytest.raises(InputError, match=message):
+        OperatorHand(hand(reaction_delay=0.0105), PERIOD)
+
+
+def test_spring_and_damper_of_a_seen_motion():
+    wrench = watch(lambda t: np.array([0.1 * t, 0.0, -0.02]), hand(damping=25.0), 0.1)
+    k = np.arange(5, 100)
+    # the log at k T shows what the tick before decided
+    seen = (k - 1) * PERIOD
+    assert np.allclose(wrench[k, 0], -300.0 * 0.1 * seen - 25.0 * 0.1, rtol=0, atol=1e-9)
+    assert np.allclose(wrench[k, 2], 300.0 * 0.02, rtol=0, atol=1e-9)
+
+
+def test_a_far_target_is_pulled_at_with_the_limit():
+    wrench = watch(lambda t: np.zeros(3), hand((3.0, 4.0, 0.0), force_limit=40.0), 0.1)
+    assert np.allclose(wrench[5:, :3], [24.0, 32.0, 0.0], rtol=0, atol=1e-9)
+
+
+def test_a_mass_is_brought_to_the_target():
+    waypoints = [HandWaypoint(0.0, [0, 0, 0]), HandWaypoint(2.0, [0.3, -0.1, 0.2])]
+    y, wrench = guide_mass(HandParameters(waypoints=waypoints, reaction_delay=0.02), 5.0)
+    assert np.allclose(y[-1], [0.3, -0.1, 0.2], rtol=0, atol=1e-3)
+    assert np.max(np.linalg.norm(wrench[:, :3], axis=1)) < 45.0
+    assert np.linalg.norm(wrench[-1, :3]) < 0.1
+
+
+def test_a_hand_at_rest_gives_no_more_energy_than_its_spring_holds():
+    stiffness, start = 400.0, np.array([0.1, -0.05, 0.02])
+    stored = 0.5 * stiffness * start @ start
+    y, wrench = guide_mass(hand(stiffness=stiffness), 3.0, friction=0.0, start=start)
+    # the wrench of sample k acted on the way to sample k
+    work = np.cumsum(np.sum(wrench[1:, :3] * np.diff(y, axis=0), axis=1))
+    assert np.max(work) <= stored
+    assert abs(work[-1]) < 0.01 * stored
+    assert np.linalg.norm(y[-1]) < 1e-3
+
+
+def test_wrenches_are_the_seeds():
+    def run(seed):
+        return watch(moving, hand(tremor=1.0, seed=seed), 0.1)
+
+    assert np.array_equal(run(1), run(1))
+    assert np.max(np.abs(run(1) - run(2))) > 0.1
+
+
+def test_it_lets_go_while_it_does_not_see_the_tool():
+    def position(t):
+        return np.array([0.01 if not 0.0195 < t < 0.0225 else np.nan, 0.0, 0.0])
+
+    wrench = watch(position, hand(), 0.05)
+    assert np.all(np.isfinite(wrench))
+    assert not np.any(wrench[21:24])
+    assert wrench[30] == pytest.approx([-3.0, 0, 0, 0, 0, 0])
+
+
+def test_it_does_not_feed_through():
+    assert not OperatorHand(hand(), PERIOD).HasAnyDirectFeedthrough()
+
+
+def test_a_robot_with_soft_joints_gives_way_to_the_target():
+    """The hand moves a damped, weightless robot to where it wants the tool point to be."""
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_3r")))
+    plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+    plant.Finalize()
+    tool = plant.GetFrameByName("tool_point")
+    chain, coordinates = chain_from_plant(plant, tool)
+    n = chain.dimension
+    encoders = builder.AddSystem(
+        MatrixGain(np.vstack([coordinates.link_rows, coordinates.motor_rows]))
+    )
+    damping = builder.AddSystem(MatrixGain(-30.0 * np.eye(4 * n)[n : 2 * n]))
+    kinematics = builder.AddSystem(ToolKinematics(chain))
+    context = plant.CreateDefaultContext()
+    q = np.array([0.2, 1.6, -0.5])
+    plant.SetPositions(context, q)
+    y_0 = tool.CalcPoseInWorld(context).translation()
+    target = y_0 + np.array([0.05, 0.1, -0.05])
+    waypoints = [HandWaypoint(0.0, y_0), HandWaypoint(1.0, target)]
+    parameters = HandParameters(waypoints=waypoints, stiffness=600.0, damping=60.0)
+    operator = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    external = builder.AddSystem(ExternalWrench(tool, chain))
+    connect = builder.Connect
+    connect(plant.get_state_output_port(), encoders.get_input_port())
+    for system in (damping, kinematics):
+        connect(encoders.get_output_port(), system.get_input_port())
+    connect(encoders.get_output_port(), external.GetInputPort("joint_state"))
+    connect(damping.get_output_port(), plant.get_actuation_input_port())
+    connect(kinematics.get_output_port(), operator.get_input_port())
+    connect(operator.get_output_port(), external.GetInputPort("wrench"))
+    connect(
+        external.GetOutputPort("applied_spatial_force"),
+        plant.GetInputPort("applied_spatial_force"),
+    )
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    plant.SetPositions(plant.GetMyMutableContextFromRoot(root), q)
+    simulator.AdvanceTo(4.0)
+    y = kinematics.get_output_port().Eval(kinematics.GetMyContextFromRoot(root))[:3]
+    assert np.linalg.norm(y - target) < 5e-3

@@ -1,0 +1,99 @@
+"""Scripted forces as a system: in the world and along a path."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
+from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+
+PERIOD = 1e-3
+LAYOUT = PathPointLayout(2, False)
+
+
+def simulate(path, pulses, tool, duration):
+    """Return times, wrenches and path points with the tool on a straight way."""
+    builder = DiagramBuilder()
+    way = builder.AddSystem(TrajectorySource(tool))
+    projector = builder.AddSystem(PathProjector(path, 2, PERIOD))
+    script = builder.AddSystem(ScriptedForce(ForceProfile(pulses), projector.layout, PERIOD))
+    builder.Connect(way.get_output_port(), projector.get_input_port())
+    builder.Connect(projector.get_output_port(), script.GetInputPort("path_point"))
+    logs = [LogVectorOutput(s.get_output_port(), builder, PERIOD) for s in (script, projector)]
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(duration)
+    wrench, point = (log.FindLog(simulator.get_context()) for log in logs)
+    return wrench.sample_times(), wrench.data().T, point.data().T, projector.layout
+
+
+def test_in_the_world_it_needs_no_path():
+    script = ScriptedForce(ForceProfile([ForcePulse(0.1, 1.0, [3.0, 0, 0])]), LAYOUT, PERIOD)
+    assert script.num_input_ports() == 0
+    context = script.CreateDefaultContext()
+    for time, value in ((0.0, 0.0), (0.125, 1.5), (0.5, 3.0), (2.0, 0.0)):
+        context.SetTime(time)
+        assert script.get_output_port().Eval(context)[0] == pytest.approx(value, abs=1e-12)
+
+
+def test_against_the_motion_is_along_the_path(path):
+    begin, end = path.evaluator(2).evaluate_at(0.05), path.evaluator(2).evaluate_at(0.4)
+    pose = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+    samples = np.column_stack([pose, pose])
+    samples[:3, 0], samples[:3, 1] = begin[LAYOUT.position][:3], end[LAYOUT.position][:3]
+    tool = PiecewisePolynomial.FirstOrderHold([0.0, 0.4], samples)
+    pulse = ForcePulse(0.0, 1.0, [-100.0, 0, 0], [0, 0, 2.0], frame="manifold")
+    times, wrench, point, layout = simulate(path, [pulse], tool, 0.4)
+    slope = point[:, layout.position][:, 3:6]
+    e_par = slope / np.linalg.norm(slope, axis=1)[:, None]
+    full = times > 0.06
+    # the directions are those of the last tick
+    force, torque = wrench[full, :3], wrench[full, 3:]
+    assert np.allclose(force, -100.0 * e_par[np.flatnonzero(full) - 1], rtol=0, atol=1e-9)
+    assert np.max(np.abs(np.diff(force, axis=0))) < 1.0
+    e_cross = np.cross(e_par, point[:, layout.normal])[np.flatnonzero(full) - 1]
+    assert np.allclose(torque, 2.0 * e_cross, rtol=0, atol=1e-9)
+
+
+def test_a_lost_path_point_leaves_the_direction():
+    builder = DiagramBuilder()
+    profile = ForceProfile([ForcePulse(-1.0, 1.0, [5.0, 0, 0], frame="manifold")])
+    script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
+    lost = builder.AddSystem(ConstantVectorSource(np.full(LAYOUT.size, np.nan)))
+    builder.Connect(lost.get_output_port(), script.get_input_port())
+    simulator = Simulator(builder.Build())
+    context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    simulator.Initialize()
+    assert not np.any(script.get_output_port().Eval(context))
+    context.SetDiscreteState(np.eye(3)[:, [1, 2, 0]].ravel())
+    simulator.AdvanceTo(0.01)
+    assert script.get_output_port().Eval(context) == pytest.approx([0, 5.0, 0, 0, 0, 0])
+
+
+def test_it_does_not_feed_through():
+    profile = ForceProfile([ForcePulse(frame="manifold")])
+    assert not ScriptedForce(profile, LAYOUT, PERIOD).HasAnyDirectFeedthrough()
+
+
+def test_the_path_is_looked_at_in_time():
+    """Well before a force the direction is not kept up to date, from 100 ticks before it is."""
+    builder = DiagramBuilder()
+    profile = ForceProfile([ForcePulse(0.3, 0.5, [5.0, 0, 0], frame="manifold")])
+    script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
+    point = np.zeros(LAYOUT.size)
+    point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
+    path_point = builder.AddSystem(ConstantVectorSource(point))
+    builder.Connect(path_point.get_output_port(), script.get_input_port())
+    simulator = Simulator(builder.Build())
+    context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.19)
+    assert not np.any(context.get_discrete_state_vector().value())
+    simulator.AdvanceTo(0.21)
+    axes = context.get_discrete_state_vector().value().reshape(3, 3)
+    np.testing.assert_allclose(axes[:, 0], [0.0, 1.0, 0.0], atol=1e-15)
+    simulator.AdvanceTo(0.4)
+    assert script.get_output_port().Eval(context) == pytest.approx([0, 5.0, 0, 0, 0, 0])

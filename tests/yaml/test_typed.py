@@ -1,0 +1,250 @@
+"""Typed loading: what fits is loaded by Drake, what does not is reported in one line."""
+
+import math
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pfsc_drake import InputError
+from pfsc_drake.yaml.reading import parse_yaml
+from pfsc_drake.yaml.typed import REQUIRED, load_file, load_typed
+
+
+@dataclass
+class Circle:
+    """A path."""
+
+    radius: float = 0.1
+
+
+@dataclass
+class Lemniscate:
+    """Another path."""
+
+    size: float = 0.25
+    bend: float = 0.1
+
+
+@dataclass
+class Gains:
+    """Nested, with a check across fields."""
+
+    eta: list[float] = field(default_factory=lambda: [1.0, 2.0])
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        if len(self.eta) != self.order:
+            raise InputError(f"eta has {len(self.eta)} gains; allowed: order = {self.order}")
+
+
+@dataclass
+class Controller:
+    """Nested, with an enumeration."""
+
+    law: str = "elastic"
+    gains: Gains = field(default_factory=Gains)
+    spare: dict[str, Gains] = field(default_factory=dict)
+    period: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if self.law not in ("elastic", "rigid"):
+            raise InputError(f"law = {self.law!r}; allowed: elastic, rigid")
+
+
+@dataclass
+class Scenario:
+    """Every kind of field."""
+
+    name: str = field(default="", metadata=REQUIRED)
+    path: Lemniscate | Circle = field(default_factory=Lemniscate)
+    controller: Controller = field(default_factory=Controller)
+    stations: list[Circle] = field(default_factory=list)
+    start: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    limit: float | None = None
+    file: Path | None = None
+    figures: bool = True
+    mixed: float | str = 0.0
+
+
+def load(text: str) -> Scenario:
+    return load_typed(Scenario, parse_yaml(text, "made_up.yaml"), "made_up.yaml")
+
+
+def message_of(text: str) -> str:
+    with pytest.raises(InputError) as caught:
+        load(text)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("made_up.yaml: ")
+    return message.removeprefix("made_up.yaml: ")
+
+
+def test_everything_is_loaded():
+    scenario = load(
+        "name: x\n"
+        "path: !Circle {radius: 2}\n"
+        "controller: {law: rigid, gains: {eta: [1, 2e-3, '3'], order: 3.0}, spare: {a: {}}}\n"
+        "stations: [{radius: 1.5}, {}]\n"
+        "start: [1, 2.5, 1e-3]\n"
+        "limit: 7\n"
+        "file: some/where.csv\n"
+        "figures: false\n"
+        "mixed: words\n"
+    )
+    assert scenario.path == Circle(2.0)
+    assert scenario.controller == Controller("rigid", Gains([1.0, 0.002, 3.0], 3), {"a": Gains()})
+    assert scenario.stations == [Circle(1.5), Circle()]
+    np.testing.assert_array_equal(scenario.start, [1.0, 2.5, 0.001])
+    assert (scenario.limit, scenario.figures, scenario.mixed) == (7.0, False, "words")
+    assert scenario.file == Path("some/where.csv")
+
+
+def test_defaults_stay_where_keys_are_missing():
+    scenario = load("{name: x, controller: {gains: {eta: [5, 6]}}, path: {bend: 0}, limit: null}")
+    assert scenario.controller == Controller(gains=Gains([5.0, 6.0], 2))
+    assert scenario.path == Lemniscate(0.25, 0.0)
+    assert scenario.limit is None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "{name: x, controller: {lwa: rigid}}",
+            "unknown key 'controller.lwa' = 'rigid': did you mean 'law'?"
+            " allowed: law, gains, spare, period",
+        ),
+        (
+            "{name: x, controler: {}}",
+            "unknown key 'controler' = {}: did you mean 'controller'? allowed: name, path,",
+        ),
+        ("{name: x, zzz: 1}", "unknown key 'zzz' = 1: allowed: name, path, controller"),
+        ("{}", "missing key 'name': expected text"),
+        (
+            "{name: x, controller: {period: fast}}",
+            "key 'controller.period' is 'fast': expected a number",
+        ),
+        ("{name: x, controller: {period: true}}", "'controller.period' is true: expected a number"),
+        ("{name: x, controller: {period: .nan}}", "'controller.period' is nan: expected a number"),
+        ("{name: x, controller: {period: [1]}}", "'controller.period' is [1]: expected a number"),
+        ("{name: x, controller: {gains: {order: 1.5}}}", "is 1.5: expected an integer"),
+        ("{name: x, controller: {gains: {eta: 3}}}", "is 3: expected a list (each item a number)"),
+        (
+            "{name: x, controller: {gains: {eta: [1, x]}}}",
+            "key 'controller.gains.eta[1]' is 'x': expected a number",
+        ),
+        (
+            "{name: x, controller: }",
+            "key 'controller' is empty (null): expected a mapping with the keys law, gains",
+        ),
+        ("{name: x, controller: !Best {}}", "'controller' is '!Best': expected a mapping without"),
+        (
+            "{name: x, controller: {spare: {b: {oder: 3}}}}",
+            "unknown key 'controller.spare.b.oder' = 3: did you mean 'order'?",
+        ),
+        ("{name: x, controller: {spare: {1: {}}}}", "is 1: expected a key that is text"),
+        ("{name: 3.0}", "key 'name' is 3.0: expected text"),
+        ("{name: x, figures: 1}", "key 'figures' is 1: expected true or false"),
+        ("{name: x, limit: high}", "key 'limit' is 'high': expected a number"),
+        ("{name: x, file: 3}", "key 'file' is 3: expected a path"),
+        ("{name: x, start: 3}", "key 'start' is 3: expected a list of numbers"),
+        ("{name: x, start: [1, a]}", "key 'start[1]' is 'a': expected a number"),
+        ("{name: x, start: [[1], [2, 3]]}", "key 'start' is [[1], [2, 3]]: expected rows of equal"),
+        ("{name: x, mixed: true}", "key 'mixed' is true: expected a number or text"),
+        ("{name: x, mixed: null}", "is empty (null): expected a number or text"),
+        ("{name: x, stations: [{}, {radius: r}]}", "key 'stations[1].radius' is 'r': expected"),
+        (
+            "{name: x, path: !Square {}}",
+            "key 'path': unknown tag !Square: allowed: !Lemniscate, !Circle",
+        ),
+        ("{name: x, path: {_tag: [1]}}", "key 'path': unknown tag [1]: allowed: !Lemniscate"),
+        ("!Scenario {name: x}", "the root is '!Scenario': expected a mapping without a tag"),
+        ("{name: x, 1: y}", "unknown key '1' = 'y': allowed: name, path"),
+        ("{name: x, path: !Circle {size: 1}}", "unknown key 'path.size' = 1: allowed: radius"),
+        (
+            "{name: x, path: {radius: 1}}",
+            "unknown key 'path.radius' = 1: allowed: size, bend"
+            " (without a tag 'path' is !Lemniscate; other tags: !Circle)",
+        ),
+        ("{name: x, path: 3}", "key 'path' is 3: expected !Lemniscate {...} or !Circle {...}"),
+        ("{name: x, path: null}", "expected !Lemniscate {...} or !Circle {...}"),
+        (
+            "{name: x, controller: {law: magic}}",
+            "key 'controller': law = 'magic'; allowed: elastic, rigid",
+        ),
+        (
+            "{name: x, controller: {gains: {eta: [1]}}}",
+            "key 'controller.gains': eta has 1 gains; allowed: order = 2",
+        ),
+        (
+            "{name: x, controller: {spare: {b: {order: 4}}}}",
+            "key 'controller.spare.b': eta has 2 gains; allowed: order = 4",
+        ),
+    ],
+)
+def test_errors_name_key_value_and_what_is_allowed(text, message):
+    assert message in message_of(text)
+
+
+def test_long_values_are_shortened():
+    message = message_of(f"{{name: x, limit: {'a' * 500}}}")
+    assert len(message) < 150
+    assert "..." in message
+
+
+def test_whatever_passes_the_check_is_accepted_by_drake():
+    """Every kind of scalar that the check lets through must not fail in Drake afterwards."""
+    values = ["1", "1.0", "'1'", "1e3", "-2", ".inf", "true", "'true'", "x", "null", "[1]", "{}"]
+    for key in ("limit", "file", "figures", "mixed", "start", "name"):
+        for value in values:
+            try:
+                load(f"name: x\n{key}: {value}\n" if key != "name" else f"name: {value}\n")
+            except InputError as error:
+                assert "expected" in str(error), (key, value)
+
+
+def test_required_list():
+    @dataclass
+    class Needs:
+        points: list[float] = field(default_factory=list, metadata=REQUIRED)
+
+    with pytest.raises(InputError, match="missing key 'points': expected a list"):
+        load_typed(Needs, {}, "a.yaml")
+    assert load_typed(Needs, {"points": [1]}, "a.yaml").points == [1.0]
+
+
+def test_infinity_is_a_number():
+    assert load("{name: x, limit: .inf}").limit == math.inf
+
+
+def test_mappings_keep_the_order_of_the_file():
+    controller = load("{name: x, controller: {spare: {z: {}, a: {}, m: {}}}}").controller
+    assert list(controller.spare) == ["z", "a", "m"]
+
+
+def test_load_file(tmp_path):
+    path = tmp_path / "scenario.yaml"
+    path.write_text("_anchor: &r 0.3\nname: x\npath: !Circle {radius: *r}\n", encoding="utf-8")
+    assert load_file(Scenario, path).path == Circle(0.3)
+    assert load_file(Scenario, str(path)).name == "x"
+    path.write_text("name: x\ncontroller: {law: magic}\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_file(Scenario, path)
+    assert str(caught.value).startswith(f"{path}: key 'controller': law = 'magic'")
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        load_file(Scenario, tmp_path / "none.yaml")
+
+
+def test_import_stays_light():
+    """The library and its loader are imported for ``python -m experiments list``, too."""
+    code = (
+        "import sys, pfsc_drake, pfsc_drake.yaml.typed;"
+        "heavy = {'pydrake', 'casadi', 'matplotlib', 'scipy'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else 0)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
