@@ -11,16 +11,17 @@ from diagrams.robots.arm import joint_state_of
 from diagrams.robots.delta_body import DeltaBody, TouchingDelta, add_free_delta, add_touching_delta
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.measurement import add_forces, add_joint_state, states_to_log, sum_of_wrenches
+from diagrams.scenario import RobotParameters
 from diagrams.scenario.delta import DeltaFollowingScenario
 from diagrams.scenario.notch import NotchParameters
-from diagrams.scenario.schema import RobotParameters
 from diagrams.signal_log import add_log
 from diagrams.station import FurtherLength, Station
 from diagrams.surroundings.notch import UP
 from diagrams.surroundings.notch_motion import place_in_notch
 from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Task, add_law, add_place_on_path, reference_progress
-from diagrams.tasks.parts import make_law, make_path
+from diagrams.tasks.law import make_law
+from diagrams.tasks.path import make_path
 from diagrams.tasks.start import check_points, start_point
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path

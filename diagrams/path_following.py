@@ -10,14 +10,15 @@ from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.measurement import add_forces, add_joint_state, states_to_log
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.hand import add_hand
 from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Task, add_law, add_place_on_path, reference_progress
+from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
-from diagrams.tasks.parts import make_law, make_path
+from diagrams.tasks.path import make_path
 from diagrams.tasks.start import start_state
 from pfsc_drake.robot.serial.chain import SerialChain
 

@@ -11,8 +11,8 @@ from diagrams.delta_following import build_delta_following, load_delta_robot
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.path_following import build_path_following
+from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario.delta import DeltaFollowingScenario
-from diagrams.scenario.schema import PathFollowingScenario
 from diagrams.station import Station
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS as DELTA_ROBOTS
 from pfsc_drake.yaml.typed import load_typed

@@ -13,7 +13,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
-from diagrams.scenario.schema import PathFollowingScenario, Waypoints
+from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
 from diagrams.stations import build_station, build_station_replay, load_settings
 from experiments.catalog.scenario_file import ScenarioFile

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
 
-from diagrams.scenario.schema import SimulationParameters
+from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
 from experiments.progress import ProgressListener
 

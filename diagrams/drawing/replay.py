@@ -13,7 +13,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.robots.model import add_visible_robot
-from diagrams.scenario.schema import RobotParameters
+from diagrams.scenario import RobotParameters
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 

@@ -17,7 +17,7 @@ from diagrams.robots.plant_wiring import (
     connect_push,
     connect_resistance,
 )
-from diagrams.scenario.schema import RobotParameters
+from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.serial.chain import SerialChain

@@ -7,8 +7,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.robots.arm import Arm
+from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
 from diagrams.scenario.checks import require_whole_fraction
-from diagrams.scenario.schema import JointFrictionParameters, PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains

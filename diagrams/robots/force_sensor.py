@@ -5,7 +5,7 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Demultiplexer
 
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant

@@ -5,7 +5,7 @@ from typing import Protocol
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, ZeroOrderHold
 
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.physics.force_profile import ForceProfile

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.scenario.schema import RobotParameters
+from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import add_models_to, resolve_model
 

@@ -1,1 +1,51 @@
 """What a scenario file says: its schema, one file per block."""
+
+from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
+from diagrams.scenario.controller import ControllerParameters, GainParameters, LawGains
+from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
+from diagrams.scenario.forces import HoldBackParameters
+from diagrams.scenario.motion import ReferenceParameters, StartParameters
+from diagrams.scenario.path import (
+    BentLemniscate,
+    Circle,
+    Keyframe,
+    Line,
+    OrientationParameters,
+    PathParameters,
+    Waypoints,
+)
+from diagrams.scenario.robot import RobotParameters
+from diagrams.scenario.schema import PathFollowingScenario, Target
+from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
+from pfsc_drake.physics.force_profile import ForcePulse
+from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
+from pfsc_drake.systems.physics.joint_encoders import EncoderOptions
+
+__all__ = [
+    "BentLemniscate",
+    "Circle",
+    "ComplianceParameters",
+    "ControllerParameters",
+    "EncoderOptions",
+    "ForcePulse",
+    "GainParameters",
+    "HandParameters",
+    "HandWaypoint",
+    "HoldBackParameters",
+    "JointFrictionParameters",
+    "Keyframe",
+    "LawGains",
+    "Line",
+    "OrientationParameters",
+    "PathFollowingScenario",
+    "PathParameters",
+    "ReferenceParameters",
+    "RobotParameters",
+    "SensorFailureParameters",
+    "SensorParameters",
+    "ServoParameters",
+    "SimulationParameters",
+    "StartParameters",
+    "Target",
+    "Waypoints",
+]

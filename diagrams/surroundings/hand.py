@@ -3,8 +3,8 @@
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.arm import Arm
+from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario.checks import require
-from diagrams.scenario.schema import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
 from pfsc_drake.geometry.paths.target import PathTarget

@@ -2,7 +2,7 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.errors import InputError

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from pfsc_drake.control.law.law import PathLaw

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagrams.scenario.schema import ControllerParameters, PathFollowingScenario
+from diagrams.scenario import ControllerParameters, PathFollowingScenario
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.serial.chain import SerialChain
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Figure, save_canvas
 from experiments.pages.report import write_report

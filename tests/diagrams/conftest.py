@@ -10,7 +10,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.model import add_robot, tool_frame
-from diagrams.scenario.schema import PathFollowingScenario, RobotParameters
+from diagrams.scenario import PathFollowingScenario, RobotParameters
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.yaml.typed import load_file

@@ -7,8 +7,8 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario.delta import DeltaFollowingScenario
-from diagrams.scenario.schema import PathFollowingScenario
 from diagrams.stations import build_station, load_settings
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data

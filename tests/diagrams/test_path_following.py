@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import GainParameters, LawGains
+from diagrams.scenario import GainParameters, LawGains
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 

@@ -10,8 +10,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
 from diagrams.drawing.replay import RecordedMotion, build_replay, record
-from diagrams.scenario.schema import Line, PathParameters, RobotParameters
-from diagrams.tasks.parts import make_path
+from diagrams.scenario import Line, PathParameters, RobotParameters
+from diagrams.tasks.path import make_path
 from pfsc_drake.geometry import PathPointLayout
 
 MODEL = "comau_racer_1_4_elastic_3r"

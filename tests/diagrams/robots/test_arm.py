@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from diagrams.path_following import build_path_following
+from diagrams.scenario import JointFrictionParameters, PathFollowingScenario, RobotParameters
 from diagrams.scenario.delta import DeltaFollowingScenario
-from diagrams.scenario.schema import JointFrictionParameters, PathFollowingScenario, RobotParameters
 from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError

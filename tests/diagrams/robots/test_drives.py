@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import load_parameters

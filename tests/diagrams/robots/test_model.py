@@ -8,7 +8,7 @@ from pydrake.geometry import Role
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.model import add_robot, add_visible_robot, tool_frame
-from diagrams.scenario.schema import RobotParameters
+from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 

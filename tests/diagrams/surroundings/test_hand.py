@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagrams.path_following import build_path_following
+from diagrams.scenario import ForcePulse, HandParameters, HandWaypoint, PathFollowingScenario
 from diagrams.scenario.delta import DeltaFollowingScenario
-from diagrams.scenario.schema import ForcePulse, HandParameters, HandWaypoint, PathFollowingScenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import ForcePulse, PathFollowingScenario
+from diagrams.scenario import ForcePulse, PathFollowingScenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import ForcePulse, PathFollowingScenario
+from diagrams.scenario import ForcePulse, PathFollowingScenario
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.yaml.typed import load_file
 

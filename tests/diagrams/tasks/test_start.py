@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario.schema import Circle, Line
-from diagrams.tasks.parts import make_path
+from diagrams.scenario import Circle, Line
+from diagrams.tasks.path import make_path
 from diagrams.tasks.start import start_state
 from pfsc_drake.errors import InputError
 

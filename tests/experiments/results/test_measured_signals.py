@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import EncoderOptions, GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import EncoderOptions, GainParameters, LawGains, PathFollowingScenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate

@@ -11,8 +11,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario.schema import PathFollowingScenario
-from diagrams.tasks.parts import make_path
+from diagrams.scenario import PathFollowingScenario
+from diagrams.tasks.path import make_path
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.geometry import Path as GeometricPath
 from pfsc_drake.robot.models.files import models_directory, resolve_model

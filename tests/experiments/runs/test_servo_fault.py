@@ -6,7 +6,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.path_following import build_path_following
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario import PathFollowingScenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
 from experiments.simulation import simulate

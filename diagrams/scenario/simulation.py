@@ -1,0 +1,58 @@
+"""How a scenario is simulated."""
+
+import dataclasses as dc
+
+from pydrake.systems.analysis import GetIntegrationSchemes
+
+from diagrams.scenario.checks import (
+    require,
+    require_not_negative,
+    require_positive,
+)
+
+
+@dc.dataclass
+class SensorFailureParameters:
+    """A component of the measured joint state that becomes NaN.
+
+    Attributes:
+        time: When [s]; negative for never.
+        component: Index in ``[q_J, v_J, q_M, v_M]``.
+    """
+
+    time: float = -1.0
+    component: int = 0
+
+
+@dc.dataclass
+class SimulationParameters:
+    """How the plant is integrated.
+
+    Attributes:
+        integrator: Drake's name of the integration scheme.
+        max_step: Largest step [s].
+        accuracy: Accuracy of error control; 0 for fixed steps.
+        frame_period: Time between the frames of the recording [s].
+        sensor_failure: A sensor that fails on the way.
+    """
+
+    integrator: str = "runge_kutta5"
+    max_step: float = 1e-3
+    accuracy: float = 0.0
+    frame_period: float = 0.032
+    sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
+
+    def __post_init__(self) -> None:
+        schemes = GetIntegrationSchemes()
+        require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
+        require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
+        require_positive("frame_period", self.frame_period)
+        require_not_negative("accuracy", self.accuracy)
+        # their error control works on stale values after a rejected step
+        stale = ("runge_kutta5", "bogacki_shampine3")
+        require(
+            self.accuracy == 0.0 or self.integrator not in stale,
+            "accuracy",
+            self.accuracy,
+            f"0 (fixed steps) with {' and '.join(stale)}; runge_kutta3 has error control",
+        )
