@@ -22,9 +22,9 @@ SPAN = 0.2
 # system, output port
 OUTPUTS = [
     ("tool_kinematics", "tool_pose"),
-    ("path_projector", "path_point"),
+    ("path_projector", "manifold_point"),
     ("reference_generator", "reference"),
-    ("path_following_controller", "law"),
+    ("following_controller", "law"),
     ("force_torque_sensor", "measurement"),
     ("tool_compensation", "compensation"),
     ("manifold_force_transform", "manifold_force"),

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.geometry import (
@@ -164,6 +164,6 @@ def make_law():
             "max_alpha": 0.9,
             "safe_state": SafeState(np.full(n, 50.0)),
         }
-        return PathLaw(**(arguments | changes))
+        return FollowingLaw(**(arguments | changes))
 
     return make

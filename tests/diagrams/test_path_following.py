@@ -16,20 +16,20 @@ WIRES = {
     ("plant", "state"): {("joint_encoders", "u0")},
     ENCODERS: {
         ("tool_kinematics", "joint_state"),
-        ("path_following_controller", "joint_state"),
+        ("following_controller", "joint_state"),
         ("log_signals", "u0"),
     },
     ("tool_kinematics", "tool_pose"): {("path_projector", "tool_pose"), ("log_signals", "u1")},
-    ("path_projector", "path_point"): {
-        ("path_following_controller", "path_point"),
+    ("path_projector", "manifold_point"): {
+        ("following_controller", "manifold_point"),
         ("log_signals", "u2"),
     },
     ("reference_generator", "reference"): {
-        ("path_following_controller", "reference"),
+        ("following_controller", "reference"),
         ("log_signals", "u3"),
     },
-    ("path_following_controller", "law"): {("log_signals", "u4")},
-    ("path_following_controller", "drive_torque"): {("hold", "u")},
+    ("following_controller", "law"): {("log_signals", "u4")},
+    ("following_controller", "drive_torque"): {("hold", "u")},
     ("hold", "y"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
     ("log_signals", "y0"): {("log", "data")},
@@ -127,7 +127,7 @@ def test_start(station):
     plant = station.plant.GetMyContextFromRoot(root)
     x = station.plant.GetPositionsAndVelocities(plant)
     np.testing.assert_array_equal(x, station.initial_state)
-    point = station.projector.GetOutputPort("path_point").Eval(
+    point = station.projector.GetOutputPort("manifold_point").Eval(
         station.projector.GetMyContextFromRoot(root)
     )
     layout = station.law.linearization.layout
@@ -158,7 +158,7 @@ def test_log_holds_every_signal(station):
     assert {name: x.shape for name, x in signals.items()} == {
         "joint_state": (3, 12),
         "tool_pose": (3, 12),
-        "path_point": (3, layout.size),
+        "manifold_point": (3, layout.size),
         "reference": (3, 9),
         "law": (3, station.law.layout.size),
     }

@@ -7,7 +7,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import least_squares
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
 from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.geometry import FourierCurve, Path
@@ -62,7 +62,7 @@ def make_law(arm):
         r = linearization.relative_degree
         gains = CoordinateGains(gains_from_poles([-20.0] * r).proportional, integral)
         stabilization = Stabilization([gains] * 3, r, ["eta", "xi_1", "xi_2"])
-        return PathLaw(
+        return FollowingLaw(
             arm.chain,
             linearization,
             stabilization,

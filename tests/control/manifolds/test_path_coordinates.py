@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.linearization import linearize_path
-from pfsc_drake.control.manifolds.path_coordinates import PathGeometry, path_coordinates
+from pfsc_drake.control.manifolds.path import PathGeometry, path_coordinates
 from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.jets import Jet
 

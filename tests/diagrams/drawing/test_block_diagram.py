@@ -13,7 +13,7 @@ BLOCKS = (
     "joint_encoders",
     "tool_kinematics",
     "path_projector",
-    "path_following_controller",
+    "following_controller",
     "reference_generator",
     "hold",
 )

@@ -27,7 +27,7 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -251,7 +251,7 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
     chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
     theta, force = 0.6, np.array([3.0, -4.0, 5.0, 0.0, 0.0, 0.0])
     desired = np.array([path.arc_length.at(theta), *np.zeros(8)])
-    controller = PathFollowingController(request.getfixturevalue("make_law")(), PERIOD)
+    controller = FollowingController(request.getfixturevalue("make_law")(), PERIOD)
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     parts = {
         "measured": builder.AddSystem(MatrixGain(rows)),
@@ -270,8 +270,8 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
         ("measured", "kinematics.joint_state"),
         ("measured", "controller.joint_state"),
         ("kinematics", "projector.tool_pose"),
-        ("projector", "controller.path_point"),
-        ("projector", "transform.path_point"),
+        ("projector", "controller.manifold_point"),
+        ("projector", "transform.manifold_point"),
         ("wrench", "transform.wrench"),
         ("desired", "filter.desired_reference"),
         ("transform", "filter.manifold_force"),

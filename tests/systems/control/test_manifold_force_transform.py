@@ -32,7 +32,7 @@ def test_position_only(path):
     layout = path.evaluator(2).layout
     system = ManifoldForceTransform(layout)
     assert not system.HasInputPort("reference")
-    forces = in_context(system, wrench=WRENCH, path_point=point)
+    forces = in_context(system, wrench=WRENCH, manifold_point=point)
     assert forces.shape == (3,)
     assert np.array_equal(forces, manifold_force(WRENCH, point, layout))
 
@@ -44,11 +44,11 @@ def test_with_orientation(oriented_path, with_turning):
     layout = oriented_path.evaluator(2).layout
     reference = np.random.default_rng(1).uniform(-1, 1, 18)
     system = ManifoldForceTransform(layout, with_turning=with_turning)
-    forces = in_context(system, wrench=WRENCH, path_point=point, reference=reference)
+    forces = in_context(system, wrench=WRENCH, manifold_point=point, reference=reference)
     expected = manifold_force(WRENCH, point, layout, reference[3:6], with_turning=with_turning)
     assert np.array_equal(forces, expected)
     reference[6:] = 0.0
-    forces = in_context(system, wrench=WRENCH, path_point=point, reference=reference)
+    forces = in_context(system, wrench=WRENCH, manifold_point=point, reference=reference)
     assert np.array_equal(forces, expected)
 
 
@@ -56,7 +56,7 @@ def test_a_failed_sensor_or_projection_raises_nothing(oriented_path):
     layout = oriented_path.evaluator(2).layout
     point = np.full(layout.size, np.nan)
     system = ManifoldForceTransform(layout, with_turning=True)
-    forces = in_context(system, wrench=WRENCH, path_point=point, reference=np.zeros(18))
+    forces = in_context(system, wrench=WRENCH, manifold_point=point, reference=np.zeros(18))
     assert np.isnan(forces).all()
 
 

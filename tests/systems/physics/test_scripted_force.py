@@ -23,7 +23,7 @@ def simulate(path, pulses, tool, duration):
     projector = builder.AddSystem(PathProjector(path, 2, PERIOD))
     script = builder.AddSystem(ScriptedForce(ForceProfile(pulses), projector.layout, PERIOD))
     builder.Connect(way.get_output_port(), projector.get_input_port())
-    builder.Connect(projector.get_output_port(), script.GetInputPort("path_point"))
+    builder.Connect(projector.get_output_port(), script.GetInputPort("manifold_point"))
     logs = [LogVectorOutput(s.get_output_port(), builder, PERIOD) for s in (script, projector)]
     simulator = Simulator(builder.Build())
     simulator.AdvanceTo(duration)
@@ -86,8 +86,8 @@ def test_the_path_is_looked_at_in_time():
     script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
     point = np.zeros(LAYOUT.size)
     point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
-    path_point = builder.AddSystem(ConstantVectorSource(point))
-    builder.Connect(path_point.get_output_port(), script.get_input_port())
+    manifold_point = builder.AddSystem(ConstantVectorSource(point))
+    builder.Connect(manifold_point.get_output_port(), script.get_input_port())
     simulator = Simulator(builder.Build())
     context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     simulator.AdvanceTo(0.19)
