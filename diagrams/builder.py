@@ -15,6 +15,7 @@ from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.checks import require_whole_fraction
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
@@ -42,7 +43,7 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
         InputError: If the scenario cannot be built.
     """
     builder, task = DiagramBuilder(), make_task(scenario, folder)
-    workpiece = None if scenario.notch is None else NotchedWorkpiece(task.path, scenario.notch)
+    workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
     law = make_law(scenario.controller, part.robot, task.manifold)
     start, initial_state = _start(scenario, task, part, workpiece)
@@ -81,6 +82,14 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
         law_warnings(scenario, part.robot, link_state) + sensor_warnings(scenario),
         workpiece,
     )
+
+
+def _workpiece(scenario: PathFollowingScenario, task: Task) -> Workpiece | None:
+    if scenario.notch is None:
+        return None
+    step = scenario.notch.time_step
+    require_whole_fraction("notch.time_step", step, scenario.controller.sampling_time)
+    return NotchedWorkpiece(task.path, scenario.notch)
 
 
 def _add_robot(

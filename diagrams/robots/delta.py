@@ -133,6 +133,7 @@ class FreeDelta(DeltaPart):
         wrench: OutputPort | None,
     ) -> SensorMount:
         """Return the sensor between end-effector and load, which is a point mass in E."""
+        _require_joint(joint)
         mass, gravity = self.robot.parameters.masses.load, self.robot.gravity
         load = ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
         acceleration = self.analytic.GetOutputPort("acceleration")
@@ -205,8 +206,9 @@ class TouchingDelta(DeltaPart):
         wrench: OutputPort | None,
     ) -> SensorMount:
         """See :class:`RobotPart`."""
+        _require_joint(joint)
         plant = self.multibody
-        mount = plant.GetJointByName(SENSOR_JOINT)
+        mount = plant.GetJointByName(joint)
         load = tool_load_from_plant(plant, mount, self.tool)
         return SensorMount(
             load, plant.get_reaction_forces_output_port(), reaction_index(plant, mount)
@@ -215,6 +217,11 @@ class TouchingDelta(DeltaPart):
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
         set_delta_positions(self.multibody, context, self.model, *np.split(state, 2))
+
+
+def _require_joint(joint: str) -> None:
+    """Refuse another joint for the sensor than that between end-effector and load."""
+    require(joint == SENSOR_JOINT, "sensor.joint", joint, f"{SENSOR_JOINT} on a DELTA robot")
 
 
 def is_delta(model: str) -> bool:

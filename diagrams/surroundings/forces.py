@@ -5,9 +5,9 @@ from pydrake.systems.primitives import Adder, ZeroOrderHold
 
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
 from diagrams.tasks.task import Task
-from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
@@ -71,8 +71,8 @@ def _scripted(
     pulse = scenario.hold_back
     if pulse.force != 0.0:
         manifold = task.place
-        if not manifold.layout.oriented:
-            raise InputError("hold_back.force: needs a path with orientation and six axes")
+        allowed = "0 without a path with orientation and six axes"
+        require(manifold.layout.oriented, "hold_back.force", pulse.force, allowed)
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
         brake = builder.AddNamedSystem(
             "hold_back", DecoupledForce(part.robot, manifold, shape, period)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
@@ -18,7 +18,7 @@ SPAN = 0.2
 def test_closed_loop(benchmark, name):
     scenario = load_file(PathFollowingScenario, SCENARIOS / f"{name}.yaml")
     with compiled_when_bound():
-        station = build_path_following(scenario, SCENARIOS)
+        station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     ApplySimulatorConfig(
         SimulatorConfig(

@@ -15,9 +15,10 @@ from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
-from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -131,7 +132,9 @@ def make_path(oriented):
 
 
 def make_law(robot, law, oriented):
-    linearization = linearize_path(robot, law, oriented=oriented, options=ActuationOptions(PERIOD))
+    linearization = linearize(
+        robot, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), ActuationOptions(PERIOD)
+    )
     r, m, n = linearization.relative_degree, linearization.num_outputs, robot.dimension
     stabilization = Stabilization([gains_from_poles([-50.0] * r)] * m, r, NAMES[:m])
     inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(n, 30.0))

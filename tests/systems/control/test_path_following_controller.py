@@ -11,8 +11,9 @@ from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
-from pfsc_drake.control.law.linearization import linearize_path
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.following_controller import FollowingController
@@ -125,7 +126,7 @@ def test_a_fault_without_measurement_holds_the_last_good_position(bench, arm):
 def test_a_later_fault_does_not_replace_the_first(bench):
     bench.start()
     point = bench.point.copy()
-    point[bench.law.linearization.layout.alpha] = 0.95
+    point[bench.law.linearization.manifold.layout.alpha] = 0.95
     bench.fix(point=point)
     bench.tick(2)
     bench.fix(state=bench.with_nan())
@@ -158,7 +159,9 @@ def test_the_last_ticks_drive_is_extrapolated(path):
     Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_elastic_3r")))
     plant.Finalize()
     chain, _ = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
-    linearization = linearize_path(chain, "elastic", oriented=False)
+    linearization = linearize(
+        chain, "elastic", PathManifold(RELATIVE_DEGREE["elastic"], oriented=False)
+    )
     gains = Stabilization([gains_from_poles([-20.0] * 4)] * 3, 4, ["eta", "xi_1", "xi_2"])
     inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(3, 30.0))
     law = FollowingLaw(chain, linearization, gains, inverse, np.full(3, 1e9), 0.9, safe)
