@@ -201,6 +201,18 @@ class FollowingLaw:
             return Fault.PROJECTION_FAILED
         return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
 
+    def error(self, result: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """Return the error of the virtual output, which is to vanish, shape (m,).
+
+        Args:
+            result: From :meth:`evaluate`.
+            reference: See there.
+        """
+        m = self.linearization.num_outputs
+        y = result[self.layout.manifold_state][:m]
+        # where the point moves with time, the virtual output is the error
+        return y if self.linearization.manifold.follows_time else y - reference[:m]
+
     def safe_drive(self, state: np.ndarray, last_good_state: np.ndarray) -> np.ndarray:
         """Return the drive input of the safe state, shape (N,).
 

@@ -141,6 +141,5 @@ class FollowingController(LeafSystem):
         memory[self._last_good] = self._joint_state.Eval(context)
         saturated = result[self.layout.status.stop - 1]
         if self._law.stabilization.has_integral_part and not saturated:
-            m = self._fault
-            y = result[self.layout.manifold_state][:m]
-            memory[self._integral] += self.period * (y - self._reference.Eval(context)[:m])
+            error = self._law.error(result, self._reference.Eval(context))
+            memory[self._integral] += self.period * error
