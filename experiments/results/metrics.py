@@ -90,13 +90,13 @@ class Metrics(UserDict[str, Metric]):
         self[name].source = source or self[name].source
 
     def write(self, path: Path) -> None:
-        """Writes flat JSON ``name: {value, unit, target?, source?}``; NaN and infinity are null.
+        """Writes the metrics, see :meth:`to_json`, to a file, which is replaced if it exists."""
+        path.write_text(self.to_json(), encoding="utf-8")
 
-        Args:
-            path: File to write; its directory must exist.
-        """
+    def to_json(self) -> str:
+        """Returns flat JSON ``name: {value, unit, target?, source?}``; NaN, infinity are null."""
         flat = {name: _to_json(metric) for name, metric in self.items()}
-        path.write_text(json.dumps(flat, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        return json.dumps(flat, indent=2, allow_nan=False) + "\n"
 
     @classmethod
     def read(cls, path: Path) -> Self:

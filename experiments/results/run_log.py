@@ -1,6 +1,7 @@
 """The log of one run: named signals over time, kept in one HDF5 file."""
 
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Self
 
@@ -107,15 +108,19 @@ class RunLog:
         return signal
 
     def write(self, path: Path) -> None:
-        """Writes the log as HDF5.
+        """Writes the log, see :meth:`to_hdf5`, to a file, which is replaced if it exists."""
+        path.write_bytes(self.to_hdf5())
+
+    def to_hdf5(self) -> bytes:
+        """Returns the log as the content of an HDF5 file.
+
+        It is made in memory: HDF5 itself cannot be relied on to say that a disk is full.
 
         Dataset ``t`` [s] and one dataset [samples, dim] per signal with attributes ``unit``,
         ``labels`` and, where known, ``limits``; ``attributes`` become the root's attributes.
-
-        Args:
-            path: File to write; its directory must exist. An existing file is replaced.
         """
-        with h5py.File(path, "w") as file:
+        content = BytesIO()
+        with h5py.File(content, "w") as file:
             file.attrs.update(self.attributes)
             file.create_dataset("t", data=self.time).attrs["unit"] = "s"
             for name, signal in self.signals.items():
@@ -126,6 +131,7 @@ class RunLog:
                 dataset.attrs.create("labels", signal.labels, dtype=h5py.string_dtype())
                 if signal.limits is not None:
                     dataset.attrs["limits"] = signal.limits
+        return content.getvalue()
 
     @classmethod
     def read(cls, path: Path) -> Self:

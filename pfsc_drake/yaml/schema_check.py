@@ -170,12 +170,12 @@ def _is_scalar(schema: Any, value: Any) -> bool:
         whole = kind is int or (kind is str and bool(_INTEGER.fullmatch(value)))
         return whole and abs(int(value)) <= _MAX_INTEGER
     if schema is float:
-        return kind in (int, float, str) and _is_number(value)
+        return kind in (int, float, str) and is_number(value)
     return schema in (str, Path) and kind is str
 
 
-def _is_number(value: float | str) -> bool:
-    """Whether a number, or text that is one, is within what a float can hold, or infinite."""
+def is_number(value: float | str) -> bool:
+    """Whether a number, or text that is one, fits a float; infinity does, NaN does not."""
     if isinstance(value, str) and not _NUMBER.fullmatch(value):
         return bool(_INFINITY.fullmatch(value))
     try:

@@ -9,6 +9,14 @@ from pfsc_drake.errors import InputError
 MAX_BYTES = 1_000_000  # of a YAML file
 
 
+def find_status(path: Path) -> os.stat_result | None:
+    """Returns what the system knows of a path; None if there is no such file, or cannot be."""
+    try:
+        return path.stat()
+    except (OSError, ValueError):  # e.g. a name that is too long, a NUL in it
+        return None
+
+
 def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     """Returns the text of a regular file.
 

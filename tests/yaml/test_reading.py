@@ -127,7 +127,7 @@ def multiplying(levels, tenfold="[{}]"):
 @pytest.mark.parametrize("levels", [5, 9, 30])
 @pytest.mark.parametrize("tenfold", ["[{}]", "{{inside: [{}]}}", "!Some {{inside: [{}]}}"])
 def test_aliases_that_multiply_are_refused_before_they_are_copied(levels, tenfold):
-    with pytest.raises(InputError, match="with aliases .* allowed: up to 100000") as caught:
+    with pytest.raises(InputError, match=r"with aliases .* allowed: up to 100000") as caught:
         parse_yaml(multiplying(levels, tenfold), "many.yaml")
     assert str(caught.value).startswith("many.yaml: line ")
     assert len(str(caught.value)) < 200

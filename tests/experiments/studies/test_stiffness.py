@@ -9,10 +9,11 @@ from experiments.studies.stiffness import write_study
 
 def test_stiff_joints_suit_the_simple_laws_and_soft_ones_do_not(tmp_path):
     lines = []
-    page = write_study(tmp_path, lines.append, laws=("elastic", "rigid"), stiffnesses=(1e4, 1e6))
+    report = write_study(tmp_path, lines.append, laws=("elastic", "rigid"), stiffnesses=(1e4, 1e6))
     assert len(lines) == 4
+    assert report.problem is None
     assert (tmp_path / "figures" / "deviation.png").stat().st_size > 10_000
-    assert "Which law when" in page.read_text(encoding="utf-8")
+    assert "Which law when" in report.path.read_text(encoding="utf-8")
     metrics = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))
     deviation = {name: entry["value"] for name, entry in metrics.items()}
     soft, stiff = "K_s1 = 1e+04 Nm/rad", "K_s1 = 1e+06 Nm/rad"
