@@ -8,7 +8,16 @@ import unicodedata
 import warnings
 
 # characters of results that no decomposition makes plain
-_PLAIN = {"≤": "<=", "≥": ">=", "·": "*", "\u2013": "-", "µ": "u", "⁻": "-", "…": "...", "\u2212": "-"}
+_PLAIN = {
+    "≤": "<=",
+    "≥": ">=",
+    "·": "*",
+    "\u2013": "-",
+    "µ": "u",
+    "⁻": "-",
+    "…": "...",
+    "\u2212": "-",
+}
 _POWER = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 
 
@@ -49,11 +58,13 @@ def one_line(message: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
 
 
-def _plain_characters(error: UnicodeError) -> tuple[str, int]:
+def _plain_characters(error: UnicodeError) -> tuple[str | bytes, int]:
     """Writes in ASCII what an encoding lacks; a handler of encoding errors."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     missing = error.object[error.start : error.end]
+    if all("\udc80" <= character <= "\udcff" for character in missing):
+        return missing.encode("utf-8", "surrogateescape"), error.end  # the bytes of a file's name
     missing = _POWER.sub(lambda power: "^" + power[0], missing)
     return "".join(map(_plain_character, missing)), error.end
 

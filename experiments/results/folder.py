@@ -79,11 +79,9 @@ class ResultsFolder:
             return None
         reasons = " and ".join(dict.fromkeys(self._reasons.values()))
         text = f"cannot write {_listed(self._reasons)} into {self.path}: {reasons}"
-        kept = [name for name in self._reasons if name not in self._lost]
-        if kept:
-            text += f"; {'it' if len(self._reasons) == 1 else _listed(kept)} kept in "
-            text += f"{self._elsewhere}"
-        return f"{text}; {_listed(self._lost)} lost" if self._lost else text
+        if len(self._lost) < len(self._reasons):
+            text += f"; kept in {self._elsewhere}"
+        return f"{text}; lost: {_listed(self._lost)}" if self._lost else text
 
     def _write_here(self, name: str, content: bytes) -> Path:
         if not os.path.samestat(os.fstat(self._handle), self.path.stat()):
@@ -151,7 +149,7 @@ def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
             raise InputError(f"--out {path}: is no folder; allowed: a folder")
         obstacle = find_obstacle(path, kind, inputs) if exists else None
     if obstacle is not None:
-        raise InputError(f"--out {path}: {obstacle}; allowed: another folder, or that moved away")
+        raise InputError(f"--out {path}: {obstacle}; allowed: another folder")
 
 
 @contextmanager
@@ -173,7 +171,7 @@ def _lock(path: Path, handle: int) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise InputError(
-            f"--out {path}: another run is writing into it; allowed: another folder, or later"
+            f"--out {path}: another run is writing into it; allowed: another folder"
         ) from None
     except OSError as error:
         if error.errno not in _NO_LOCKS:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import read_text
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -112,9 +113,11 @@ class Metrics(UserDict[str, Metric]):
             InputError: If the file cannot be read or is no such file.
         """
         try:
-            flat = json.loads(path.read_text(encoding="utf-8"))
+            flat = json.loads(read_text(path))
             return cls({name: _from_json(entry) for name, entry in flat.items()})
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except InputError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise InputError(f"{path}: not a readable metrics file: {error!r}") from None
 
 

@@ -1,5 +1,6 @@
 """The log of one run: named signals over time, kept in one HDF5 file."""
 
+import stat
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import find_status
 
 FloatArray = NDArray[np.float64]
 
@@ -146,6 +148,9 @@ class RunLog:
         Raises:
             InputError: If the file cannot be read or is not such a log.
         """
+        status = find_status(path)
+        if status is None or not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5)")
         try:
             with h5py.File(path, "r") as file:
                 signals = {
