@@ -24,11 +24,11 @@ def leave_when_interrupted() -> None:
 
 @contextmanager
 def raised_interruption() -> Iterator[None]:
-    """Lets Ctrl-C raise KeyboardInterrupt, as Python does by default."""
+    """Lets Ctrl-C raise KeyboardInterrupt; a library that swallows it only delays it."""
     if not _is_obeyed():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.signal(signal.SIGINT, _Raise())
     try:
         yield
     finally:
@@ -40,6 +40,9 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
     """Gives a function that tells whether Ctrl-C was pressed since the context began.
 
     The first Ctrl-C is only noticed; the next one raises KeyboardInterrupt.
+
+    Raises:
+        KeyboardInterrupt: If Ctrl-C was pressed before, and a library swallowed the exception.
     """
     noticed = False
 
@@ -52,11 +55,25 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
     if not _is_obeyed():
         yield lambda: False
         return
-    before = signal.signal(signal.SIGINT, notice)
+    before = signal.getsignal(signal.SIGINT)
+    if isinstance(before, _Raise) and before.has_raised:
+        raise KeyboardInterrupt
+    signal.signal(signal.SIGINT, notice)
     try:
         yield lambda: noticed
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+class _Raise:
+    """Handler that raises KeyboardInterrupt and remembers it."""
+
+    def __init__(self) -> None:
+        self.has_raised = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        self.has_raised = True
+        raise KeyboardInterrupt
 
 
 def _is_obeyed() -> bool:

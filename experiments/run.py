@@ -96,7 +96,7 @@ def run_scenario(
     _resolve_files(settings, scenario.path.parent)
     scenario_text = yaml_dump_typed(settings)
 
-    with open_results(out, "run", inputs) as results, noticed_interruption() as interrupted:
+    with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", scenario_text)
         progress.expect(settings.duration)
         with _steady_clock():

@@ -74,6 +74,10 @@ def test_override_changes_one_place_of_an_alias(scenario):
         ("points.2.0=1", "points is a list, '2' is no index of it; allowed: 0 to 1"),
         ("points.x=1", "points is a list, 'x' is no index of it; allowed: 0 to 1"),
         ("controller.law.x=1", "controller.law is 'elastic' and has no key 'x'"),
+        ("a." * 2999 + "a=1", "3000 levels; allowed: up to 100"),
+        ("a=" + "[" * 3000, "nested too deeply; allowed: up to 100 levels"),
+        ("controller.law.x=" + "y" * 3000, "controller.law is 'elastic' and has no key 'x'"),
+        ('name="a\\0b"', "holds a NUL"),
         ("duration=[1", "--set duration=[1: invalid YAML in line 1"),
     ],
 )

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from experiments.cli import main
 from experiments.studies.stiffness import write_study
 
 
@@ -22,3 +23,12 @@ def test_stiff_joints_suit_the_simple_laws_and_soft_ones_do_not(tmp_path):
     assert ratio == pytest.approx(100.0, rel=0.4)
     assert deviation[f"elastic, {soft}"] < 1e-5
     assert deviation[f"elastic, {stiff}"] < 5e-5
+
+
+def test_the_folder_is_refused_before_anything_is_run(tmp_path, capsys):
+    (tmp_path / "metrics.json").write_text("mine")
+    assert main(["study", "--out", str(tmp_path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "holds metrics.json, which no study has written" in captured.err
+    assert captured.err.count("\n") == 1
