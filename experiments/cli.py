@@ -89,7 +89,7 @@ def run_command(
     with _interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / loaded.name
-        logging.getLogger("drake").setLevel(logging.ERROR)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
         with ProgressDisplay(console, loaded.name, seconds) as progress:
             outcome = run_scenario(
@@ -125,7 +125,7 @@ def study_command(
     from experiments.studies.stiffness import write_study
 
     with _interruptible():
-        logging.getLogger("drake").setLevel(logging.ERROR)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
         report = write_study(
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)

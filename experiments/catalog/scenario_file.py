@@ -1,5 +1,6 @@
 """Reading a scenario file: YAML with typed mappings, and ``--set`` overrides on top."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +29,9 @@ class ScenarioFile:
 
     @property
     def name(self) -> str:
-        """Key ``name`` of the file, else the file's name without suffix."""
-        return str(self.data.get("name", self.path.stem))
+        """Key ``name`` of the file, else the file's name without suffix, as text."""
+        stem = os.fsencode(self.path.stem).decode("utf-8", "replace")
+        return str(self.data.get("name", stem))
 
     def inputs(self) -> list[Path]:
         """Returns the file itself and every path that a text in it may stand for."""

@@ -60,7 +60,8 @@ class ResultsFolder:
         Returns:
             The file; None if it could not be written anywhere.
         """
-        content = content.encode("utf-8") if isinstance(content, str) else content
+        if isinstance(content, str):
+            content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
         try:
             return self._write_here(name, content)
         except OSError as error:

@@ -94,8 +94,8 @@ def parse_yaml(text: str, source: str) -> Any:
             problem = "a !Tag needs a mapping after it, e.g. !Tag {}"
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
         raise InputError(f"{source}: invalid YAML in line {line}: {problem}") from None
-    except (yaml.YAMLError, ValueError, KeyError, AttributeError) as error:
-        # PyYAML lets the others than YAMLError out of e.g. 2020-02-31, !!bool x, !!timestamp x.
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError) as error:
+        # PyYAML lets the others than YAMLError out of e.g. 2020-02-31, !!bool x, !!int "".
         raise InputError(f"{source}: invalid YAML: {' '.join(str(error).split())}") from None
 
 

@@ -168,3 +168,60 @@ def test_names_that_no_file_can_have(tmp_path, name):
     with pytest.raises(InputError, match="cannot be read") as caught:
         read_yaml(tmp_path / name)
     assert "\0" not in str(caught.value)
+
+
+FRAGMENTS = st.sampled_from(
+    [
+        "a: ",
+        "- ",
+        "{",
+        "}",
+        "[",
+        "]",
+        "&x ",
+        "*x",
+        "!T ",
+        "!!int ",
+        "!!float ",
+        "!!binary ",
+        "<<: *x",
+        "\n",
+        "\n  ",
+        ": ",
+        "'",
+        '"',
+        "> ",
+        "? ",
+        "#",
+        "1_0",
+        "0x1F",
+        "1:30",
+        "2020-02-31",
+        "~",
+        ".nan",
+        "=",
+        "%",
+    ]
+)
+
+
+@given(st.lists(FRAGMENTS | st.text(max_size=3), max_size=30).map("".join))
+def test_every_text_is_data_or_one_line(text):
+    try:
+        data = parse_yaml(text, "made_up.yaml")
+    except InputError as error:
+        message = str(error)
+        assert message.startswith("made_up.yaml: ")
+        assert "\n" not in message
+    else:
+        dump_yaml(data)
+
+
+@given(st.binary(max_size=100))
+def test_every_file_is_data_or_one_line(tmp_path_factory, content):
+    path = tmp_path_factory.getbasetemp() / "any.yaml"
+    path.write_bytes(content)
+    try:
+        assert isinstance(read_yaml(path), dict)
+    except InputError as error:
+        assert str(error).startswith(f"{path}: ")

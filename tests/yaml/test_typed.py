@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pfsc_drake import InputError
 from pfsc_drake.yaml.reading import parse_yaml
@@ -219,6 +221,59 @@ def test_whatever_passes_the_check_is_accepted_by_drake():
                 load(f"name: x\n{key}: {value}\n" if key != "name" else f"name: {value}\n")
             except InputError as error:
                 assert "expected" in str(error), (key, value)
+
+
+LEAVES = (
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**1100), 2**1100)
+    | st.floats()
+    | st.sampled_from(["1_0", "\u0661", "1e400", "inf", ".inf", "nan", "-", "1e", "true", "x", ""])
+    | st.dates()
+    | st.binary(max_size=3)
+)
+VALUES = st.recursive(
+    LEAVES,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["eta", "order", "radius", "size", "_tag"]), inner, max_size=2
+        )
+    ),
+    max_leaves=5,
+)
+PLACES = st.sampled_from(
+    [
+        "name",
+        "path",
+        "controller",
+        "stations",
+        "start",
+        "limit",
+        "file",
+        "figures",
+        "mixed",
+        "controller.gains",
+        "controller.gains.eta",
+        "controller.gains.order",
+        "controller.period",
+    ]
+)
+
+
+@given(PLACES, VALUES)
+def test_every_value_is_loaded_or_refused_in_one_line(place, value):
+    data = {"name": "x", "controller": {"gains": {}}}
+    *way, last = place.split(".")
+    target = data
+    for key in way:
+        target = target[key]
+    target[last] = value
+    try:
+        load_typed(Scenario, data, "made_up.yaml")
+    except InputError as error:
+        assert str(error).startswith("made_up.yaml: ")
+        assert "\n" not in str(error)
 
 
 def test_required_list():

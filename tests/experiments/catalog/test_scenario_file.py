@@ -1,8 +1,11 @@
 """Reading scenario files and overriding keys of them."""
 
+import os
+from pathlib import Path
+
 import pytest
 
-from experiments.catalog.scenario_file import load_scenario_data, read_scenario
+from experiments.catalog.scenario_file import ScenarioFile, load_scenario_data, read_scenario
 from pfsc_drake import InputError
 
 TEXT = """\
@@ -86,6 +89,17 @@ def test_malformed_overrides(scenario, override, message):
         load_scenario_data(scenario, [override])
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_whose_name_is_no_text_has_one(tmp_path):
+    path = tmp_path / os.fsdecode(b"mine\xff.yaml")
+    path.write_text("duration: 1\n")
+    assert read_scenario(str(path), []).name == "mine\ufffd"
+
+
+def test_inputs_are_the_file_and_whatever_it_may_name(scenario):
+    inputs = ScenarioFile(scenario, {"a": "x.csv", "b": [{"c": "/y.urdf"}], "d": 1}).inputs()
+    assert inputs == [scenario, scenario.parent / "x.csv", Path("/y.urdf")]
 
 
 def test_read_scenario_knows_its_name(scenario):
