@@ -66,7 +66,11 @@ def run_command(
         str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the results. [default: out/SCENARIO]")
+        Path | None,
+        typer.Option(
+            help="Folder for the results: a new one or that of an earlier run, whose results are "
+            "replaced; a user's own files never are. Default: out/SCENARIO"
+        ),
     ] = None,
     overrides: Annotated[
         list[str] | None,
