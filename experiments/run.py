@@ -1,7 +1,6 @@
 """One run: from a scenario file to log, metrics, figures, recording and report."""
 
 import gc
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,18 +16,22 @@ from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.figures.all import write_figures
-from experiments.pages.report import write_report
+from experiments.figures.all import render_figures
+from experiments.interruption import noticed_interruption
+from experiments.length import check_length
+from experiments.pages.report import report_page, write_report
 from experiments.progress import ProgressListener
+from experiments.results.folder import check_folder, open_results
 from experiments.results.metrics import Metrics
-from experiments.results.path_metrics import metric_names, path_following_metrics
+from experiments.results.path_metrics import path_following_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
-from experiments.results.run_signals import collect_log, collect_motion, optional_signals
+from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.targets import check_targets
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
 from pfsc_drake.compiled.bound_function import compiled_when_bound
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.typed import load_typed
 
 _PATH_POINTS = 600
@@ -40,16 +43,20 @@ class RunOutcome:
     """What a run left.
 
     Attributes:
-        fault: Why the run was stopped, or None if it completed.
-        report: The page to open.
+        fault: Why the run was stopped, or None if it was not.
+        report: The page to open; None if it could not be written.
         metrics: Its metrics.
         warnings: What may not have gone as well as hoped, one sentence each.
+        interrupted: Whether the user stopped it.
+        problem: Which results could not be written, why, and where they are instead; or None.
     """
 
     fault: str | None
-    report: Path
+    report: Path | None
     metrics: Metrics
     warnings: list[str]
+    interrupted: bool = False
+    problem: str | None = None
 
 
 def run_scenario(
@@ -63,90 +70,103 @@ def run_scenario(
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
 
+    Once the simulation has begun, Ctrl-C ends it: what was logged is kept, without pictures.
+
     Args:
         scenario: The scenario as read.
-        out: Folder for the results; files of an earlier run are replaced.
+        out: Folder for the results, see :func:`experiments.results.folder.open_results`.
         duration: Simulated time [s] instead of the scenario's.
         figures: Whether to draw figures.
         recording: Whether to record the motion.
         progress: Told how far the run is.
 
     Raises:
-        InputError: If the scenario is wrong; nothing has moved then.
+        InputError: If the scenario is wrong or the folder cannot be used; nothing has moved then.
     """
     progress(0.0, "preparing")
     settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
-    try:
+    inputs = scenario.inputs()
+    check_folder(out, "run", inputs)
+    with _naming(scenario.path):
         with compiled_when_bound():
             station = build_station(settings, scenario.path.parent)
-        _check_targets(settings, station)
-    except InputError as error:
-        raise InputError(f"{scenario.path}: {error}") from None
-    settings.name = settings.name or scenario.name
-    settings.duration = duration or settings.duration or station.reference_duration
+        check_targets(settings, station)
+        settings.name = settings.name or scenario.name
+        settings.duration = duration or settings.duration or station.reference_duration
+        check_length(settings, station)
     _resolve_files(settings, scenario.path.parent)
-    _prepare_folder(out)
-    (out / "scenario.yaml").write_text(yaml_dump_typed(settings), encoding="utf-8")
+    scenario_text = yaml_dump_typed(settings)
 
-    progress.expect(settings.duration)
-    with _steady_clock():
-        result = simulate(station, settings.simulation, settings.duration, progress)
-        end = float(result.root.get_time())
-        log = collect_log(station, result.root)
-        log.attributes = standard_attributes(scenario.name)
-        if result.fault is not None:
-            log.attributes["fault"] = result.fault
-        log.write(out / "log.h5")
-        motion = collect_motion(station, result.root, settings.simulation.frame_period)
-        progress(end, "measuring the tick")
-        tick = measure_tick(station, result.root, log) * 1e6
-    metrics = _metrics(log, settings)
-    metrics.add("real_time_factor", result.real_time_factor, "1")
-    median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
-    metrics.add("controller_tick_us", float(median), "us", source="median")
-    metrics.add("controller_tick_us_p99", float(p99), "us")
-    for name, target in settings.targets.get(settings.controller.law, {}).items():
-        metrics.set_target(name, target.bound, target.source)
-    metrics.write(out / "metrics.json")
-
-    page = None
-    if recording and len(motion.times) > 1:
-        progress(end, "recording")
-        page = _write_recording(settings, scenario.path.parent, station, motion, out)
-    progress(end, "drawing")
-    pictures = write_figures(log, _path_points(station), out / "figures") if figures else []
-    report = write_report(
-        out,
-        title=scenario.name,
-        description=settings.description,
-        warnings=station.warnings,
-        scenario_yaml_text=(out / "scenario.yaml").read_text(encoding="utf-8"),
-        metrics=metrics,
-        figures=pictures,
-        log_attributes=log.attributes,
-        recording=page,
-        fault=result.fault,
-        diagram_svg=block_diagram_svg(station.diagram) if figures else None,
-    )
-    progress(end, "done")
-    return RunOutcome(result.fault, report, metrics, station.warnings)
-
-
-def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
-    """Refuse a target for a metric that the run will not have."""
-    signals = optional_signals(station)
-    known = [
-        *metric_names(station.robot.dimension, signals),
-        "real_time_factor",
-        "controller_tick_us",
-        "controller_tick_us_p99",
-    ]
-    for name in settings.targets.get(settings.controller.law, {}):
-        if name not in known:
-            raise InputError(
-                f"targets.{settings.controller.law}.{name}: no such metric; "
-                f"allowed: {', '.join(known)}"
+    with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
+        results.write("scenario.yaml", scenario_text)
+        progress.expect(settings.duration)
+        with _steady_clock():
+            result = simulate(
+                station, settings.simulation, settings.duration, progress, interrupted
             )
+            end = float(result.root.get_time())
+            log = collect_log(station, result.root)
+            log.attributes = standard_attributes(scenario.name)
+            if result.fault is not None:
+                log.attributes["fault"] = result.fault
+            if interrupted():
+                log.attributes["interrupted"] = f"at t = {end:.3f} s"
+            results.write("log.h5", log.to_hdf5())
+            motion = collect_motion(station, result.root, settings.simulation.frame_period)
+            progress(end, "measuring the tick")
+            tick = measure_tick(station, result.root, log) * 1e6
+        metrics = _metrics(log, settings)
+        metrics.add("real_time_factor", result.real_time_factor, "1")
+        median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
+        metrics.add("controller_tick_us", float(median), "us", source="median")
+        metrics.add("controller_tick_us_p99", float(p99), "us")
+        for name, target in settings.targets.get(settings.controller.law, {}).items():
+            metrics.set_target(name, target.bound, target.source)
+        results.write("metrics.json", metrics.to_json())
+
+        page = None
+        if recording and len(motion.times) > 1 and not interrupted():
+            progress(end, "recording")
+            content = _recording(settings, scenario.path.parent, station, motion)
+            page = results.write("recording.html", content)
+        pictures = []
+        if figures and not interrupted():
+            progress(end, "drawing")
+            pictures = render_figures(log, _path_points(station))
+        diagram_svg = block_diagram_svg(station.diagram) if pictures else None
+        report = write_report(
+            results,
+            pictures,
+            report_page(
+                title=scenario.name,
+                description=settings.description,
+                warnings=station.warnings,
+                scenario_yaml_text=scenario_text,
+                metrics=metrics,
+                figures=pictures,
+                log_attributes=log.attributes,
+                recording=_link(page, out),
+                fault=result.fault,
+                interrupted=interrupted(),
+                diagram_svg=diagram_svg,
+            ),
+        )
+        progress(end, "done")
+        return RunOutcome(
+            result.fault, report.path, metrics, station.warnings, interrupted(), report.problem
+        )
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Name the scenario's file in what is said against it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except OSError as error:  # of a file that the scenario names
+        name = shortened(str(error.filename), 100)
+        raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
 
 
 def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
@@ -162,19 +182,6 @@ def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
         settings.robot.model = str((folder / model).resolve())
 
 
-def _prepare_folder(out: Path) -> None:
-    """Make the folder for the results and take away what an earlier run left there."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name in ("scenario.yaml", "log.h5", "metrics.json", "recording.html", "report.html"):
-            (out / name).unlink(missing_ok=True)
-        shutil.rmtree(out / "figures", ignore_errors=True)
-    except OSError as error:
-        raise InputError(
-            f"--out {out}: cannot be written: {error.strerror}; allowed: a folder to write in"
-        ) from None
-
-
 def _metrics(log: RunLog, settings: PathFollowingScenario) -> Metrics:
     """The tool comes to the path during the first rest; from then on deviations count."""
     return path_following_metrics(
@@ -188,19 +195,20 @@ def _path_points(station: Station) -> np.ndarray:
     return curve.derivatives(np.linspace(*curve.domain, _PATH_POINTS), 0)[:, 0, :]
 
 
-def _write_recording(
-    settings: PathFollowingScenario,
-    folder: Path,
-    station: Station,
-    motion: RecordedMotion,
-    out: Path,
-) -> Path:
+def _recording(
+    settings: PathFollowingScenario, folder: Path, station: Station, motion: RecordedMotion
+) -> str:
+    """Return the recording as a page of its own."""
     meshcat = Meshcat(MeshcatParams(host="localhost"))
     diagram = build_station_replay(settings, folder, station, motion, meshcat)
-    recording = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
-    page = out / "recording.html"
-    page.write_text(recording, encoding="utf-8")
-    return page
+    return record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+
+
+def _link(recording: Path | None, out: Path) -> str | None:
+    """Return where the report, in its folder, finds the recording."""
+    if recording is None:
+        return None
+    return recording.name if recording.parent == out else str(recording)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Running a path following station."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -34,14 +35,16 @@ def simulate(
     parameters: SimulationParameters,
     duration: float,
     progress: ProgressListener,
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> SimulationResult:
-    """Simulate until the end or until a controller is in its safe state.
+    """Simulate until the end, until a controller is in its safe state, or an interruption.
 
     Args:
         station: What to simulate.
         parameters: How.
         duration: Simulated time [s].
         progress: Told how far the run is.
+        interrupted: Whether to stop as soon as the step that is being made is complete.
     """
     simulator = Simulator(station.diagram)
     ApplySimulatorConfig(_configuration(parameters), simulator)
@@ -51,7 +54,7 @@ def simulate(
     period = station.controller.period
     last_tick, stride = int(duration / period + 1e-6), max(1, round(_CHUNK / period))
     wall, tick, fault = 0.0, 0, None
-    while root.get_time() < duration and fault is None:
+    while root.get_time() < duration and fault is None and not interrupted():
         tick += stride
         # ticks are products as in Drake's own schedule, so that rounding loses no last sample
         goal = tick * period if tick < last_tick else max(duration, last_tick * period)

@@ -19,7 +19,7 @@ def test_files(three_axes):
     bare = three_axes()
     assert bare.status == 0
     names = sorted(path.name for path in bare.folder.iterdir())
-    assert names == ["log.h5", "metrics.json", "report.html", "scenario.yaml"]
+    assert names == ["log.h5", "manifest.json", "metrics.json", "report.html", "scenario.yaml"]
     assert f"Open the report: {bare.folder / 'report.html'}" in bare.stdout
 
 
@@ -30,6 +30,7 @@ def test_everything_that_a_run_can_write(six_axes):
         "scenario.yaml",
         "log.h5",
         "metrics.json",
+        "manifest.json",
         "figures",
         "recording.html",
         "report.html",
@@ -152,7 +153,7 @@ def test_files_of_an_earlier_run_are_replaced(run_scenario, tmp_path):
     later = run_scenario(out, "pfc_elastic_3r", "--duration", "0.02")
     assert len(later.t) == 21
     names = sorted(path.name for path in out.iterdir())
-    assert names == ["log.h5", "metrics.json", "report.html", "scenario.yaml"]
+    assert names == ["log.h5", "manifest.json", "metrics.json", "report.html", "scenario.yaml"]
     assert "recording.html" not in (out / "report.html").read_text(encoding="utf-8")
 
 
