@@ -10,7 +10,8 @@ from pydrake.systems.framework import Diagram
 from diagrams.delta_following import build_delta_following, load_delta_robot
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
-from diagrams.path_following import build_path_following
+from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.path_following import PathFollowingStation, build_path_following
 from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario.delta import DeltaFollowingScenario
 from diagrams.station import Station
@@ -54,10 +55,26 @@ def build_station(settings: PathFollowingScenario, folder: FilePath) -> Station:
     return build_path_following(settings, folder)
 
 
+def draw_station(
+    settings: PathFollowingScenario, folder: FilePath, station: Station
+) -> RobotDrawing | None:
+    """Read what a station's robot looks like, or return None if that is known without files.
+
+    Args:
+        settings: The scenario that is to be run.
+        folder: Where its relative file names start.
+        station: Its station.
+    """
+    if not isinstance(station, PathFollowingStation):
+        return None
+    return draw_robot(station.arm.model, station.arm.tool, settings.robot, folder)
+
+
 def build_station_replay(
     settings: PathFollowingScenario,
     folder: FilePath,
     station: Station,
+    drawing: RobotDrawing | None,
     motion: RecordedMotion,
     meshcat: Meshcat,
 ) -> Diagram:
@@ -67,6 +84,7 @@ def build_station_replay(
         settings: The scenario that was run.
         folder: Where its relative file names start.
         station: Its station.
+        drawing: What its robot looks like, from :func:`draw_station`.
         motion: What to draw.
         meshcat: Where to draw.
     """
@@ -76,4 +94,5 @@ def build_station_replay(
         return build_delta_replay(
             robot, station.path, layout, motion, meshcat, period, settings.notch
         )
-    return build_replay(settings.robot, folder, station.path, layout, motion, meshcat, period)
+    assert drawing is not None  # draw_station knows every other robot
+    return build_replay(drawing, station.path, layout, motion, meshcat, period)

@@ -13,9 +13,10 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
-from diagrams.stations import build_station, build_station_replay, load_settings
+from diagrams.stations import build_station, build_station_replay, draw_station, load_settings
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import write_figures
 from experiments.pages.report import write_report
@@ -84,6 +85,9 @@ def run_scenario(
     settings.name = settings.name or scenario.name
     settings.duration = duration or settings.duration or station.reference_duration
     _resolve_files(settings, scenario.path.parent)
+    # before anything moves, so that what cannot be drawn is known first
+    drawing = draw_station(settings, scenario.path.parent, station) if recording else None
+    warnings = station.warnings + (drawing.warnings if drawing else [])
     _prepare_folder(out)
     (out / "scenario.yaml").write_text(yaml_dump_typed(settings), encoding="utf-8")
 
@@ -111,14 +115,14 @@ def run_scenario(
     page = None
     if recording and len(motion.times) > 1:
         progress(end, "recording")
-        page = _write_recording(settings, scenario.path.parent, station, motion, out)
+        page = _write_recording(settings, scenario.path.parent, station, drawing, motion, out)
     progress(end, "drawing")
     pictures = write_figures(log, _path_points(station), out / "figures") if figures else []
     report = write_report(
         out,
         title=scenario.name,
         description=settings.description,
-        warnings=station.warnings,
+        warnings=warnings,
         scenario_yaml_text=(out / "scenario.yaml").read_text(encoding="utf-8"),
         metrics=metrics,
         figures=pictures,
@@ -128,7 +132,7 @@ def run_scenario(
         diagram_svg=block_diagram_svg(station.diagram) if figures else None,
     )
     progress(end, "done")
-    return RunOutcome(result.fault, report, metrics, station.warnings)
+    return RunOutcome(result.fault, report, metrics, warnings)
 
 
 def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
@@ -191,11 +195,12 @@ def _write_recording(
     settings: PathFollowingScenario,
     folder: Path,
     station: Station,
+    drawing: RobotDrawing | None,
     motion: RecordedMotion,
     out: Path,
 ) -> Path:
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    diagram = build_station_replay(settings, folder, station, motion, meshcat)
+    diagram = build_station_replay(settings, folder, station, drawing, motion, meshcat)
     recording = record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
     page = out / "recording.html"
     page.write_text(recording, encoding="utf-8")
