@@ -14,11 +14,13 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.drawing.robot_geometry import RobotDrawing
+from diagrams.integration import Integration
 from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
 from diagrams.stations import build_station, build_station_replay, draw_station, load_settings
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import write_figures
+from experiments.integration import choose_integration
 from experiments.pages.report import write_report
 from experiments.progress import ProgressListener
 from experiments.results.metrics import Metrics
@@ -80,6 +82,7 @@ def run_scenario(
         with compiled_when_bound():
             station = build_station(settings, scenario.path.parent)
         _check_targets(settings, station)
+        station, integration = _integrated(settings, scenario.path.parent, station)
     except InputError as error:
         raise InputError(f"{scenario.path}: {error}") from None
     settings.name = settings.name or scenario.name
@@ -96,7 +99,7 @@ def run_scenario(
         result = simulate(station, settings.simulation, settings.duration, progress)
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
-        log.attributes = standard_attributes(scenario.name)
+        log.attributes = standard_attributes(scenario.name) | {"integration": str(integration)}
         if result.fault is not None:
             log.attributes["fault"] = result.fault
         log.write(out / "log.h5")
@@ -133,6 +136,22 @@ def run_scenario(
     )
     progress(end, "done")
     return RunOutcome(result.fault, report, metrics, warnings)
+
+
+def _integrated(
+    settings: PathFollowingScenario, folder: Path, station: Station
+) -> tuple[Station, Integration]:
+    """Settle the integration in the settings, and return it and a station that is made for it.
+
+    The settings name scheme and step then, so that the scenario as resolved gives this run again.
+    """
+    integration = choose_integration(station, settings.simulation, settings.reference.dwell)
+    longest = min(settings.simulation.max_step, station.controller.period)
+    settings.simulation = integration.applied_to(settings.simulation)
+    if integration.step < longest:  # friction is made for the step
+        with compiled_when_bound():
+            station = build_station(settings, folder)
+    return station, integration
 
 
 def _check_targets(settings: PathFollowingScenario, station: Station) -> None:

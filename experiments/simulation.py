@@ -39,12 +39,12 @@ def simulate(
 
     Args:
         station: What to simulate.
-        parameters: How.
+        parameters: How; ``integrator`` names a scheme.
         duration: Simulated time [s].
         progress: Told how far the run is.
     """
     simulator = Simulator(station.diagram)
-    ApplySimulatorConfig(_configuration(parameters), simulator)
+    configure(simulator, parameters)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
@@ -66,11 +66,18 @@ def simulate(
     return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault)
 
 
-def _configuration(parameters: SimulationParameters) -> SimulatorConfig:
+def configure(simulator: Simulator, parameters: SimulationParameters) -> None:
+    """Let a simulator integrate as a scenario says.
+
+    Args:
+        simulator: The simulator, not yet initialized.
+        parameters: How; ``integrator`` names a scheme.
+    """
     error_control = parameters.accuracy > 0.0
-    return SimulatorConfig(
+    configuration = SimulatorConfig(
         integration_scheme=parameters.integrator,
         max_step_size=parameters.max_step,
         use_error_control=error_control,
         accuracy=parameters.accuracy if error_control else 1e-6,
     )
+    ApplySimulatorConfig(configuration, simulator)
