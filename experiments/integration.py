@@ -22,10 +22,10 @@ _TOLERANCE = 1e-6
 # the step that errors are measured against is shorter by this factor, its scheme the best
 _FINER, _BEST = 5, "runge_kutta5"
 # length of a trial: steps, and at least ticks of the controller
-_STEPS, _TICKS = 200, 20
+_STEPS, _TICKS = 100, 20
 # part of 1 by which halving the step must shrink the error, else it comes from switching
 _PROGRESS = 0.25
-_HALVINGS_TO_BE_ACCURATE, _HALVINGS_TO_BE_STABLE = 4, 8
+_HALVINGS_TO_BE_ACCURATE, _HALVINGS_TO_BE_STABLE = 2, 8
 
 
 def choose_integration(
@@ -67,7 +67,7 @@ class _Search:
     """A station that is tried with several schemes."""
 
     def __init__(self, station: Station, begin: float) -> None:
-        self._station, self._begin = station, begin
+        self._station, self._begin, self._duration = station, begin, 0.0
         self._pose = pose_function(station.chain)
         systems = station.diagram.GetSystems()
         self._rough = any(isinstance(system, JointFriction) for system in systems)
@@ -92,6 +92,7 @@ class _Search:
                 f"{step:.3g} s; allowed: a shorter simulation.max_step, or runge_kutta3 with "
                 "simulation.accuracy"
             )
+        self._duration = max(_STEPS * step, _TICKS * self._station.controller.period)
         errors = self._errors(stable, step)
         first = (stable, step, errors)
         for _ in range(0 if self._rough else _HALVINGS_TO_BE_ACCURATE):
@@ -110,7 +111,7 @@ class _Search:
         enough = max(_TOLERANCE, 2.0 * min(errors))
         scheme, error = next((s, e) for s, e in zip(schemes, errors, strict=False) if e <= enough)
         against = (
-            f"over the first {self._duration(step):.3g} s, against steps {_FINER} times shorter"
+            f"over the first {self._duration:.3g} s, against steps {_FINER} times shorter"
         )
         reason = f"the cheapest with an error below {_TOLERANCE:g} (rad, m); {error:.2g} {against}"
         if error > _TOLERANCE:
@@ -125,11 +126,10 @@ class _Search:
 
         It is infinite where a scheme gives up.
         """
-        duration = self._duration(step)
-        truth = self._positions(_BEST, step / _FINER, duration)
+        truth = self._positions(_BEST, step / _FINER)
         errors = []
         for scheme in schemes:
-            tried = self._positions(scheme, step, duration)
+            tried = self._positions(scheme, step)
             complete = len(tried) >= len(truth)
             error = float(np.abs(tried[: len(truth)] - truth).max()) if complete else np.inf
             errors.append(error)
@@ -137,10 +137,7 @@ class _Search:
                 break  # those that follow cost more
         return errors
 
-    def _duration(self, step: float) -> float:
-        return max(_STEPS * step, _TICKS * self._station.controller.period)
-
-    def _positions(self, scheme: str, step: float, duration: float) -> np.ndarray:
+    def _positions(self, scheme: str, step: float) -> np.ndarray:
         """Positions of links, motors and tool at the ticks, as far as they are finite.
 
         Returns:
@@ -149,7 +146,7 @@ class _Search:
         simulator, station = self._start(scheme, step), self._station
         root = simulator.get_context()
         with contextlib.suppress(RuntimeError):  # what was logged until then counts
-            simulator.AdvanceTo(self._begin + duration)
+            simulator.AdvanceTo(self._begin + self._duration)
         n, state = station.chain.dimension, station.log.read(root)[1]["joint_state"]
         finite = np.isfinite(state).all(axis=1)
         state = state[: len(state) if finite.all() else int(np.argmin(finite))]
