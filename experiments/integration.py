@@ -110,9 +110,7 @@ class _Search:
     ) -> Integration:
         enough = max(_TOLERANCE, 2.0 * min(errors))
         scheme, error = next((s, e) for s, e in zip(schemes, errors, strict=False) if e <= enough)
-        against = (
-            f"over the first {self._duration:.3g} s, against steps {_FINER} times shorter"
-        )
+        against = f"over the first {self._duration:.3g} s, against steps {_FINER} times shorter"
         reason = f"the cheapest with an error below {_TOLERANCE:g} (rad, m); {error:.2g} {against}"
         if error > _TOLERANCE:
             reason = f"error {error:.2g} (rad, m) {against}; no scheme comes below {_TOLERANCE:g}"
