@@ -1,0 +1,157 @@
+"""Which integration is chosen for which robot."""
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from diagrams.integration import is_stable
+from diagrams.scenario import SimulationParameters
+from diagrams.stations import build_station, load_settings
+from experiments.catalog.scenario_file import read_scenario
+from experiments.integration import choose_integration
+from experiments.results.run_signals import collect_log
+from experiments.simulation import simulate
+from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.writer import write_sdf
+from pfsc_drake.robot.resonance import joint_resonances
+
+RIGID = (
+    "robot.model=comau_racer_1_4",
+    "controller.law=rigid",
+    "controller.gains.rigid="
+    "{eta: {poles: [-20, -20]}, xi: {poles: [-30, -30]}, phi: {poles: [-30, -30]}}",
+)
+
+
+class Quiet:
+    """Listens to no progress."""
+
+    def __call__(self, simulated_time, phase):
+        pass
+
+
+def build(name, *changes):
+    scenario = read_scenario(name, ["simulation.integrator=auto", *changes])
+    settings = load_settings(scenario.data, name)
+    return settings, build_station(settings, scenario.path.parent)
+
+
+def choose(name, *changes):
+    settings, station = build(name, *changes)
+    return choose_integration(station, settings.simulation, settings.reference.dwell)
+
+
+def motion(station, settings, parameters):
+    """Positions in the first 0.2 s of a run, shape (201, n)."""
+    result = simulate(station, parameters, 0.2, Quiet())
+    log = collect_log(station, result.root)
+    return np.hstack([log["q_J"].values, log["y_t"].values])
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "scheme", "without"),
+    [
+        ("pfc_elastic_6r", RIGID, "runge_kutta2", None),
+        ("pfc_elastic_3r", (), "runge_kutta3", "runge_kutta2"),
+        ("pfc_elastic_6r", (), "runge_kutta5", "runge_kutta3"),
+    ],
+)
+def test_the_cheapest_that_is_accurate(name, changes, scheme, without):
+    """Against error control four orders tighter than what is asked for."""
+    settings, station = build(name, *changes)
+    chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
+    assert (chosen.scheme, chosen.step) == (scheme, 1e-3)
+    assert "the cheapest with an error below 1e-06" in chosen.reason
+    tight = SimulationParameters("runge_kutta3", 1e-3, accuracy=1e-10)
+    truth = motion(station, settings, tight)
+    assert np.ptp(truth, axis=0).max() > 5e-3  # it did move
+    tried = motion(station, settings, chosen.applied_to(settings.simulation))
+    assert np.abs(tried - truth).max() < 1e-6
+    if without:
+        cheaper = motion(station, settings, SimulationParameters(without, 1e-3))
+        assert np.abs(cheaper - truth).max() > 1e-6
+
+
+def test_it_is_the_same_every_time():
+    settings, station = build("pfc_elastic_3r")
+    choices = [choose_integration(station, settings.simulation, 0.3) for _ in range(2)]
+    assert choices[0] == choices[1] == choose("pfc_elastic_3r")
+
+
+def test_an_unstable_scheme_is_not_chosen_because_nothing_excites_it():
+    """A robot that hardly moves has no error to speak of, whatever integrates it."""
+    slow = (
+        "start.offset=[0, 0]",
+        "start.rotation_deg=[0, 0, 0]",
+        "reference.points=[0.96, 0.961]",
+        "reference.velocity=1e-4",
+        "reference.acceleration=1e-3",
+    )
+    settings, station = build("pfc_elastic_6r", *slow)
+    truth = motion(station, settings, SimulationParameters("runge_kutta3", accuracy=1e-10))
+    tried = motion(station, settings, SimulationParameters("runge_kutta2"))
+    assert np.abs(tried - truth).max() < 1e-6
+    chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
+    assert chosen.scheme == "runge_kutta3"
+
+
+def test_stiff_joints_get_shorter_steps(tmp_path):
+    parameters = load_parameters("comau_racer_1_4")
+    variant = next(v for v in parameters.variants if v.name == "comau_racer_1_4_elastic_3r")
+    elasticity = parameters.elasticities[variant.elasticity]
+    elasticity.stiffness = 3e3 * elasticity.stiffness
+    (tmp_path / "stiff.sdf").write_text(write_sdf(parameters, variant), encoding="utf-8")
+    changes = (
+        f"robot.model={tmp_path / 'stiff.sdf'}",
+        "controller.law=singular_perturbation",
+        "controller.boundary_layer_damping=[1e-6, 1e-6, 1e-6]",
+    )
+    settings, station = build("pfc_elastic_3r", *changes)
+    chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
+    q_J = (station.coordinates.link_rows @ station.initial_state)[:3]
+    modes = 1j * joint_resonances(station.chain, q_J)
+    assert not any(is_stable(scheme, 1e-3, modes) for scheme in ("runge_kutta3", "runge_kutta5"))
+    assert chosen.step < 1e-3
+    assert is_stable(chosen.scheme, chosen.step, modes)
+
+
+def test_friction_has_its_schemes():
+    chosen = choose("pfc_elastic_6r", *RIGID, "friction.file=comau_racer_1_4")
+    assert chosen.scheme in ("runge_kutta3", "runge_kutta5")
+    assert chosen.step == 1e-3
+
+
+def test_a_step_is_never_longer_than_a_tick():
+    assert choose("pfc_elastic_6r", *RIGID, "simulation.max_step=0.01").step == 1e-3
+
+
+def test_a_discrete_plant_has_steps_of_its_own():
+    chosen = choose("pfc_delta_notch")
+    assert "time steps of its own, 0.5 ms" in chosen.reason
+
+
+def test_error_control_gets_the_scheme_that_has_it():
+    chosen = choose("pfc_elastic_3r", "simulation.accuracy=1e-6")
+    assert chosen.scheme == "runge_kutta3"
+    assert "accuracy 1e-06" in chosen.reason
+
+
+def test_what_the_scenario_names_is_taken():
+    chosen = choose("pfc_elastic_3r", "simulation.integrator=runge_kutta2")
+    assert str(chosen) == "runge_kutta2 in steps of 1 ms: as the scenario says"
+
+
+def test_a_run_says_it_and_its_copy_gives_the_same(run_scenario, tmp_path):
+    bare = ("--set", "simulation.integrator=auto", "--duration", "0.1")
+    first = run_scenario(tmp_path / "first", "pfc_elastic_3r", *bare)
+    resolved = tmp_path / "first" / "scenario.yaml"
+    simulation = yaml.safe_load(resolved.read_text().replace("!", "#"))["simulation"]
+    assert (simulation["integrator"], simulation["max_step"]) == ("runge_kutta3", 1e-3)
+    assert "runge_kutta3 in steps of 1 ms: the cheapest" in first.attributes["integration"]
+    assert first.attributes["integration"][:30] in (tmp_path / "first/report.html").read_text()
+    second = run_scenario(tmp_path / "second", resolved)
+    assert second.attributes["integration"].endswith("as the scenario says")
+    with h5py.File(tmp_path / "first/log.h5") as one, h5py.File(tmp_path / "second/log.h5") as two:
+        for name in one:
+            np.testing.assert_array_equal(one[name][:], two[name][:])
