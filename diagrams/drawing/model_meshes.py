@@ -4,7 +4,7 @@ import json
 from pathlib import Path as FilePath
 from xml.etree import ElementTree
 
-from pydrake.geometry import Mesh
+from pydrake.geometry import Mesh, Meshcat, MeshcatParams
 
 from diagrams.drawing.stl import read_stl
 from pfsc_drake.errors import InputError
@@ -63,7 +63,13 @@ def _is_gltf(file: FilePath) -> bool:
         content = json.loads(file.read_bytes())
     except ValueError:
         return False
-    return isinstance(content, dict) and bool(content.get("meshes"))
+    if not isinstance(content, dict) or not content.get("meshes"):
+        return False
+    try:  # no other kind of file makes Meshcat raise
+        Meshcat(MeshcatParams(host="localhost")).SetObject("mesh", Mesh(str(file)))
+    except RuntimeError:
+        return False
+    return True
 
 
 def _is_collada(file: FilePath) -> bool:

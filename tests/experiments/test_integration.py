@@ -96,18 +96,23 @@ def test_an_unstable_scheme_is_not_chosen_because_nothing_excites_it():
     assert chosen.scheme == "runge_kutta3"
 
 
-def test_stiff_joints_get_shorter_steps(tmp_path):
+@pytest.fixture
+def stiff(tmp_path):
+    """Changes that make the joints of three axes 3000 times stiffer."""
     parameters = load_parameters("comau_racer_1_4")
     variant = next(v for v in parameters.variants if v.name == "comau_racer_1_4_elastic_3r")
     elasticity = parameters.elasticities[variant.elasticity]
     elasticity.stiffness = 3e3 * elasticity.stiffness
     (tmp_path / "stiff.sdf").write_text(write_sdf(parameters, variant), encoding="utf-8")
-    changes = (
+    return (
         f"robot.model={tmp_path / 'stiff.sdf'}",
         "controller.law=singular_perturbation",
         "controller.boundary_layer_damping=[1e-6, 1e-6, 1e-6]",
     )
-    settings, station = build("pfc_elastic_3r", *changes)
+
+
+def test_stiff_joints_get_shorter_steps(stiff):
+    settings, station = build("pfc_elastic_3r", *stiff)
     chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
     q_J = (station.coordinates.link_rows @ station.initial_state)[:3]
     modes = 1j * joint_resonances(station.chain, q_J)
@@ -155,3 +160,17 @@ def test_a_run_says_it_and_its_copy_gives_the_same(run_scenario, tmp_path):
     with h5py.File(tmp_path / "first/log.h5") as one, h5py.File(tmp_path / "second/log.h5") as two:
         for name in one:
             np.testing.assert_array_equal(one[name][:], two[name][:])
+
+
+def test_friction_is_made_for_a_step_that_had_to_be_shorter(run_scenario, tmp_path, stiff):
+    """The copy, which names the step, gives the same."""
+    changes = ("simulation.integrator=auto", "friction.f_c=[20, 20, 10]", *stiff)
+    flags = [argument for change in changes for argument in ("--set", change)]
+    first = run_scenario(tmp_path / "first", "pfc_elastic_3r", *flags, "--duration", "0.02")
+    assert first.status == 0
+    resolved = tmp_path / "first" / "scenario.yaml"
+    simulation = yaml.safe_load(resolved.read_text().replace("!", "#"))["simulation"]
+    assert simulation["max_step"] < 1e-3
+    second = run_scenario(tmp_path / "second", resolved)
+    np.testing.assert_array_equal(first["tau_f"], second["tau_f"])
+    assert np.ptp(first["tau_f"]) > 1.0

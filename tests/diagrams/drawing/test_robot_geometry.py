@@ -143,6 +143,7 @@ def test_meshes_that_drake_draws_are_left_to_it(draw):
         ("part.dae", "<COLLADA", "holds no mesh"),
         ("part.gltf", "{", "holds no mesh"),
         ("part.gltf", "[]", "holds no mesh"),
+        ("part.gltf", '{"meshes": [3], "buffers": [{"uri": 5}], "images": "x"}', "holds no mesh"),
         ("part.step", "x", "drawn are obj, gltf, dae and stl"),
         ("part.glb", "x", "drawn are obj, gltf, dae and stl"),
     ],
