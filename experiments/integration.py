@@ -21,8 +21,8 @@ from pfsc_drake.systems.physics.joint_friction import JointFriction
 _TOLERANCE = 1e-6
 # the step that errors are measured against is shorter by this factor, its scheme the best
 _FINER, _BEST = 5, "runge_kutta5"
-# length of a trial: steps, and at least ticks of the controller
-_STEPS, _TICKS = 100, 20
+# length of a trial: steps, or ticks of the controller if that is more, within bounds
+_STEPS, _TICKS, _MOST_STEPS = 100, 20, 500
 # part of 1 by which halving the step must shrink the error, else it comes from switching
 _PROGRESS = 0.25
 _HALVINGS_TO_BE_ACCURATE, _HALVINGS_TO_BE_STABLE = 2, 8
@@ -55,8 +55,9 @@ def choose_integration(
         accuracy = f"error control with accuracy {parameters.accuracy:g}"
         return Integration("runge_kutta3", step, f"the scheme whose {accuracy} can be relied on")
     step = min(step, station.controller.period)
-    if isinstance(station.plant, MultibodyPlant) and station.plant.time_step() > 0.0:
-        period = station.plant.time_step() * 1e3
+    plant = station.part.plant
+    if isinstance(plant, MultibodyPlant) and plant.time_step() > 0.0:
+        period = plant.time_step() * 1e3
         return Integration(
             "runge_kutta3", step, f"the plant has time steps of its own, {period:g} ms"
         )
@@ -68,7 +69,7 @@ class _Search:
 
     def __init__(self, station: Station, begin: float) -> None:
         self._station, self._begin, self._duration = station, begin, 0.0
-        self._pose = pose_function(station.chain)
+        self._pose = pose_function(station.robot)
         systems = station.diagram.GetSystems()
         self._rough = any(isinstance(system, JointFriction) for system in systems)
         simulator = self._start(_BEST, station.controller.period)
@@ -92,7 +93,8 @@ class _Search:
                 f"{step:.3g} s; allowed: a shorter simulation.max_step, or runge_kutta3 with "
                 "simulation.accuracy"
             )
-        self._duration = max(_STEPS * step, _TICKS * self._station.controller.period)
+        ticks = round(self._station.controller.period / step * _TICKS)
+        self._duration = step * min(max(_STEPS, ticks), _MOST_STEPS)
         errors = self._errors(stable, step)
         first = (stable, step, errors)
         for _ in range(0 if self._rough else _HALVINGS_TO_BE_ACCURATE):
@@ -111,7 +113,7 @@ class _Search:
         enough = max(_TOLERANCE, 2.0 * min(errors))
         scheme, error = next((s, e) for s, e in zip(schemes, errors, strict=False) if e <= enough)
         against = f"over the first {self._duration:.3g} s, against steps {_FINER} times shorter"
-        reason = f"the cheapest with an error below {_TOLERANCE:g} (rad, m); {error:.2g} {against}"
+        reason = f"the cheapest with an error below {_TOLERANCE:g} (rad, m): {error:.2g} {against}"
         if error > _TOLERANCE:
             reason = f"error {error:.2g} (rad, m) {against}; no scheme comes below {_TOLERANCE:g}"
         return Integration(scheme, step, reason)
@@ -145,7 +147,7 @@ class _Search:
         root = simulator.get_context()
         with contextlib.suppress(RuntimeError):  # what was logged until then counts
             simulator.AdvanceTo(self._begin + self._duration)
-        n, state = station.chain.dimension, station.log.read(root)[1]["joint_state"]
+        n, state = station.robot.dimension, station.log.read(root)[1]["joint_state"]
         finite = np.isfinite(state).all(axis=1)
         state = state[: len(state) if finite.all() else int(np.argmin(finite))]
         q_J, q_M = state[:, :n], state[:, 2 * n : 3 * n]

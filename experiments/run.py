@@ -11,13 +11,13 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from diagrams.builder import build_station, build_station_replay, draw_station
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
 from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
-from diagrams.stations import build_station, build_station_replay, draw_station, load_settings
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import write_figures
 from experiments.integration import choose_integration
@@ -32,6 +32,7 @@ from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.typed import load_typed
 
 _PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
@@ -77,7 +78,7 @@ def run_scenario(
         InputError: If the scenario is wrong; nothing has moved then.
     """
     progress(0.0, "preparing")
-    settings = load_settings(scenario.data, str(scenario.path))
+    settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
     try:
         with compiled_when_bound():
             station = build_station(settings, scenario.path.parent)
@@ -158,7 +159,7 @@ def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     """Refuse a target for a metric that the run will not have."""
     signals = optional_signals(station)
     known = [
-        *metric_names(station.chain.dimension, signals),
+        *metric_names(station.robot.dimension, signals),
         "real_time_factor",
         "controller_tick_us",
         "controller_tick_us_p99",

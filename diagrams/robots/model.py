@@ -1,5 +1,6 @@
 """The robot in a diagram."""
 
+from collections.abc import Callable
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -13,41 +14,34 @@ from pydrake.multibody.tree import (
     PrismaticSpring,
     RevoluteSpring,
 )
-from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import add_models_to, resolve_model
 
 
-def add_robot(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath
+def read_robot(
+    parameters: RobotParameters,
+    folder: FilePath,
+    time_step: float = 0.0,
+    before_finalizing: Callable[[MultibodyPlant], None] | None = None,
 ) -> MultibodyPlant:
-    """Add a continuous plant with a robot, without geometry.
-
-    Args:
-        builder: Builder of the diagram.
-        parameters: Which robot.
-        folder: Where relative file names start.
-
-    Raises:
-        InputError: If the model cannot be read.
-    """
-    return builder.AddNamedSystem("plant", read_robot(parameters, folder))
-
-
-def read_robot(parameters: RobotParameters, folder: FilePath) -> MultibodyPlant:
-    """Return a continuous plant with a robot, without geometry and in no diagram.
+    """Return a plant with a robot, without the robot's geometry and in no diagram.
 
     Args:
         parameters: Which robot.
         folder: Where relative file names start.
+        time_step: Of the plant [s]; 0 for a continuous one.
+        before_finalizing: What else is to be added to the plant.
 
     Raises:
         InputError: If the model cannot be read.
     """
-    plant = MultibodyPlant(time_step=0.0)
+    plant = MultibodyPlant(time_step)
     _parse(plant, parameters, folder)
+    if before_finalizing is not None:
+        before_finalizing(plant)
+    plant.Finalize()
     return plant
 
 
@@ -79,7 +73,6 @@ def _parse(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath)
         raise InputError(f"robot.model: {file}: cannot be read: {reason}") from None
     if parameters.joint_damping:
         _set_joint_damping(plant, parameters)
-    plant.Finalize()
 
 
 def _set_joint_damping(plant: MultibodyPlant, parameters: RobotParameters) -> None:

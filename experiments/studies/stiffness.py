@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Figure, save_canvas
@@ -155,9 +155,9 @@ def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:
 def _resonance(scenario: ScenarioFile) -> float:
     """Return the fastest joint resonance at the start [rad/s]."""
     settings = load_typed(PathFollowingScenario, scenario.data, _SCENARIO)
-    station = build_path_following(settings, scenario.path.parent)
-    q_J = (station.coordinates.link_rows @ station.initial_state)[: station.chain.dimension]
-    return float(joint_resonances(station.chain, q_J)[-1])
+    station = build_station(settings, scenario.path.parent)
+    q_J = (station.part.coordinates.link_rows @ station.initial_state)[: station.robot.dimension]
+    return float(joint_resonances(station.robot, q_J)[-1])
 
 
 def _run(

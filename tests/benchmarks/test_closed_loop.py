@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
@@ -20,7 +20,7 @@ SPAN = 0.2
 def test_closed_loop(benchmark, name):
     scenario = load_file(PathFollowingScenario, SCENARIOS / f"{name}.yaml")
     with compiled_when_bound():
-        station = build_path_following(scenario, SCENARIOS)
+        station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
     configure(simulator, integration.applied_to(scenario.simulation))

@@ -6,8 +6,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LinearSystem, ZeroOrderHold
 
+from diagrams.builder import build_station
 from diagrams.integration import STABILITY, Integration, continuous_modes, is_stable
-from diagrams.path_following import build_path_following
 from diagrams.scenario import SimulationParameters
 from pfsc_drake.robot.resonance import joint_resonances
 
@@ -106,12 +106,12 @@ def test_modes_of_a_diagram_with_held_inputs():
 
 def test_modes_of_elastic_joints_are_their_resonances(load_scenario):
     scenario = load_scenario("pfc_elastic_3r")
-    station = build_path_following(scenario, None)
+    station = build_station(scenario, None)
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     modes = continuous_modes(station.diagram, root)
-    q_J = (station.coordinates.link_rows @ station.initial_state)[: station.chain.dimension]
-    fastest = joint_resonances(station.chain, q_J)[-1]
+    q_J = (station.part.coordinates.link_rows @ station.initial_state)[: station.robot.dimension]
+    fastest = joint_resonances(station.robot, q_J)[-1]
     assert np.abs(modes).max() == pytest.approx(fastest, rel=1e-2)  # gravity stiffens a little
 
 

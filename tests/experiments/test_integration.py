@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import yaml
 
+from diagrams.builder import build_station
 from diagrams.integration import is_stable
-from diagrams.scenario import SimulationParameters
-from diagrams.stations import build_station, load_settings
+from diagrams.scenario import PathFollowingScenario, SimulationParameters
 from experiments.catalog.scenario_file import read_scenario
 from experiments.integration import choose_integration
 from experiments.results.run_signals import collect_log
@@ -15,6 +15,7 @@ from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.yaml.typed import load_typed
 
 RIGID = (
     "robot.model=comau_racer_1_4",
@@ -33,7 +34,7 @@ class Quiet:
 
 def build(name, *changes):
     scenario = read_scenario(name, ["simulation.integrator=auto", *changes])
-    settings = load_settings(scenario.data, name)
+    settings = load_typed(PathFollowingScenario, scenario.data, name)
     return settings, build_station(settings, scenario.path.parent)
 
 
@@ -114,8 +115,8 @@ def stiff(tmp_path):
 def test_stiff_joints_get_shorter_steps(stiff):
     settings, station = build("pfc_elastic_3r", *stiff)
     chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
-    q_J = (station.coordinates.link_rows @ station.initial_state)[:3]
-    modes = 1j * joint_resonances(station.chain, q_J)
+    q_J = (station.part.coordinates.link_rows @ station.initial_state)[:3]
+    modes = 1j * joint_resonances(station.robot, q_J)
     assert not any(is_stable(scheme, 1e-3, modes) for scheme in ("runge_kutta3", "runge_kutta5"))
     assert chosen.step < 1e-3
     assert is_stable(chosen.scheme, chosen.step, modes)
@@ -129,6 +130,12 @@ def test_friction_has_its_schemes():
 
 def test_a_step_is_never_longer_than_a_tick():
     assert choose("pfc_elastic_6r", *RIGID, "simulation.max_step=0.01").step == 1e-3
+
+
+@pytest.mark.parametrize("step", [1e-5, 1e-6])
+def test_steps_that_are_short_already_take_no_long_trial(step):
+    chosen = choose("pfc_elastic_6r", *RIGID, f"simulation.max_step={step}")
+    assert (chosen.scheme, chosen.step) == ("runge_kutta2", step)
 
 
 def test_a_discrete_plant_has_steps_of_its_own():

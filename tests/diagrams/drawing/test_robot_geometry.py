@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydrake.geometry import Box, Cylinder, Mesh
-from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.drawing.robot_geometry import draw_robot
-from diagrams.robots.model import add_robot, tool_frame
+from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from pfsc_drake.systems.drawing.robot_visualizer import Surface
 
@@ -70,7 +69,7 @@ def draw(tmp_path):
             target.write_bytes(content if isinstance(content, bytes) else content.encode())
         parameters = RobotParameters(f"my_arm/urdf/{name}", "link_2")
         # the plant that is simulated takes the model whatever its geometry is
-        plant = add_robot(DiagramBuilder(), parameters, tmp_path)
+        plant = read_robot(parameters, tmp_path)
         assert not plant.geometry_source_is_registered()
         return draw_robot(plant, tool_frame(plant, parameters), parameters, tmp_path)
 

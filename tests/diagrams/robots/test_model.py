@@ -4,9 +4,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.robots.model import add_robot, tool_frame
+from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
@@ -15,7 +14,7 @@ SHIPPED = "comau_racer_1_4_elastic_3r"
 
 
 def add(model, folder=Path()):
-    return add_robot(DiagramBuilder(), RobotParameters(model), folder)
+    return read_robot(RobotParameters(model), folder)
 
 
 @pytest.mark.parametrize(
@@ -28,14 +27,12 @@ def add(model, folder=Path()):
     ],
 )
 def test_shipped_robots_are_continuous_and_without_geometry(model, positions, drives):
-    builder = DiagramBuilder()
-    plant = add_robot(builder, RobotParameters(model), Path())
+    plant = add(model)
     assert plant.num_positions() == plant.num_velocities() == positions
     assert plant.num_actuators() == drives
     assert plant.is_finalized()
     assert plant.time_step() == 0.0
     assert not plant.geometry_source_is_registered()
-    assert builder.HasSubsystemNamed("plant")
 
 
 def test_a_file_is_relative_to_the_folder(tmp_path, monkeypatch):
