@@ -157,7 +157,7 @@ class _Search:
     def _start(self, scheme: str, step: float) -> Simulator:
         """Put the robot at its start when the reference begins to move."""
         simulator = Simulator(self._station.diagram)
-        configure(simulator, SimulationParameters(integrator=scheme, max_step=step))
+        configure(simulator, scheme, step)
         root = simulator.get_mutable_context()
         root.SetTime(self._begin)
         self._station.set_start(root)

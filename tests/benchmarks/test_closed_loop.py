@@ -23,7 +23,7 @@ def test_closed_loop(benchmark, name):
         station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
-    configure(simulator, integration.applied_to(scenario.simulation))
+    configure(simulator, integration.scheme, integration.step)
     root = simulator.get_mutable_context()
 
     def restart():
