@@ -23,6 +23,8 @@ _TOLERANCE = 1e-6
 _FINER, _BEST = 5, "runge_kutta5"
 # length of a trial: steps, or ticks of the controller if that is more, within bounds
 _STEPS, _TICKS, _MOST_STEPS = 100, 20, 500
+# rad/s or m/s, of every joint when a trial starts
+_SPEED = 0.05
 # part of 1 by which halving the step must shrink the error, else it comes from switching
 _PROGRESS = 0.25
 _HALVINGS_TO_BE_ACCURATE, _HALVINGS_TO_BE_STABLE = 2, 8
@@ -33,12 +35,12 @@ def choose_integration(
 ) -> Integration:
     """Return how to integrate a station: as the scenario says, or with ``auto`` the cheapest way.
 
-    The station is tried in closed loop from its start, in contexts of their own. Reference and
-    forces are those from ``begin`` on, so that the robot comes to the path and moves along it at
-    once. The cheapest scheme is taken whose error, against steps five times shorter, stays
-    below 1e-6 rad and m; if none is, shorter steps. A scheme that lets a mode of the plant grow is
-    never taken, whether the trial excites the mode or not. Friction and encoders switch, and an
-    error that no shorter step makes smaller is taken as it is.
+    The station is tried in closed loop from its start, in contexts of their own, with every joint
+    in slow motion: all that can oscillate does so, wherever the scenario starts. Reference and
+    forces are those from ``begin`` on. The cheapest scheme is taken whose error, against steps
+    five times shorter, stays below 1e-6 rad and m; if there is none, shorter steps. A scheme that
+    lets a mode of the plant grow is never taken, whatever its error. Friction and encoders switch,
+    and an error that no shorter step makes smaller is taken as it is.
 
     Args:
         station: The station.
@@ -70,6 +72,11 @@ class _Search:
     def __init__(self, station: Station, begin: float) -> None:
         self._station, self._begin, self._duration = station, begin, 0.0
         self._pose = pose_function(station.robot)
+        coordinates, n = station.part.coordinates, station.robot.dimension
+        rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
+        joint_state = rows @ station.initial_state
+        joint_state.reshape(4, n)[[1, 3]] = _SPEED
+        self._state = coordinates.plant_state(joint_state)
         systems = station.diagram.GetSystems()
         self._rough = any(isinstance(system, JointFriction) for system in systems)
         simulator = self._start(_BEST, station.controller.period)
@@ -155,11 +162,12 @@ class _Search:
         return np.hstack([q_J, q_M, y_t])
 
     def _start(self, scheme: str, step: float) -> Simulator:
-        """Put the robot at its start when the reference begins to move."""
+        """Put the robot at its start, in motion, when the reference begins to move."""
         simulator = Simulator(self._station.diagram)
         configure(simulator, scheme, step)
         root = simulator.get_mutable_context()
         root.SetTime(self._begin)
         self._station.set_start(root)
+        self._station.place_robot(root, self._state)
         simulator.Initialize()
         return simulator

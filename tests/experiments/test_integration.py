@@ -8,12 +8,11 @@ import yaml
 from diagrams.builder import build_station
 from diagrams.integration import is_stable
 from diagrams.scenario import PathFollowingScenario, SimulationParameters
+from experiments import integration
 from experiments.catalog.scenario_file import read_scenario
 from experiments.integration import choose_integration
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
-from pfsc_drake.robot.models.parameters import load_parameters
-from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
 
@@ -77,39 +76,20 @@ def test_the_cheapest_that_is_accurate(name, changes, scheme, without):
 def test_it_is_the_same_every_time():
     settings, station = build("pfc_elastic_3r")
     choices = [choose_integration(station, settings.simulation, 0.3) for _ in range(2)]
-    assert choices[0] == choices[1] == choose("pfc_elastic_3r")
+    assert choices[0] == choices[1]
 
 
-def test_an_unstable_scheme_is_not_chosen_because_nothing_excites_it():
-    """A robot that hardly moves has no error to speak of, whatever integrates it."""
-    slow = (
-        "start.offset=[0, 0]",
-        "start.rotation_deg=[0, 0, 0]",
-        "reference.points=[0.96, 0.961]",
-        "reference.velocity=1e-4",
-        "reference.acceleration=1e-3",
-    )
-    settings, station = build("pfc_elastic_6r", *slow)
-    truth = motion(station, settings, SimulationParameters("runge_kutta3", accuracy=1e-10))
-    tried = motion(station, settings, SimulationParameters("runge_kutta2"))
-    assert np.abs(tried - truth).max() < 1e-6
-    chosen = choose_integration(station, settings.simulation, settings.reference.dwell)
-    assert chosen.scheme == "runge_kutta3"
+def test_an_unstable_scheme_is_not_chosen_whatever_its_error(monkeypatch):
+    """Second order makes undamped joints oscillate ever more, in the end."""
+    monkeypatch.setattr(integration, "_TOLERANCE", 1.0)
+    assert choose("pfc_elastic_6r").scheme == "runge_kutta3"
+    assert choose("pfc_elastic_6r", *RIGID).scheme == "runge_kutta2"
 
 
-@pytest.fixture
-def stiff(tmp_path):
-    """Changes that make the joints of three axes 3000 times stiffer."""
-    parameters = load_parameters("comau_racer_1_4")
-    variant = next(v for v in parameters.variants if v.name == "comau_racer_1_4_elastic_3r")
-    elasticity = parameters.elasticities[variant.elasticity]
-    elasticity.stiffness = 3e3 * elasticity.stiffness
-    (tmp_path / "stiff.sdf").write_text(write_sdf(parameters, variant), encoding="utf-8")
-    return (
-        f"robot.model={tmp_path / 'stiff.sdf'}",
-        "controller.law=singular_perturbation",
-        "controller.boundary_layer_damping=[1e-6, 1e-6, 1e-6]",
-    )
+@pytest.mark.parametrize("start", ["start.offset=[0, 0]", "start.offset=[0.01, 0]"])
+def test_the_start_of_the_scenario_does_not_decide(start):
+    """Without a way to the path, and the reference hardly moving yet, all else rests."""
+    assert choose("pfc_elastic_3r", start).scheme == "runge_kutta3"
 
 
 def test_stiff_joints_get_shorter_steps(stiff):
