@@ -13,6 +13,8 @@ from experiments.catalog.scenario_file import read_scenario
 from experiments.integration import choose_integration
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
+from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
 
@@ -84,6 +86,21 @@ def test_an_unstable_scheme_is_not_chosen_whatever_its_error(monkeypatch):
     monkeypatch.setattr(integration, "_TOLERANCE", 1.0)
     assert choose("pfc_elastic_6r").scheme == "runge_kutta3"
     assert choose("pfc_elastic_6r", *RIGID).scheme == "runge_kutta2"
+
+
+@pytest.fixture
+def stiff(tmp_path):
+    """Changes that make the joints of three axes 3000 times stiffer."""
+    parameters = load_parameters("comau_racer_1_4")
+    variant = next(v for v in parameters.variants if v.name == "comau_racer_1_4_elastic_3r")
+    elasticity = parameters.elasticities[variant.elasticity]
+    elasticity.stiffness = 3e3 * elasticity.stiffness
+    (tmp_path / "stiff.sdf").write_text(write_sdf(parameters, variant), encoding="utf-8")
+    return (
+        f"robot.model={tmp_path / 'stiff.sdf'}",
+        "controller.law=singular_perturbation",
+        "controller.boundary_layer_damping=[1e-6, 1e-6, 1e-6]",
+    )
 
 
 @pytest.mark.parametrize("start", ["start.offset=[0, 0]", "start.offset=[0.01, 0]"])
