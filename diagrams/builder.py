@@ -48,7 +48,7 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
     part = _add_robot(builder, scenario, folder, workpiece)
     law = make_law(scenario.controller, part.robot, task.manifold)
     start, initial_state = _start(scenario, task, part, workpiece)
-    on_motors = scenario.controller.law == "rigid" and part.robot.is_elastic
+    on_motors = scenario.controller.law == "rigid" and not part.robot.is_rigid
     following = Following(scenario, part.robot, task, law, on_motors)
 
     true_state = part.joint_state(builder)

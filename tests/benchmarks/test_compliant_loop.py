@@ -135,7 +135,7 @@ def test_update(loop, benchmark, name):
 
 def test_plant(loop, benchmark):
     """Accelerations and reaction forces, as the sensor asks for them."""
-    plant = loop.station.plant
+    plant = loop.station.part.plant
     context = plant.CreateDefaultContext()
     state = loop.station.initial_state
     plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))
