@@ -117,6 +117,8 @@ class _Search:
     def _cheapest(
         self, schemes: Sequence[str], step: float, errors: Sequence[float]
     ) -> Integration:
+        if not np.isfinite(min(errors)):
+            return Integration(schemes[-1], step, "nothing could be measured: no sample is finite")
         enough = max(_TOLERANCE, 2.0 * min(errors))
         scheme, error = next((s, e) for s, e in zip(schemes, errors, strict=False) if e <= enough)
         against = f"over the first {self._duration:.3g} s, against steps {_FINER} times shorter"
@@ -137,7 +139,7 @@ class _Search:
         errors = []
         for scheme in schemes:
             tried = self._positions(scheme, step)
-            complete = len(tried) >= len(truth)
+            complete = len(tried) >= len(truth) > 0
             error = float(np.abs(tried[: len(truth)] - truth).max()) if complete else np.inf
             errors.append(error)
             if error <= _TOLERANCE:
@@ -158,6 +160,8 @@ class _Search:
         finite = np.isfinite(state).all(axis=1)
         state = state[: len(state) if finite.all() else int(np.argmin(finite))]
         q_J, q_M = state[:, :n], state[:, 2 * n : 3 * n]
+        if len(state) == 0:
+            return np.zeros((0, 2 * n + 3))
         y_t = np.array(self._pose.map(len(q_J))(q_J.T))[:3].T
         return np.hstack([q_J, q_M, y_t])
 
