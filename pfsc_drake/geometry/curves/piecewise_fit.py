@@ -7,6 +7,8 @@ import numpy as np
 from pfsc_drake.errors import InputError
 
 _MAX_HALVINGS = 30
+# About half a gigabyte of a path's table.
+_MAX_PIECES = 200_000
 _NEGLIGIBLE = 0.01
 _ROUNDING = 1e-13
 
@@ -72,7 +74,7 @@ def fit_pieces(
         of (theta - theta_s).
 
     Raises:
-        InputError: no agreement even on very short segments.
+        InputError: no agreement even on very short segments, or on as many as 200,000.
     """
     starts, lengths = breakpoints[:-1], np.diff(breakpoints)
     # Off the nodes, and close to the ends, where interpolation errors are largest.
@@ -80,6 +82,7 @@ def fit_pieces(
     # Rounding errors of the function itself do not get smaller with the segments.
     negligible = _NEGLIGIBLE * tolerance * (breakpoints[-1] - breakpoints[0])
     done: list[tuple[np.ndarray, np.ndarray]] = []
+    found = 0
     for _ in range(_MAX_HALVINGS):
         nodes = chebyshev_nodes(starts, lengths, degree + 1)
         values = function(nodes.ravel()).reshape(*nodes.shape, -1)
@@ -91,6 +94,14 @@ def fit_pieces(
         allowed = tolerance + _ROUNDING * np.abs(values).max(axis=(1, 2))
         good = (error <= allowed) | (error * lengths <= negligible)
         done.append((starts[good], coefficients[good]))
+        found += int(np.count_nonzero(good))
+        if found + 2 * np.count_nonzero(~good) > _MAX_PIECES:
+            where = starts[0] if np.all(good) else starts[~good][0]
+            raise InputError(
+                f"curve: more than {_MAX_PIECES} polynomials are needed, near"
+                f" theta = {where:.9g} and elsewhere; a smoother curve, or one of fewer"
+                " segments, is required"
+            )
         if np.all(good):
             pieces = np.concatenate([item[0] for item in done])
             order = np.argsort(pieces)
