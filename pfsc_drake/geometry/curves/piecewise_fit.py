@@ -1,6 +1,7 @@
 """Adaptive piecewise polynomial approximation of functions."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -24,13 +25,7 @@ def power_coefficients(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         Coefficients of powers of (theta - theta_s), [segments, degree + 1, dimension].
     """
     count = values.shape[1]
-    chebyshev = np.linalg.inv(
-        np.polynomial.chebyshev.chebvander(_chebyshev_points(count), count - 1)
-    )
-    powers = np.zeros((count, count))
-    for j in range(count):
-        unit = np.polynomial.Chebyshev.basis(j, domain=[0.0, 1.0])
-        powers[: j + 1, j] = unit.convert(kind=np.polynomial.Polynomial).coef
+    chebyshev, powers = _conversions(count)
     # In two steps: their product has large entries of both signs, which would cost digits.
     series = np.einsum("ij,sjd->sid", chebyshev, values)
     scaled = np.einsum("ij,sjd->sid", powers, series)
@@ -113,5 +108,18 @@ def fit_pieces(
     raise InputError(f"curve: not smooth near theta = {starts[0]:.9g}; a regular curve is required")
 
 
+@cache
+def _conversions(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Maps from values at `count` nodes to a Chebyshev series, and from there to powers."""
+    nodes = _chebyshev_points(count)
+    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1))
+    powers = np.zeros((count, count))
+    for j in range(count):
+        unit = np.polynomial.Chebyshev.basis(j, domain=[0.0, 1.0])
+        powers[: j + 1, j] = unit.convert(kind=np.polynomial.Polynomial).coef
+    return chebyshev, powers
+
+
+@cache
 def _chebyshev_points(count: int) -> np.ndarray:
     return np.polynomial.chebyshev.chebpts1(count)

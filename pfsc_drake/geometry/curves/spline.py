@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import splu
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
@@ -13,6 +15,8 @@ from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 Parametrization = Literal["chord", "centripetal"]
 
 _MIN_SMOOTHNESS, _MAX_SMOOTHNESS = 2, 6
+# Periodic splines of more waypoints are solved by sparse matrices.
+_DENSE = 1000
 # Waypoints closer than this part of the path's chord length are one point.
 _COINCIDENT = 1e-9
 
@@ -126,12 +130,27 @@ def _periodic_spline(
         starts = np.append(parameters[0], base)
     index = np.arange(-degree, count + degree + 1)
     knots = base[index % count] + period * (index // count)
-    unfolded = BSpline.design_matrix(sites, knots, degree).toarray()
-    folded = np.zeros((count, count))
-    for column in range(unfolded.shape[1]):
-        folded[:, column % count] += unfolded[:, column]
-    coefficients = np.linalg.solve(folded, values)
+    folded = fold_columns(BSpline.design_matrix(sites, knots, degree), count)
+    if count <= _DENSE:
+        coefficients = np.linalg.solve(folded.toarray(), values)
+    else:
+        coefficients = splu(folded.tocsc()).solve(values)
     return BSpline(knots, coefficients[np.arange(count + degree) % count], degree), starts
+
+
+def fold_columns(matrix: csr_array, period: int) -> csr_array:
+    """Sum of the columns that are whole periods apart, for periodic splines.
+
+    Args:
+        matrix: Design matrix [rows, columns].
+        period: Number of distinct coefficients.
+
+    Returns:
+        Matrix [rows, period].
+    """
+    entries = matrix.tocoo()
+    place = (entries.row, entries.col % period)
+    return csr_array((entries.data, place), shape=(matrix.shape[0], period))
 
 
 def accumulate(chords: np.ndarray, parametrization: Parametrization) -> np.ndarray:
