@@ -22,9 +22,10 @@ from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.tasks.law import make_law
 from diagrams.tasks.path import make_path
+from diagrams.tasks.path_warnings import path_warnings
 from diagrams.tasks.start import check_points, start_point
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import Path
+from pfsc_drake.geometry import Path, shape_report
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
@@ -143,7 +144,7 @@ def build_delta_following(
         initial_state,
         initial_theta,
         on_motors=False,
-        warnings=sensor_warnings(scenario),
+        warnings=path_warnings(path, shape_report(path)) + sensor_warnings(scenario),
         body=body,
         notch=scenario.notch,
     )

@@ -19,7 +19,9 @@ from diagrams.tasks.following import Task, add_law, add_place_on_path, reference
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.path import make_path
+from diagrams.tasks.path_warnings import path_warnings
 from diagrams.tasks.start import start_state
+from pfsc_drake.geometry import shape_report
 from pfsc_drake.robot.serial.chain import SerialChain
 
 
@@ -98,7 +100,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_state,
         initial_theta,
         on_motors,
-        law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
+        path_warnings(path, shape_report(path))
+        + law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
         + sensor_warnings(scenario),
         arm,
     )

@@ -25,10 +25,12 @@ from experiments.results.path_metrics import metric_names, path_following_metric
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, collect_motion, optional_signals
+from experiments.results.shape_metrics import shape_metrics
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import shape_report
 
 _PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
@@ -100,6 +102,7 @@ def run_scenario(
         progress(end, "measuring the tick")
         tick = measure_tick(station, result.root, log) * 1e6
     metrics = _metrics(log, settings)
+    metrics.update(shape_metrics(shape_report(station.path)))
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")
@@ -136,6 +139,7 @@ def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     signals = optional_signals(station)
     known = [
         *metric_names(station.chain.dimension, signals),
+        *shape_metrics(shape_report(station.path)),
         "real_time_factor",
         "controller_tick_us",
         "controller_tick_us_p99",
