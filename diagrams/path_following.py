@@ -18,7 +18,7 @@ from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Task, add_law, add_place_on_path, reference_progress
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
-from diagrams.tasks.path import make_path
+from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_warnings import path_warnings
 from diagrams.tasks.start import start_state
 from pfsc_drake.geometry import shape_report
@@ -62,6 +62,7 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
     chain, coordinates = arm.chain, arm.coordinates
     period, law_name = scenario.controller.sampling_time, scenario.controller.law
     path = make_path(scenario.path, law_name, folder)
+    require_orientation(path, chain.dimension)
     law = make_law(scenario.controller, chain, path.orientation is not None)
     initial_state, initial_theta = start_state(scenario, path, chain, coordinates)
     on_motors = law_name == "rigid" and chain.is_elastic

@@ -61,6 +61,24 @@ def make_path(
     return path
 
 
+def require_orientation(path: Path, num_joints: int) -> None:
+    """Refuse a path without orientation for a robot whose joints need one.
+
+    Args:
+        path: The path.
+        num_joints: Of the robot.
+
+    Raises:
+        InputError: If six joints have no orientation to follow.
+    """
+    if num_joints == 6 and path.orientation is None:
+        raise InputError(
+            f"path: {num_joints} joints for 3 outputs (position only); give the orientation too: "
+            "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
+            "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+        )
+
+
 def _through_waypoints(
     parameters: PathParameters,
     shape: Waypoints,

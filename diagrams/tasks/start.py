@@ -5,12 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagrams.scenario import PathFollowingScenario
+from diagrams.tasks.path_warnings import closing_gap
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.robot.inverse_kinematics import solve_pose
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+
+_LOOKS_CLOSED = "; it ends where it starts: if it is to go round, write path.shape.closed: true"
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,10 @@ def check_points(points: list[float], path: Path) -> None:
     rounding = 1e-9 * path.length
     for eta in points:
         if not path.closed and not -rounding <= eta <= path.length + rounding:
+            closed = closing_gap(path) is not None
             raise InputError(
                 f"reference.points: {eta:g} m; the path is open and {path.length:.6g} m long"
+                f"{_LOOKS_CLOSED if closed else ''}"
             )
 
 

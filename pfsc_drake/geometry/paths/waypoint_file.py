@@ -141,14 +141,11 @@ def _contents(name: str) -> Iterator[tuple[int, str, float]]:
     """Lines that say something: number, text without comment, and the fraction of the file."""
     try:
         status = FilePath(name).stat()
+        kind = _KINDS.get(stat.S_IFMT(status.st_mode), "is no regular file")
         if not stat.S_ISREG(status.st_mode):
-            kind = _KINDS.get(stat.S_IFMT(status.st_mode), "is no regular file")
-            raise InputError(f"{name}: {kind}; a CSV file is required")
+            raise OSError(0, kind)
         if status.st_size > _MAX_BYTES:
-            raise InputError(
-                f"{name}: {status.st_size / 2**20:.0f} MiB; at most {_MAX_BYTES >> 20} MiB"
-                " of waypoints are read"
-            )
+            raise OSError(0, f"{status.st_size >> 20} MiB, at most {_MAX_BYTES >> 20} are read")
         text = FilePath(name).read_text(encoding="utf-8-sig")
     # ValueError: bytes that are no UTF-8, or a name that no file can have.
     except (OSError, ValueError) as error:

@@ -264,7 +264,7 @@ def test_lengths_and_angles_beyond_all_robots(make_shape, part):
 def test_axes_of_a_circle_that_span_no_plane(tilt):
     axis = [1e200 * math.cos(math.radians(tilt)), 1e200 * math.sin(math.radians(tilt)), 0.0]
     angle = min(tilt, 180.0 - tilt)
-    with pytest.raises(InputError, match="deg between them; at least 0.1 deg") as caught:
+    with pytest.raises(InputError, match=r"deg between them; at least 0\.1 deg") as caught:
         make(Circle(axis_u=[1.0, 0.0, 0.0], axis_v=axis))
     assert float(str(caught.value).split(" deg")[0].split()[-1]) == pytest.approx(angle, abs=1e-6)
 

@@ -172,6 +172,22 @@ def test_centre_of_a_circle_is_not_a_strict_minimum() -> None:
     assert result.alpha == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-6, 1e-3])
+def test_beyond_the_centre_of_curvature_no_maximum_is_taken(offset: float) -> None:
+    """From the top of an ellipse, a point below its centre of curvature there: alpha > 1.
+
+    The far side is nearest. Exactly at the maximum no direction is better, which is said.
+    """
+    ellipse = FourierCurve([0.0, 0.0, 0.0], [[2.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    result = Projector(ellipse).project([0.0, -3.5, 0.0], math.pi / 2 + offset)
+    if result.converged:
+        assert result.alpha < 1.0
+        assert result.theta == pytest.approx(1.5 * math.pi, abs=1e-8)
+    else:
+        assert offset == 0.0
+        assert result.alpha > 1.0
+
+
 def test_maximum_is_left() -> None:
     circle = FourierCurve.circle([0, 0, 0], 1.0)
     result = Projector(circle).project([0.5, 0.0, 0.0], math.pi - 0.01)
