@@ -16,7 +16,7 @@ from pfsc_drake.geometry import (
     zyx_to_quaternion,
 )
 
-ANGLE = np.linspace(0.0, 2.0, 600)
+ANGLE = np.linspace(0.0, 2.0, 241)
 WAVE = np.stack([0.3 * np.cos(ANGLE), 0.3 * np.sin(ANGLE), 0.1 * np.sin(2.0 * ANGLE)], axis=1)
 U_TURN = np.array(
     [[0, k / 10, 0] for k in range(5)]
@@ -33,9 +33,9 @@ def warnings(points, **options):
 @pytest.mark.parametrize("smoothness", [3, 5])
 def test_smooth_paths_pass_in_silence(smoothness):
     assert warnings(WAVE, smoothness=smoothness) == []
-    assert warnings(WAVE[::40], smoothness=smoothness) == []
+    assert warnings(WAVE[::16], smoothness=smoothness) == []
     circle = np.stack([np.cos(ANGLE * np.pi), np.sin(ANGLE * np.pi), 0 * ANGLE], axis=1)
-    for step in (1, 10, 75):
+    for step in (4, 30):
         assert warnings(circle[:-1:step], smoothness=smoothness, closed=True) == []
     line = PiecewisePolynomialCurve.line([0, 0, 0], [0, 0.5, 0])
     path = Path(line, OrientationCurve.fixed([1, 0, 0, 0], line.domain))
@@ -45,7 +45,9 @@ def test_smooth_paths_pass_in_silence(smoothness):
 @pytest.mark.parametrize("smoothness", [3, 5])
 @pytest.mark.parametrize("noise", [2e-5, 2e-4])
 def test_noise(smoothness, noise):
-    points = WAVE[:100] + noise * np.random.default_rng(0).normal(size=(100, 3))
+    angle = np.linspace(0.0, 0.3, 100)  # 1 mm apart
+    points = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    points += noise * np.random.default_rng(0).normal(size=points.shape)
     (sentence,) = warnings(points, smoothness=smoothness)
     assert "bends to and fro" in sentence
     # what is advised works, and leaves nothing to complain of

@@ -172,20 +172,27 @@ def test_centre_of_a_circle_is_not_a_strict_minimum() -> None:
     assert result.alpha == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-6, 1e-3])
-def test_beyond_the_centre_of_curvature_no_maximum_is_taken(offset: float) -> None:
-    """From the top of an ellipse, a point below its centre of curvature there: alpha > 1.
-
-    The far side is nearest. Exactly at the maximum no direction is better, which is said.
-    """
-    ellipse = FourierCurve([0.0, 0.0, 0.0], [[2.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    result = Projector(ellipse).project([0.0, -3.5, 0.0], math.pi / 2 + offset)
-    if result.converged:
-        assert result.alpha < 1.0
-        assert result.theta == pytest.approx(1.5 * math.pi, abs=1e-8)
-    else:
-        assert offset == 0.0
-        assert result.alpha > 1.0
+@pytest.mark.parametrize(
+    ("centre", "beyond", "angle"),
+    [
+        ([-2.1390000529541577, 0.7008301371461622, 0.09631938828645387], 3.723607138829761e-07,
+         2.6103183199737243),
+        ([5.439234560342072, 2.0992735673252816, -13.029900141443427], 2.531541242187901e-09,
+         2.86309806649092),
+        ([2.580872003751626, -5.05491376376775, -5.837945308992216], 2.8610591008271826e-06,
+         4.966457368696757),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("step", [0.0, 1e-13, -1e-12, 1e-11, -1e-9])
+def test_no_stalled_maximum_counts_as_the_foot(
+    centre: list[float], beyond: float, angle: float, step: float
+) -> None:
+    """Just beyond the centre of a circle, at its farthest point: steps end in rounding errors."""
+    circle = FourierCurve.circle(centre, 1.0)
+    direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+    point = (np.array(centre) - beyond * direction).tolist()
+    result = Projector(circle).project(point, angle + step)
+    assert not result.converged or result.alpha < 1.0
 
 
 def test_maximum_is_left() -> None:
