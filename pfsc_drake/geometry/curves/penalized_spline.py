@@ -60,6 +60,7 @@ class PenalizedSpline:
             differences = following - differences[: following.shape[0]]
         self._differences = csr_array(differences) * math.sqrt(len(points) / intervals)
         self._closeness = self._basis.T @ self._basis
+        self._right = self._basis.T @ (points - self._centre)
         self._penalty = self._differences.T @ self._differences
 
     def fit(self, roughness: float, weights: np.ndarray | None = None) -> np.ndarray:
@@ -72,19 +73,17 @@ class PenalizedSpline:
         Returns:
             [intervals, dimension] if closed, else [intervals + degree, dimension].
         """
-        weighted, closeness = self._basis.T, self._closeness
+        closeness, right = self._closeness, self._right
         if weights is not None:
             weighted = csr_array(diags_array(weights) @ self._basis).T
-            closeness = weighted @ self._basis
+            closeness, right = weighted @ self._basis, weighted @ (self._points - self._centre)
         normal = closeness + roughness * self._penalty
         solve = splu(normal.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0).solve
-        moved = self._points - self._centre
-        coefficients = solve(weighted @ moved)
+        coefficients = solve(right)
         # A strong penalty makes the matrix ill-conditioned, but not the differences themselves.
         for _ in range(_REFINEMENTS):
-            rest = weighted @ (moved - self._basis @ coefficients)
             bent = self._differences.T @ (self._differences @ coefficients)
-            coefficients = coefficients + solve(rest - roughness * bent)
+            coefficients = coefficients + solve(right - closeness @ coefficients - roughness * bent)
         return np.asarray(coefficients + self._centre)
 
     def at_points(self, coefficients: np.ndarray) -> np.ndarray:

@@ -45,7 +45,7 @@ def test_smooth_paths_pass_in_silence(smoothness):
 @pytest.mark.parametrize("smoothness", [3, 5])
 @pytest.mark.parametrize("noise", [2e-5, 2e-4])
 def test_noise(smoothness, noise):
-    angle = np.linspace(0.0, 0.3, 100)  # 1 mm apart
+    angle = np.linspace(0.0, 0.12, 40)  # 1 mm apart
     points = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     points += noise * np.random.default_rng(0).normal(size=points.shape)
     (sentence,) = warnings(points, smoothness=smoothness)

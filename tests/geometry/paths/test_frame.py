@@ -178,7 +178,7 @@ def test_kinks_too_small_to_be_refused_do_not_add_up() -> None:
     found = ParallelTransportFrame(curve, e_0).normals(breaks[-1])[0]
     # two turns on great circles, from the first tangent to the last straight one, and up
     first, last = directions[0], directions[-1]
-    end = ([*last, 0.0, 0.0, 2.0]) / math.sqrt(5.0)
+    end = (last + np.array([0.0, 0.0, 2.0])) / math.sqrt(5.0)
     e_1 = e_0 - (e_0 @ last) / (1.0 + first @ last) * (first + last)
     e_2 = e_1 - (e_1 @ end) / (1.0 + last @ end) * (last + end)
     np.testing.assert_allclose(found, e_2, atol=1e-9)

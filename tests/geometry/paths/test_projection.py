@@ -195,6 +195,34 @@ def test_no_stalled_maximum_counts_as_the_foot(
     assert not result.converged or result.alpha < 1.0
 
 
+def test_a_step_that_overshoots_is_halved() -> None:
+    """Between two bends full steps of Newton's method go to and fro for ever."""
+    points = [
+        [-0.11535051720022994, 0.012813117540587025, 0.02659754115572893],
+        [0.11606088400600399, 0.05359802001989985, 0.050554667091403306],
+        [0.17207247192249286, -0.07557246021442587, -0.08119978047538409],
+        [0.22071125671825753, -0.17984778731589407, -0.20572198832362212],
+        [0.2831490670874785, -0.16973587947805696, -0.2125305128172127],
+        [0.23539170749444274, -0.32426069132120533, -0.22111818377081632],
+        [0.269404085667612, -0.322610318635475, -0.1550582995045272],
+        [0.49123447944386844, -0.2719930174950428, -0.06185399220643992],
+        [0.45390586180028014, -0.25639284025481723, -0.2409150248025054],
+        [0.480611618521719, -0.1856534164969723, -0.33608293420311974],
+    ]
+    point, guess = (
+        [0.292585444369587, -0.25847094679877924, 0.04290028416161609],
+        0.7078023964083564,
+    )
+    curve = interpolate(points, smoothness=3)
+    result = Projector(curve).project(point, guess)
+    assert result.converged
+    assert result.iterations < 20
+    sigma, slope = curve.derivatives(result.theta, 1)
+    assert abs((np.array(point) - sigma) @ slope) < 1e-11
+    before = np.linalg.norm(np.array(point) - curve.derivatives(guess, 0)[0])
+    assert np.linalg.norm(np.array(point) - sigma) < before
+
+
 def test_maximum_is_left() -> None:
     circle = FourierCurve.circle([0, 0, 0], 1.0)
     result = Projector(circle).project([0.5, 0.0, 0.0], math.pi - 0.01)
