@@ -25,17 +25,22 @@ from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
+from diagrams.tasks.path import require_orientation
 from diagrams.tasks.path_following import make_task
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
+from pfsc_drake.geometry.paths.smoothing import Progress
 
 
-def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
+def build_station(
+    scenario: PathFollowingScenario, folder: FilePath, progress: Progress | None = None
+) -> Station:
     """Build the station of a scenario.
 
     Args:
         scenario: The scenario.
         folder: Where the scenario's relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -43,9 +48,10 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder, task = DiagramBuilder(), make_task(scenario, folder)
+    builder, task = DiagramBuilder(), make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
+    require_orientation(task.path, part.robot.dimension)
     law = make_law(scenario.controller, part.robot, task.manifold)
     start, initial_state = _start(scenario, task, part, workpiece)
     on_motors = scenario.controller.law == "rigid" and not part.robot.is_rigid
@@ -80,7 +86,7 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
         initial_state,
         start.theta,
         on_motors,
-        law_warnings(scenario, part.robot, link_state) + sensor_warnings(scenario),
+        task.warnings + law_warnings(scenario, part.robot, link_state) + sensor_warnings(scenario),
         workpiece,
     )
 

@@ -15,6 +15,7 @@ from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
 from experiments.length import check_length
+from experiments.progress import ProgressListener
 from experiments.results.targets import check_targets
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError, shortened
@@ -44,13 +45,20 @@ class PreparedRun:
     warnings: list[str]
 
 
-def prepare(scenario: ScenarioFile, duration: float | None, *, recording: bool) -> PreparedRun:
+def prepare(
+    scenario: ScenarioFile,
+    duration: float | None,
+    *,
+    recording: bool,
+    progress: ProgressListener,
+) -> PreparedRun:
     """Build a scenario's station and check everything that can be checked beforehand.
 
     Args:
         scenario: The scenario as read.
         duration: Simulated time [s] instead of the scenario's.
         recording: Whether the motion will be recorded.
+        progress: Told what goes on.
 
     Raises:
         InputError: If the scenario is wrong.
@@ -58,12 +66,13 @@ def prepare(scenario: ScenarioFile, duration: float | None, *, recording: bool) 
     settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
     with _naming(scenario.path):
-        station = _build(settings, folder)
+        station = _build(settings, folder, progress)
         check_targets(settings, station)
         settings.name = settings.name or scenario.name
         settings.duration = duration or settings.duration or station.reference_duration
         check_length(settings, station)
-        station, integration = _integrated(settings, folder, station)
+        progress(0.0, "choosing the integration")
+        station, integration = _integrated(settings, folder, station, progress)
         drawing = draw_station(settings, folder, station) if recording else None
     _resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
@@ -71,13 +80,16 @@ def prepare(scenario: ScenarioFile, duration: float | None, *, recording: bool) 
     return PreparedRun(settings, text, folder, station, integration, drawing, warnings)
 
 
-def _build(settings: PathFollowingScenario, folder: Path) -> Station:
+def _build(settings: PathFollowingScenario, folder: Path, progress: ProgressListener) -> Station:
+    def tell(fraction: float, phase: str) -> None:
+        progress(0.0, f"{phase}, {fraction:.0%}")
+
     with compiled_when_bound():
-        return build_station(settings, folder)
+        return build_station(settings, folder, tell)
 
 
 def _integrated(
-    settings: PathFollowingScenario, folder: Path, station: Station
+    settings: PathFollowingScenario, folder: Path, station: Station, progress: ProgressListener
 ) -> tuple[Station, Integration]:
     """Settle the integration in the settings, and return it and a station that is made for it.
 
@@ -87,7 +99,7 @@ def _integrated(
     longest = min(settings.simulation.max_step, station.controller.period)
     settings.simulation = integration.applied_to(settings.simulation)
     if integration.step < longest:  # friction is made for the step
-        station = _build(settings, folder)
+        station = _build(settings, folder, progress)
     return station, integration
 
 

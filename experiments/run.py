@@ -24,6 +24,7 @@ from experiments.results.path_metrics import path_following_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.shape_metrics import shape_metrics
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
 
@@ -96,7 +97,7 @@ def run_scenario(
     progress(0.0, "preparing")
     inputs = scenario.inputs()
     check_folder(out, "run", inputs)
-    prepared = prepare(scenario, duration, recording=recording)
+    prepared = prepare(scenario, duration, recording=recording, progress=progress)
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         measured = _measure(prepared, scenario.name, results, progress, interrupted)
@@ -146,6 +147,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.update(shape_metrics(station.task.shape))
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")

@@ -4,6 +4,7 @@ from diagrams.scenario import PathFollowingScenario
 from diagrams.station import Station
 from experiments.results.path_metrics import metric_names
 from experiments.results.run_signals import optional_signals
+from experiments.results.shape_metrics import shape_metrics
 from pfsc_drake.errors import InputError
 
 # signals that another law may log on the same robot
@@ -25,6 +26,7 @@ def check_targets(settings: PathFollowingScenario, station: Station) -> None:
         other = set() if law == settings.controller.law else _OF_OTHER_LAWS
         known = [
             *metric_names(station.robot.dimension, signals | other),
+            *shape_metrics(station.task.shape),
             "real_time_factor",
             "controller_tick_us",
             "controller_tick_us_p99",

@@ -50,7 +50,7 @@ def test_law_for_elastic_joints_on_a_rigid_robot(refused, mine, law):
 
 
 def test_as_many_outputs_as_joints(refused, mine):
-    parts = ("6 joints", "3 outputs", "position only")
+    parts = ("6 joints", "3 outputs", "position only", "keyframes: [{angles_deg: [0, 0, 0]}]")
     refused(mine(SIX), *parts, changes=["path.orientation.keyframes=[]"])
     parts = ("3 joints", "6 outputs", "position and orientation")
     refused(mine(), *parts, changes=["path.orientation.keyframes=[{theta: 0}]"])
