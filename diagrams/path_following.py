@@ -98,7 +98,8 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_state,
         initial_theta,
         on_motors,
-        law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
+        arm.warnings
+        + law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
         + sensor_warnings(scenario),
         arm,
     )

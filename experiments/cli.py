@@ -110,7 +110,7 @@ def study_command(
     """Which law when: all laws on joints of rising stiffness (about a minute)."""
     from experiments.studies.stiffness import write_study
 
-    logging.getLogger("drake").setLevel(logging.ERROR)
+    logging.getLogger("drake").setLevel(logging.WARNING)
     console = Console()
     page = write_study(out, lambda line: console.print(line, highlight=False, markup=False))
     console.print(f"Open the study: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
@@ -150,7 +150,7 @@ def _run(
     """Runs a scenario with progress and prints what came out; returns the exit status."""
     from experiments.run import run_scenario
 
-    logging.getLogger("drake").setLevel(logging.ERROR)
+    logging.getLogger("drake").setLevel(logging.WARNING)
     console = Console()
     with ProgressDisplay(console, scenario.name, duration) as progress:
         outcome = run_scenario(

@@ -10,7 +10,7 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
-from diagrams.robots.model import add_robot, read_robot, tool_frame
+from diagrams.robots.model import read_robot, tool_frame
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
     connect_actuation,
@@ -35,12 +35,14 @@ class Arm(ABC):
         chain: The arm as the laws know it, N joints.
         coordinates: Where its coordinates stand in the state of ``model``.
         tool: Frame whose origin follows the path.
+        warnings: What there is to say about the model, one sentence each.
     """
 
     model: MultibodyPlant
     chain: SerialChain
     coordinates: PlantCoordinates
     tool: Frame
+    warnings: list[str]
 
     @property
     @abstractmethod
@@ -181,27 +183,23 @@ def add_arm(builder: DiagramBuilder, parameters: RobotParameters, folder: FilePa
         folder: Where relative file names start.
 
     Raises:
-        InputError: If the model cannot be read, is no chain of driven joints, or its rotors are
-            not known.
+        InputError: If the model cannot be read, is no chain of joints, or its rotors are not
+            known.
     """
     coupled = parameters.rotor_coupling
-    model = read_robot(parameters, folder) if coupled else add_robot(builder, parameters, folder)
+    model, warnings = read_robot(parameters, folder)
     tool = tool_frame(model, parameters)
     chain, coordinates = chain_from_plant(model, tool)
-    undriven = [n for n, a in zip(chain.names, coordinates.actuators, strict=True) if a < 0]
-    if undriven:
-        raise InputError(
-            f"robot.model: {', '.join(undriven)} without actuator; every joint needs one"
-        )
     if not coupled:
-        return MultibodyArm(model, chain, coordinates, tool)
+        builder.AddNamedSystem("plant", model)
+        return MultibodyArm(model, chain, coordinates, tool, warnings)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
         plant = FullElasticPlant(chain, mounts_from_parameters(chain, robot))
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(model, chain, coordinates, tool, plant)
+    return CoupledArm(model, chain, coordinates, tool, warnings, plant)
 
 
 def joint_state_of(

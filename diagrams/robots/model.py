@@ -2,54 +2,32 @@
 
 from pathlib import Path as FilePath
 
-import numpy as np
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    ForceElementIndex,
-    Frame,
-    Joint,
-    JointIndex,
-    PrismaticSpring,
-    RevoluteSpring,
-)
+from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import add_models_to, resolve_model
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.reading import ModelOptions, read_model
 
 
-def add_robot(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath
-) -> MultibodyPlant:
-    """Add a continuous plant with a robot, without geometry.
-
-    Args:
-        builder: Builder of the diagram.
-        parameters: Which robot.
-        folder: Where relative file names start.
-
-    Raises:
-        InputError: If the model cannot be read.
-    """
-    return builder.AddNamedSystem("plant", read_robot(parameters, folder))
-
-
-def read_robot(parameters: RobotParameters, folder: FilePath) -> MultibodyPlant:
+def read_robot(parameters: RobotParameters, folder: FilePath) -> tuple[MultibodyPlant, list[str]]:
     """Return a continuous plant with a robot, without geometry and in no diagram.
 
     Args:
         parameters: Which robot.
         folder: Where relative file names start.
 
+    Returns:
+        The plant, and what there is to say about the model, one sentence each.
+
     Raises:
         InputError: If the model cannot be read.
     """
     plant = MultibodyPlant(time_step=0.0)
-    _parse(plant, parameters, folder)
-    return plant
+    return plant, _read(plant, parameters, folder)
 
 
 def add_visible_robot(
@@ -68,51 +46,21 @@ def add_visible_robot(
     plant = MultibodyPlant(time_step=0.0)
     scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    _parse(plant, parameters, folder)
+    _read(plant, parameters, folder)
     return plant, scene_graph
 
 
-def _parse(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath) -> None:
-    parser = Parser(plant)
-    add_models_to(parser.package_map())
+def _read(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath) -> list[str]:
     model = parameters.model
     if FilePath(model).suffix and not model.startswith("package://"):
         model = str(folder / model)
-    file = resolve_model(model)
     try:
-        parser.AddModels(str(file))
-    except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"robot.model: {file}: cannot be read: {reason}") from None
-    if parameters.joint_damping:
-        _set_joint_damping(plant, parameters)
-    plant.Finalize()
-
-
-def _set_joint_damping(plant: MultibodyPlant, parameters: RobotParameters) -> None:
-    """Give the sprung joints, base first, another damping ``K_d`` than the model's."""
-    inboard = {joint.child_body().index(): joint for joint in _joints(plant)}
-    springs = (
-        plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
-    )
-    sprung = [s.joint() for s in springs if isinstance(s, RevoluteSpring | PrismaticSpring)]
-
-    def depth(joint: Joint) -> int:
-        below = inboard.get(joint.parent_body().index())
-        return 0 if below is None else 1 + depth(below)
-
-    damping = parameters.joint_damping
-    if len(damping) != len(sprung):
-        raise InputError(
-            f"robot.joint_damping: {len(damping)} values; the model {parameters.model} has "
-            f"{len(sprung)} elastic joints"
-        )
-    for joint, K_d in zip(sorted(sprung, key=depth), damping, strict=True):
-        joint.set_default_damping_vector(np.array([K_d]))
-
-
-def _joints(plant: MultibodyPlant) -> list[Joint]:
-    return [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
+        return read_model(plant, resolve_model(model), parameters.options(folder))
+    except InputError as error:
+        # what starts with an option is about the key of that name, the rest about the file
+        key = str(error).split(":")[0].split(".")[0]
+        about_key = key in ModelOptions.__dataclass_fields__
+        raise InputError(f"robot.{'' if about_key else 'model: '}{error}") from None
 
 
 def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:

@@ -4,6 +4,7 @@ import dataclasses as dc
 
 from diagrams.scenario.checks import require
 from diagrams.scenario.notch import NotchParameters
+from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.schema import PathFollowingScenario
 
 
@@ -36,9 +37,10 @@ class DeltaFollowingScenario(PathFollowingScenario):
         force = self.hold_back.force
         require(force == 0.0, "hold_back.force", force, "0 for a DELTA robot")
         require(not self.friction.is_given, "friction", "a block", "drive_friction here")
-        for key in ("joint_damping", "rotor_coupling"):
-            value = getattr(self.robot, key)
-            require(not value, f"robot.{key}", value, "none for a DELTA robot")
+        for key, none in dc.asdict(RobotParameters()).items():
+            value = dc.asdict(self.robot)[key]
+            given = key not in ("model", "tool_frame") and value != none
+            require(not given, f"robot.{key}", value, "none for a DELTA robot")
         measured = self.compliance.is_given or self.controller.external_torque.source == "measured"
         allowed = "only with a notch, nothing else touches a DELTA robot"
         require(self.notch is not None or not measured, "compliance", "a block", allowed)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
-from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.robots.model import add_robot, tool_frame
+from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import PathFollowingScenario, RobotParameters
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -21,7 +20,7 @@ class Arm:
 
     def __init__(self, model: str) -> None:
         parameters = RobotParameters(model)
-        self.plant: MultibodyPlant = add_robot(DiagramBuilder(), parameters, Path())
+        self.plant: MultibodyPlant = read_robot(parameters, Path())[0]
         self.tool = tool_frame(self.plant, parameters)
         self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
         self.n = self.chain.dimension

@@ -7,7 +7,7 @@ import pytest
 from pydrake.geometry import Role
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.robots.model import add_robot, add_visible_robot, tool_frame
+from diagrams.robots.model import add_visible_robot, read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
@@ -16,7 +16,8 @@ SHIPPED = "comau_racer_1_4_elastic_3r"
 
 
 def add(model, folder=Path()):
-    return add_robot(DiagramBuilder(), RobotParameters(model), folder)
+    plant, _ = read_robot(RobotParameters(model), folder)
+    return plant
 
 
 @pytest.mark.parametrize(
@@ -29,14 +30,13 @@ def add(model, folder=Path()):
     ],
 )
 def test_shipped_robots_are_continuous_and_without_geometry(model, positions, drives):
-    builder = DiagramBuilder()
-    plant = add_robot(builder, RobotParameters(model), Path())
+    plant, warnings = read_robot(RobotParameters(model), Path())
+    assert warnings == []
     assert plant.num_positions() == plant.num_velocities() == positions
     assert plant.num_actuators() == drives
     assert plant.is_finalized()
     assert plant.time_step() == 0.0
     assert not plant.geometry_source_is_registered()
-    assert builder.HasSubsystemNamed("plant")
 
 
 def test_visible_robot_has_pictures_and_nothing_to_collide():
