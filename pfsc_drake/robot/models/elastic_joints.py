@@ -1,10 +1,12 @@
 """Joints of a parsed model that become elastic, eq. (2.65), and rotors of rigid ones."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
+    Joint,
     PrismaticSpring,
     RevoluteJoint,
     RevoluteSpring,
@@ -96,6 +98,7 @@ def make_elastic(plant: MultibodyPlant, parameters: ElasticJoints) -> None:
     damping = _for_each(parameters.damping, "damping", names, 0.0)
     rotor_inertia = _for_each(parameters.rotor_inertia, "rotor_inertia", names, np.nan)
     gear_ratio = _for_each(parameters.gear_ratio, "gear_ratio", names, np.nan)
+    springs = []
     for i, joint in enumerate(joints):
         drive = actuator_of(plant, joint)
         if drive is None:
@@ -125,8 +128,20 @@ def make_elastic(plant: MultibodyPlant, parameters: ElasticJoints) -> None:
                 damping=damping[i],
             )
         )
-        spring = RevoluteSpring if taken.kind is RevoluteJoint else PrismaticSpring
-        plant.AddForceElement(spring(flex, 0.0, stiffness[i]))
+        springs.append((flex, stiffness[i]))
+    add_springs(plant, springs)
+
+
+def add_springs(plant: MultibodyPlant, springs: Iterable[tuple[Joint, float]]) -> None:
+    """Add springs, which rest at zero; joints cannot be taken out of the plant any more.
+
+    Args:
+        plant: A plant that is not finalized.
+        springs: Revolute or prismatic joints with their stiffness [Nm/rad or N/m].
+    """
+    for joint, stiffness in springs:
+        spring = RevoluteSpring if isinstance(joint, RevoluteJoint) else PrismaticSpring
+        plant.AddForceElement(spring(joint, 0.0, stiffness))
 
 
 def set_joint_damping(plant: MultibodyPlant, damping: list[float]) -> None:

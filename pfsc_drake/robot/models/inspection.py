@@ -36,12 +36,14 @@ class ModelFacts:
         without_inertia: Where each link without ``<inertial>`` stands, by its name.
         effort_limits: Effort limits of URDF joints, by name [Nm or N].
         friction: Joints with dry friction.
+        springs: Stiffness of the sprung joints of the model itself, by name.
         mimics: Number of joints that follow others; all of them are fixed.
     """
 
     without_inertia: dict[str, str] = field(default_factory=dict)
     effort_limits: dict[str, float] = field(default_factory=dict)
     friction: list[str] = field(default_factory=list)
+    springs: dict[str, float] = field(default_factory=dict)
     mimics: int = 0
 
 
@@ -171,6 +173,8 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
             numbers = _check_joint(joint, values, fixed, negative_is_unlimited=True)
             if numbers.get("friction", 0.0) > 0.0:
                 facts.friction.append(joint.name)
+            if numbers.get("spring_stiffness", 0.0) > 0.0:
+                facts.springs[joint.name] = numbers["spring_stiffness"]
             for key, allowed in _DRIVE.items():
                 for part in element.all(key):
                     joint.number(key, part.text, allowed, part)

@@ -20,7 +20,6 @@ from pfsc_drake.robot.models.joint_edits import (
     joints_of,
     moving_joints,
     pose_at,
-    sprung_joints,
     take_joint,
 )
 
@@ -29,12 +28,11 @@ def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
     """Weld joints where they stand.
 
     Args:
-        plant: A plant that is not finalized.
+        plant: A plant that is not finalized, without springs.
         values: Positions by joint name [rad or m].
 
     Raises:
-        InputError: If there is no such joint, it cannot be fixed, or the value is beyond its
-            limits.
+        InputError: If there is no such joint, or the value is beyond its limits.
     """
     for name, value in values.items():
         movable = {
@@ -46,8 +44,6 @@ def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
             allowed = ", ".join(movable) or "none, nothing moves"
             raise InputError(f"fixed_joints: '{name}'; allowed: {allowed}")
         joint = movable[name]
-        if joint.index() in {sprung.index() for sprung in sprung_joints(plant)}:
-            raise InputError(f"fixed_joints: '{name}' carries a spring; allowed: other joints")
         lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
         if not lower <= value <= upper:
             unit = "rad" if isinstance(joint, RevoluteJoint) else "m"
@@ -63,7 +59,7 @@ def place_base(plant: MultibodyPlant, base: str, X_WB: RigidTransform) -> None:
     """Weld a model to the world where its base is to stand.
 
     Args:
-        plant: A plant that is not finalized.
+        plant: A plant that is not finalized, without springs.
         base: Frame B of the model; if empty the root link of a model that floats, or the world
             frame of a model that is attached to the world.
         X_WB: Pose of B in the world.

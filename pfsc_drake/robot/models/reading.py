@@ -22,7 +22,12 @@ from pydrake.multibody.tree import (
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.drake_messages import DrakeMessages, collected_messages, one_line
-from pfsc_drake.robot.models.elastic_joints import ElasticJoints, make_elastic, set_joint_damping
+from pfsc_drake.robot.models.elastic_joints import (
+    ElasticJoints,
+    add_springs,
+    make_elastic,
+    set_joint_damping,
+)
 from pfsc_drake.robot.models.inclusion import read_with_inclusions
 from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
@@ -31,7 +36,7 @@ from pfsc_drake.robot.models.joint_edits import (
     moving_joints,
     sprung_joints,
 )
-from pfsc_drake.robot.models.materials import with_distinct_materials
+from pfsc_drake.robot.models.model_text import usable_text
 from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
 from pfsc_drake.robot.models.packages import packages_for
 from pfsc_drake.robot.models.placement import fix_joints, place_base
@@ -67,6 +72,12 @@ class ModelOptions:
     elastic: ElasticJoints = field(default_factory=ElasticJoints)
     joint_damping: list[float] = field(default_factory=list)
 
+    @property
+    def moves_joints(self) -> bool:
+        """Whether joints of the model are fixed or stand elsewhere."""
+        placed = bool(self.base) or not self.base_pose.IsExactlyIdentity()
+        return placed or bool(self.fixed_joints)
+
 
 def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None = None) -> list[str]:
     """Add a robot to an empty plant and finalize it.
@@ -93,16 +104,22 @@ def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None =
     packages = packages_for(file, model.content, options.packages)
     models = read_with_inclusions(file, packages)
     facts = inspect_model(models, frozenset(options.fixed_joints))
+    sprung = [name for name in options.fixed_joints if name in facts.springs]
+    if sprung:
+        raise InputError(f"fixed_joints: '{sprung[0]}' carries a spring; allowed: other joints")
     with collected_messages() as messages:
         parser = Parser(plant)
         parser.package_map().AddMap(packages)
         with _named(file, "cannot be read"):
-            _parse(parser, model)
+            _parse(parser, model, without_springs=options.moves_joints)
         _refuse_replaced_inertia(file, messages)
         with _named(file, "cannot be simulated"):
             _take_constraints(plant, file, facts)
             fix_joints(plant, options.fixed_joints)
             place_base(plant, options.base, options.base_pose)
+            if options.moves_joints:
+                springs = facts.springs.items()
+                add_springs(plant, [(plant.GetJointByName(j), K_s) for j, K_s in springs])
             _require_inertia(plant, model, facts)
             _drive(plant, file, facts)
             unlimited = _release_velocities(plant)
@@ -149,12 +166,12 @@ def _named(file: Path, trouble: str) -> Iterator[None]:
         raise InputError(f"{file}: {trouble}: {one_line(error)}") from None
 
 
-def _parse(parser: Parser, model: ModelXml) -> None:
-    edited = with_distinct_materials(model)
+def _parse(parser: Parser, model: ModelXml, without_springs: bool) -> None:
+    edited = usable_text(model, without_springs=without_springs)
     if edited is None:
         parser.AddModels(str(model.file))
     else:
-        parser.AddModelsFromString(edited, "urdf")
+        parser.AddModelsFromString(edited, model.file.suffix[1:].lower())
 
 
 def _refuse_replaced_inertia(file: Path, messages: DrakeMessages) -> None:
