@@ -19,7 +19,7 @@ from diagrams.tasks.following import Task, add_law, add_place_on_path, reference
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.path import make_path
-from diagrams.tasks.start import start_state
+from diagrams.tasks.start import posture_warnings, start_state
 from pfsc_drake.robot.serial.chain import SerialChain
 
 
@@ -99,6 +99,11 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
         initial_theta,
         on_motors,
         arm.warnings
+        + posture_warnings(
+            scenario.start.posture_deg,
+            chain,
+            (coordinates.link_rows @ initial_state)[: chain.dimension],
+        )
         + law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
         + sensor_warnings(scenario),
         arm,

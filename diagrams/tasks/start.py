@@ -12,6 +12,12 @@ from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 
+# from where on a posture that was found is another one than the posture given
+_FAR_DEG = 60.0
+_FAR_SLIDE = 0.3  # m
+# by how much radians must fit better than degrees to be what was meant
+_MUCH_NEARER = 3.0
+
 
 @dataclass(frozen=True)
 class StartPoint:
@@ -110,6 +116,54 @@ def check_points(points: list[float], path: Path) -> None:
             raise InputError(
                 f"reference.points: {eta:g} m; the path is open and {path.length:.6g} m long"
             )
+
+
+def describe_posture(chain: SerialChain, q: np.ndarray) -> str:
+    """Return a posture in one line, e.g. ``shoulder -12.5 deg, lift 0.2 m``.
+
+    Args:
+        chain: The robot.
+        q: Joint coordinates, shape (N,) [rad or m].
+    """
+    return ", ".join(
+        f"{link.name} {np.rad2deg(value):.4g} deg"
+        if link.is_revolute
+        else f"{link.name} {value:.4g} m"
+        for link, value in zip(chain.links, q, strict=True)
+    )
+
+
+def posture_warnings(posture_deg: list[float], chain: SerialChain, q_J: np.ndarray) -> list[str]:
+    """Return what is odd about a given start posture, one sentence each.
+
+    Args:
+        posture_deg: As the scenario gives it; empty for none.
+        chain: The robot.
+        q_J: The start posture found from there, shape (N,) [rad or m].
+    """
+    if not posture_deg:
+        return []
+    is_angle = np.array([link.is_revolute for link in chain.links])
+    unit = np.where(is_angle, np.deg2rad(_FAR_DEG), _FAR_SLIDE)
+    distance = np.abs(q_J - _posture(posture_deg, chain)) / unit
+    if distance.max() <= 1.0:
+        return []
+    found = describe_posture(chain, q_J)
+    # the same digits, as radians: all within a turn, and much nearer to what was found
+    as_radians = np.abs(q_J - np.array(posture_deg)) / unit
+    small = np.abs(posture_deg)[is_angle].max(initial=0.0) <= 2.0 * np.pi
+    if small and as_radians.max() < distance.max() / _MUCH_NEARER:
+        in_degrees = np.where(is_angle, np.rad2deg(posture_deg), posture_deg)
+        written = ", ".join(f"{value:.4g}" for value in in_degrees)
+        return [
+            f"start.posture_deg: {posture_deg} looks like radians; the robot starts at {found}: "
+            f"write [{written}]"
+        ]
+    worst = chain.names[int(distance.argmax())]
+    return [
+        f"start.posture_deg: {posture_deg} is far from any solution, {worst} most; the robot "
+        f"starts at {found}, perhaps in another configuration than meant"
+    ]
 
 
 def _posture(posture_deg: list[float], chain: SerialChain) -> np.ndarray:

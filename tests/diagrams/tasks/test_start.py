@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Circle, Line
 from diagrams.tasks.path import make_path
-from diagrams.tasks.start import start_state
+from diagrams.tasks.start import describe_posture, posture_warnings, start_state
 from pfsc_drake.errors import InputError
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
@@ -190,3 +190,68 @@ def test_posture_of_another_robot(on_line, start, posture):
     settings = on_line()
     settings.start.posture_deg = posture
     refused(start, settings, "start.posture_deg", str(len(posture)), "3 joints")
+
+
+def beam(name, joint):
+    """Return a link of a robot, and the joint that carries it, as URDF."""
+    return (
+        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
+        f'ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="{name}_joint" {joint}</joint>'
+    )
+
+
+@pytest.fixture
+def on_rails(tmp_path, load_scenario):
+    """A scenario of a robot with a rail, a lift and an arm of 1 m; it starts at (0, 0.6, 0.2)."""
+    limit = '<limit lower="-3" upper="3" effort="100" velocity="1"/>'
+    rail = f'type="prismatic"><parent link="world"/><child link="rail"/>{limit}'
+    lift = f'type="prismatic"><parent link="rail"/><child link="lift"/><axis xyz="0 0 1"/>{limit}'
+    arm = f'type="revolute"><parent link="lift"/><child link="arm"/><axis xyz="0 0 1"/>{limit}'
+    tool = (
+        '<link name="tool_point"/><joint name="t" type="fixed"><parent link="arm"/>'
+        '<child link="tool_point"/><origin xyz="1 0 0"/></joint>'
+    )
+    file = tmp_path / "rails.urdf"
+    text = '<link name="world"/>' + beam("rail", rail) + beam("lift", lift) + beam("arm", arm)
+    file.write_text(f'<robot name="rails">{text}{tool}</robot>', encoding="utf-8")
+    settings = load_scenario(THREE)
+    settings.robot.model = str(file)
+    settings.path.shape = Line([0.0, 0.6, 0.2], [0.5, 0.6, 0.2])
+    settings.reference.points, settings.start.offset = [0.0, 0.4], [0.0, 0.0]
+    return settings
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
+    """The arm reaches the point from either side; the place on the rail says from which."""
+    on_rails.start.posture_deg = [0.8 * side, 0.2, 90.0 - 5.0 * side]
+    _, _, arm, x = start(on_rails)
+    q = (arm.coordinates.link_rows @ x)[:3]
+    np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
+    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q) == []
+    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q)
+    assert "lift_joint most" in warning and f"rail_joint {0.8 * side:g} m" in warning
+
+
+def test_a_posture_in_radians(load_scenario, start):
+    settings = load_scenario(SIX)
+    given = settings.start.posture_deg
+    _, _, arm, x = start(settings)
+    found = (arm.coordinates.link_rows @ x)[:6]
+    assert posture_warnings(given, arm.chain, found) == []
+    assert posture_warnings([], arm.chain, found) == []
+    (warning,) = posture_warnings(np.deg2rad(given).round(2).tolist(), arm.chain, found)
+    line = describe_posture(arm.chain, found)
+    assert "radians" in warning and line in warning
+    assert "write [25.21, 115.2, -40.11, -5.157, 95.11, -17.19]" in warning
+    assert line.startswith(f"motor_1 {np.rad2deg(found[0]):.4g} deg, motor_2 ")
+
+
+def test_a_posture_far_from_any_solution(load_scenario, start):
+    _, _, arm, x = start(load_scenario(SIX))
+    found = (arm.coordinates.link_rows @ x)[:6]
+    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found)
+    assert "far from any solution, motor_6 most" in warning
+    # small angles in degrees are no radians
+    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found)
+    assert "far from any solution" in warning
