@@ -4,13 +4,16 @@ from pathlib import Path as FilePath
 
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame
+from pydrake.multibody.tree import Frame, FrameIndex
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
+
+# of a model that are worth naming; the last are those at the tool
+_MOST_NAMES = 12
 
 
 def read_robot(parameters: RobotParameters, folder: FilePath) -> tuple[MultibodyPlant, list[str]]:
@@ -74,7 +77,10 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
         InputError: If the model has no such frame.
     """
     if not plant.HasFrameNamed(parameters.tool_frame):
+        frames = (plant.get_frame(FrameIndex(i)) for i in range(1, plant.num_frames()))
+        names = [frame.name() for frame in frames if frame.name()]
         raise InputError(
-            f"robot.tool_frame: the model {parameters.model} has no frame '{parameters.tool_frame}'"
+            f"robot.tool_frame: the model {parameters.model} has no frame "
+            f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
         )
     return plant.GetFrameByName(parameters.tool_frame)

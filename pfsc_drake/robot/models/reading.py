@@ -33,6 +33,7 @@ from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
     bodies_of,
+    inboard_joints,
     moving_joints,
     sprung_joints,
 )
@@ -125,6 +126,7 @@ def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None =
             unlimited = _release_velocities(plant)
             make_elastic(plant, options.elastic)
             set_joint_damping(plant, options.joint_damping)
+            _require_rotors(plant, file)
             plant.mutable_gravity_field().set_gravity_vector(options.gravity)
             plant.Finalize()
             _require_regular_mass_matrix(plant, file)
@@ -253,6 +255,20 @@ def _drive(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> None:
                 "allowed: a positive effort limit"
             )
         plant.AddJointActuator(joint.name(), joint, effort_limit)
+
+
+def _require_rotors(plant: MultibodyPlant, file: Path) -> None:
+    """Refuse motors of elastic joints without inertia; nothing would hold against the spring."""
+    inboard = inboard_joints(plant)
+    for sprung in sprung_joints(plant):
+        motor = inboard.get(sprung.parent_body().index())
+        drive = None if motor is None else actuator_of(plant, motor)
+        if drive is not None and not drive.default_reflected_inertia() > 0.0:
+            raise InputError(
+                f"{file}: joint '{drive.joint().name()}': rotor_inertia * gear_ratio^2 = "
+                f"{drive.default_reflected_inertia():g}; allowed: a positive number in front of "
+                "an elastic joint"
+            )
 
 
 def _release_velocities(plant: MultibodyPlant) -> list[str]:

@@ -209,3 +209,16 @@ def test_shipped_models_give_no_warnings():
         scene_graph = SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         assert read_model(plant, resolve_model(name)) == []
+
+
+WRITTEN = "<drake:rotor_inertia>0.000611</drake:rotor_inertia>"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(WRITTEN, ""), (WRITTEN, "<drake:rotor_inertia>0</drake:rotor_inertia>")]
+)
+def test_motors_of_elastic_joints_without_inertia(write, read, refused, old, new):
+    text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
+    assert old in text
+    file = write(text.replace(old, new), "arm.sdf")
+    refused(lambda: read(file), file, "'motor_1'", "rotor_inertia", "positive")
