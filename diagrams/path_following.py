@@ -103,6 +103,7 @@ def build_path_following(scenario: PathFollowingScenario, folder: FilePath) -> P
             scenario.start.posture_deg,
             chain,
             (coordinates.link_rows @ initial_state)[: chain.dimension],
+            path.orientation is not None,
         )
         + law_warnings(scenario, chain, coordinates.link_rows @ initial_state)
         + sensor_warnings(scenario),

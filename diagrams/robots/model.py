@@ -4,7 +4,7 @@ from pathlib import Path as FilePath
 
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, FrameIndex
+from pydrake.multibody.tree import Frame, FrameIndex, JointIndex
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
@@ -77,8 +77,11 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
         InputError: If the model has no such frame.
     """
     if not plant.HasFrameNamed(parameters.tool_frame):
-        frames = (plant.get_frame(FrameIndex(i)) for i in range(1, plant.num_frames()))
-        names = [frame.name() for frame in frames if frame.name()]
+        frames = [plant.get_frame(FrameIndex(i)).name() for i in range(1, plant.num_frames())]
+        joints = [plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()]
+        # Drake's own frames at joints are not the user's
+        made = {f"{joint}_{end}" for joint in joints for end in ("parent", "child", "base")}
+        names = [name for name in frames if name and name not in made]
         raise InputError(
             f"robot.tool_frame: the model {parameters.model} has no frame "
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"

@@ -8,15 +8,13 @@ from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.robot.inverse_kinematics import solve_pose
-from pfsc_drake.robot.robot_model import gravity_function
+from pfsc_drake.robot.robot_model import gravity_function, pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 
 # from where on a posture that was found is another one than the posture given
 _FAR_DEG = 60.0
 _FAR_SLIDE = 0.3  # m
-# by how much radians must fit better than degrees to be what was meant
-_MUCH_NEARER = 3.0
 
 
 @dataclass(frozen=True)
@@ -133,13 +131,16 @@ def describe_posture(chain: SerialChain, q: np.ndarray) -> str:
     )
 
 
-def posture_warnings(posture_deg: list[float], chain: SerialChain, q_J: np.ndarray) -> list[str]:
+def posture_warnings(
+    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
+) -> list[str]:
     """Return what is odd about a given start posture, one sentence each.
 
     Args:
         posture_deg: As the scenario gives it; empty for none.
         chain: The robot.
         q_J: The start posture found from there, shape (N,) [rad or m].
+        oriented: Whether the pose that was looked for has an orientation.
     """
     if not posture_deg:
         return []
@@ -149,10 +150,7 @@ def posture_warnings(posture_deg: list[float], chain: SerialChain, q_J: np.ndarr
     if distance.max() <= 1.0:
         return []
     found = describe_posture(chain, q_J)
-    # the same digits, as radians: all within a turn, and much nearer to what was found
-    as_radians = np.abs(q_J - np.array(posture_deg)) / unit
-    small = np.abs(posture_deg)[is_angle].max(initial=0.0) <= 2.0 * np.pi
-    if small and as_radians.max() < distance.max() / _MUCH_NEARER:
+    if _fits_in_radians(posture_deg, chain, q_J, oriented):
         in_degrees = np.where(is_angle, np.rad2deg(posture_deg), posture_deg)
         written = ", ".join(f"{value:.4g}" for value in in_degrees)
         return [
@@ -164,6 +162,24 @@ def posture_warnings(posture_deg: list[float], chain: SerialChain, q_J: np.ndarr
         f"start.posture_deg: {posture_deg} is far from any solution, {worst} most; the robot "
         f"starts at {found}, perhaps in another configuration than meant"
     ]
+
+
+def _fits_in_radians(
+    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
+) -> bool:
+    """Return whether the same digits, as radians, are next to a solution of their own."""
+    angles = np.array([link.is_revolute for link in chain.links])
+    as_radians = np.array(posture_deg)
+    turns = np.abs(as_radians[angles]).max(initial=0.0)
+    if not 0.0 < turns <= 2.0 * np.pi:
+        return False
+    pose = np.array(pose_function(chain)(q_J)).ravel()
+    R_e = pose[3:].reshape(3, 3) if oriented else None
+    try:
+        solution = solve_pose(chain, pose[:3], R_e, as_radians, "start")
+    except InputError:
+        return False
+    return bool(np.all(np.abs(solution - as_radians)[angles] < np.deg2rad(_FAR_DEG)))
 
 
 def _posture(posture_deg: list[float], chain: SerialChain) -> np.ndarray:

@@ -228,8 +228,8 @@ def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
     _, _, arm, x = start(on_rails)
     q = (arm.coordinates.link_rows @ x)[:3]
     np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
-    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q) == []
-    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q)
+    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, False) == []
+    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, False)
     assert "lift_joint most" in warning and f"rail_joint {0.8 * side:g} m" in warning
 
 
@@ -238,9 +238,10 @@ def test_a_posture_in_radians(load_scenario, start):
     given = settings.start.posture_deg
     _, _, arm, x = start(settings)
     found = (arm.coordinates.link_rows @ x)[:6]
-    assert posture_warnings(given, arm.chain, found) == []
-    assert posture_warnings([], arm.chain, found) == []
-    (warning,) = posture_warnings(np.deg2rad(given).round(2).tolist(), arm.chain, found)
+    assert posture_warnings(given, arm.chain, found, True) == []
+    assert posture_warnings([], arm.chain, found, True) == []
+    in_radians = np.deg2rad(given).round(2).tolist()
+    (warning,) = posture_warnings(in_radians, arm.chain, found, True)
     line = describe_posture(arm.chain, found)
     assert "radians" in warning and line in warning
     assert "write [25.21, 115.2, -40.11, -5.157, 95.11, -17.19]" in warning
@@ -250,8 +251,19 @@ def test_a_posture_in_radians(load_scenario, start):
 def test_a_posture_far_from_any_solution(load_scenario, start):
     _, _, arm, x = start(load_scenario(SIX))
     found = (arm.coordinates.link_rows @ x)[:6]
-    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found)
+    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found, True)
     assert "far from any solution, motor_6 most" in warning
     # small angles in degrees are no radians
-    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found)
+    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found, True)
     assert "far from any solution" in warning
+
+
+def test_a_posture_in_radians_that_leads_astray(load_scenario, start):
+    """Taken for degrees, the posture leads to the other wrist; the digits still tell."""
+    settings = load_scenario(SIX)
+    settings.start.posture_deg = [25, 115, -40, 175, -95, 163]
+    _, _, arm, x = start(settings)
+    other = (arm.coordinates.link_rows @ x)[:6]
+    in_radians = np.deg2rad([25, 115, -40, -5, 95, -17]).round(2).tolist()
+    (warning,) = posture_warnings(in_radians, arm.chain, other, True)
+    assert "radians" in warning

@@ -29,7 +29,7 @@ controller:
   gains:
     rigid: {eta: {poles: [-30, -30]}, xi: {poles: [-30, -30]}}
     elastic: {eta: {poles: [-40, -40, -40, -40]}, xi: {poles: [-40, -40, -40, -40]}}
-reference: {points: [0.1, 0.3], velocity: 0.3, acceleration: 1.0, dwell: 0.1}
+reference: {points: [0.1, 0.3], velocity: 0.3, acceleration: 1.0, dwell: 0.3}
 start: {offset: [0.002, 0.0], posture_deg: [0, -60, 100]}
 """
 
@@ -51,7 +51,7 @@ def scenario(tmp_path):
 @pytest.mark.parametrize("changes", [(), ELASTIC])
 def test_run(run_scenario, scenario, tmp_path, capfd, changes):
     overrides = [argument for change in changes for argument in ("--set", change)]
-    run = run_scenario(tmp_path / "out", scenario, "--duration", "0.7", *overrides)
+    run = run_scenario(tmp_path / "out", scenario, "--duration", "0.9", *overrides)
     assert run.status == 0
     assert run.metrics["max_path_deviation_while_moving"]["value"] < 2e-5
     (warning,) = [line for line in run.stdout.splitlines() if "warning" in line]
