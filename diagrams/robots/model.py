@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.joint_edits import frame_named
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 
 # of a model that are worth naming; the last are those at the tool
@@ -76,7 +77,11 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
     Raises:
         InputError: If the model has no such frame.
     """
-    if not plant.HasFrameNamed(parameters.tool_frame):
+    try:
+        frame = frame_named(plant, parameters.tool_frame)
+    except InputError as error:
+        raise InputError(f"robot.tool_frame: {error}") from None
+    if frame is None:
         frames = [plant.get_frame(FrameIndex(i)).name() for i in range(1, plant.num_frames())]
         joints = [plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()]
         # Drake's own frames at joints are not the user's
@@ -86,4 +91,4 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
             f"robot.tool_frame: the model {parameters.model} has no frame "
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
         )
-    return plant.GetFrameByName(parameters.tool_frame)
+    return frame

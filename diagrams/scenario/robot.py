@@ -15,6 +15,9 @@ from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
+_FARTHEST = 1e6  # m
+_STRONGEST = 1e6  # m/s^2
+
 
 @dc.dataclass
 class PoseParameters:
@@ -31,6 +34,8 @@ class PoseParameters:
 
     def __post_init__(self) -> None:
         require_numbers("position", self.position, 3)
+        near = all(abs(coordinate) <= _FARTHEST for coordinate in self.position)
+        require(near, "position", self.position, f"up to {_FARTHEST:g} m")
         require_numbers("zyx_deg", self.zyx_deg, 3)
 
     def transform(self) -> RigidTransform:
@@ -104,6 +109,8 @@ class RobotParameters:
 
     def __post_init__(self) -> None:
         require_numbers("gravity", self.gravity, 3)
+        bearable = all(abs(component) <= _STRONGEST for component in self.gravity)
+        require(bearable, "gravity", self.gravity, f"up to {_STRONGEST:g} m/s^2")
         for name, value in self.fixed_joints.items():
             require(bool(np.isfinite(value)), f"fixed_joints.{name}", value, "a finite number")
         damping = self.joint_damping

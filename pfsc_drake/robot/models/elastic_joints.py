@@ -20,6 +20,10 @@ from pfsc_drake.robot.models.joint_edits import (
     sprung_joints,
     take_joint,
 )
+from pfsc_drake.robot.models.model_parts import LARGEST
+
+# positive numbers below are slips of the pen
+_SMALLEST = 1e-9
 
 
 def _nothing() -> np.ndarray:
@@ -50,20 +54,18 @@ class ElasticJoints:
         Raises:
             InputError: If one is out of range.
         """
-        positive, not_negative = "positive numbers", "finite numbers, none negative"
-        for key, valid, allowed in (
-            ("stiffness", self.stiffness > 0.0, f"{positive}, .inf for a rigid joint"),
-            ("damping", (self.damping >= 0.0) & np.isfinite(self.damping), not_negative),
-            (
-                "rotor_inertia",
-                (self.rotor_inertia >= 0.0) & np.isfinite(self.rotor_inertia),
-                not_negative,
-            ),
-            ("gear_ratio", (self.gear_ratio > 0.0) & np.isfinite(self.gear_ratio), positive),
+        positive = f"numbers from {_SMALLEST:g} to {LARGEST:g}"
+        not_negative = f"finite numbers from 0 to {LARGEST:g}"
+        for key, lower, allowed in (
+            ("stiffness", _SMALLEST, f"{positive}, .inf for a rigid joint"),
+            ("damping", 0.0, not_negative),
+            ("rotor_inertia", 0.0, not_negative),
+            ("gear_ratio", _SMALLEST, positive),
         ):
-            if not np.all(valid):
-                value = np.atleast_1d(getattr(self, key)).tolist()
-                raise InputError(f"elastic.{key} = {value}; allowed: {allowed}")
+            values = np.atleast_1d(getattr(self, key))
+            rigid = np.isposinf(values) & (key == "stiffness")
+            if not np.all(rigid | ((values >= lower) & (values <= LARGEST))):
+                raise InputError(f"elastic.{key} = {values.tolist()}; allowed: {allowed}")
 
     @property
     def is_given(self) -> bool:

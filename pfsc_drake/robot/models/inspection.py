@@ -64,6 +64,7 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
         if inertial is None:
             facts.without_inertia[link.name] = model.place(element)
             continue
+        _check_origin(link, inertial)
         mass, inertia = inertial.first("mass"), inertial.first("inertia")
         check_inertia(
             link,
@@ -74,6 +75,7 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
     edges = []
     for element in model.root.all("joint"):
         joint = ModelPart(model, element, "joint")
+        _check_origin(joint, element)
         parent, child = (_attribute(element, end, "link") for end in ("parent", "child"))
         edges.append((joint, parent, child))
         values = {
@@ -98,6 +100,13 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             for key, allowed in DRIVE_NUMBERS.items():
                 for part in actuator.all(key):
                     drive.number(key, part.attributes.get("value"), allowed, part)
+
+
+def _check_origin(part: ModelPart, holder: Element) -> None:
+    for name, keys in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
+        for element in holder.all(name):
+            for key in keys:
+                part.check_numbers(f"{name} {key}", element.attributes.get(key), element)
 
 
 def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> None:
@@ -136,6 +145,7 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
             for mimic in element.all("axis", "mimic"):
                 refuse_mimic(joint, mimic.attributes.get("joint"), fixed, mimic)
                 facts.mimics += 1
+        _check_poses(model, one)
         frames = {
             frame.attributes.get("name", ""): frame.attributes.get("attached_to", "")
             for frame in one.all("frame")
@@ -143,9 +153,20 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
         refuse_loops(edges, frames)
 
 
+def _check_poses(model: ModelXml, one: Element) -> None:
+    for kind in ("link", "joint", "frame"):
+        for element in one.all(kind):
+            part = ModelPart(model, element, kind)
+            for path in (("pose",), ("inertial", "pose"), ("axis", "xyz")):
+                for pose in element.all(*path):
+                    part.check_numbers(" ".join(path), pose.text, pose)
+
+
 def _inspect_mjcf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> None:
     for element in (e for e in model.root.within() if e.name == "body"):
         body = ModelPart(model, element, "body")
+        for key in ("pos", "quat", "euler", "axisangle"):
+            body.check_numbers(key, element.attributes.get(key), element)
         for inertial in element.all("inertial"):
             attributes = inertial.attributes
             moments = attributes.get("fullinertia") or attributes.get("diaginertia", "")

@@ -10,6 +10,7 @@ from pydrake.multibody.tree import (
     BodyIndex,
     ForceElementIndex,
     Frame,
+    FrameIndex,
     Joint,
     JointActuator,
     JointIndex,
@@ -21,10 +22,33 @@ from pydrake.multibody.tree import (
     WeldJoint,
 )
 
+from pfsc_drake.errors import InputError
+
 
 def bodies_of(plant: MultibodyPlant) -> list[RigidBody]:
     """Return the bodies of a plant, the world first."""
     return [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
+
+
+def frame_named(plant: MultibodyPlant, name: str) -> Frame | None:
+    """Return the link or frame of a name, or None if there is none.
+
+    Args:
+        plant: A plant.
+        name: Its name, with as many of the models around it as are needed (``sub::tcp``).
+
+    Raises:
+        InputError: If several have that name.
+    """
+    frames = [plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())]
+    found = {
+        frame.scoped_name().get_full(): frame
+        for frame in frames
+        if f"::{frame.scoped_name().get_full()}".endswith(f"::{name}")
+    }
+    if len(found) > 1 and name not in found:
+        raise InputError(f"'{name}' names several frames; allowed: {', '.join(found)}")
+    return found.get(name) or next(iter(found.values()), None)
 
 
 def joints_of(plant: MultibodyPlant) -> list[Joint]:

@@ -16,19 +16,23 @@ MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
 _ONE_AXIS = ("revolute", "prismatic", "hinge", "slide")
 
+# far beyond any robot in any unit, and small enough to be squared and multiplied
+LARGEST = 1e12
+
 _ANY, _LIMIT, _NOT_NEGATIVE, _POSITIVE = (
-    "a finite number",
+    f"a number of magnitude up to {LARGEST:g}",
     "a number",
-    "zero or a positive number",
-    "a positive number",
+    f"zero or a positive number up to {LARGEST:g}",
+    f"a positive number up to {LARGEST:g}",
 )
+_NOT_SIGNED = "zero or a positive number"  # a limit of any size
 
 DRIVE_NUMBERS = {"drake:rotor_inertia": _NOT_NEGATIVE, "drake:gear_ratio": _POSITIVE}
 _JOINT_NUMBERS = {
     "lower": _LIMIT,
     "upper": _LIMIT,
-    "effort": _NOT_NEGATIVE,
-    "velocity": _NOT_NEGATIVE,
+    "effort": _NOT_SIGNED,
+    "velocity": _NOT_SIGNED,
     "damping": _NOT_NEGATIVE,
     "friction": _NOT_NEGATIVE,
     "armature": _NOT_NEGATIVE,
@@ -73,14 +77,20 @@ class ModelPart:
         if _NUMBER.fullmatch(written) or _INFINITE.fullmatch(written):
             value = float(written)
         valid = {
-            _ANY: np.isfinite(value),
+            _ANY: abs(value) <= LARGEST,
             _LIMIT: not np.isnan(value),
-            _NOT_NEGATIVE: np.isfinite(value) and value >= 0.0,
-            _POSITIVE: np.isfinite(value) and value > 0.0,
+            _NOT_NEGATIVE: 0.0 <= value <= LARGEST,
+            _NOT_SIGNED: value >= 0.0 and np.isfinite(value),
+            _POSITIVE: 0.0 < value <= LARGEST,
         }[allowed]
         if not valid:
             self.refuse(key, written or "empty", allowed, at)
         return value
+
+    def check_numbers(self, key: str, text: str | None, at: Element) -> None:
+        """Refuse a vector if one of its words is no number; how many there are is not checked."""
+        for word in (text or "").split():
+            self.number(key, word, _ANY, at)
 
     def refuse(self, key: str, value: object, allowed: str, at: Element | None = None) -> None:
         """Raise the InputError of a value; for the arguments see :meth:`number`."""

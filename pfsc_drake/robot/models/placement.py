@@ -16,6 +16,7 @@ from pydrake.multibody.tree import (
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import (
     bodies_of,
+    frame_named,
     inboard_joints,
     joints_of,
     moving_joints,
@@ -98,9 +99,13 @@ def place_base(plant: MultibodyPlant, base: str, X_WB: RigidTransform) -> None:
 def _base_frame(plant: MultibodyPlant, base: str, default: RigidBody) -> Frame:
     if not base:
         return default.body_frame()
-    if not plant.HasFrameNamed(base):
+    try:
+        frame = frame_named(plant, base)
+    except InputError as error:
+        raise InputError(f"base: {error}") from None
+    if frame is None:
         raise InputError(f"base: '{base}'; allowed: a link or frame of the model")
-    return plant.GetFrameByName(base)
+    return frame
 
 
 def _root_of(plant: MultibodyPlant, frame: Frame) -> tuple[RigidBody, RigidTransform]:

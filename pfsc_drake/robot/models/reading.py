@@ -32,8 +32,8 @@ from pfsc_drake.robot.models.inclusion import read_with_inclusions
 from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
-    bodies_of,
     inboard_joints,
+    joints_of,
     moving_joints,
     sprung_joints,
 )
@@ -223,19 +223,15 @@ def _require_inertia(plant: MultibodyPlant, model: ModelXml, facts: ModelFacts) 
 
 def _moving_groups(plant: MultibodyPlant) -> list[list[RigidBody]]:
     """Return what is welded together, for all that is not welded to the world, base first."""
-    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
-    welds = [
-        (joint.parent_body().index(), joint.child_body().index())
-        for joint in joints
-        if isinstance(joint, WeldJoint)
-    ]
-    group = {body.index(): body.index() for body in bodies_of(plant)}
-    for one, other in welds:
-        old, new = group[other], group[one]
-        group = {body: new if of == old else of for body, of in group.items()}
-    world = group[plant.world_body().index()]
-    numbers = dict.fromkeys(of for of in group.values() if of != world)
-    return [[plant.get_body(b) for b, of in group.items() if of == number] for number in numbers]
+    world = plant.world_body()
+    group = {world.index(): [world]}
+    for joint in joints_of(plant):
+        carried = joint.child_body()
+        welded = isinstance(joint, WeldJoint)
+        group[carried.index()] = group[joint.parent_body().index()] if welded else []
+        group[carried.index()].append(carried)
+    groups = {id(bodies): bodies for bodies in group.values() if bodies[0] is not world}
+    return list(groups.values())
 
 
 def _drive(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> None:

@@ -116,6 +116,7 @@ def test_keys_that_do_not_suit_the_model(tmp_path, changes, message):
     [
         ({"gravity": [0.0, 9.81]}, "gravity"),
         ({"gravity": [0.0, 0.0, math.inf]}, "gravity"),
+        ({"gravity": [0.0, 0.0, 1e300]}, "gravity"),
         ({"fixed_joints": {"j": math.inf}}, "fixed_joints.j"),
     ],
 )

@@ -89,7 +89,7 @@ def test_files_that_are_no_files(refused, mine, tmp_path):
         ("robot.packages={mine: nope}", ["robot.packages: mine", "no such folder"]),
         ("robot.elastic.stiffness=1e4", ["robot.elastic: ", "elastic already"]),
         ("robot.elastic.stiffness=soft", ["robot.elastic.stiffness[0]", "'soft'", "a number"]),
-        ("robot.elastic.stiffness=-1", ["robot.elastic", "stiffness = [-1.0]", "positive"]),
+        ("robot.elastic.stiffness=-1", ["robot.elastic", "stiffness = [-1.0]", ".inf for a rigid"]),
         ("robot.elastic.gear_ratio=[1, 0]", ["robot.elastic", "gear_ratio = [1.0, 0.0]"]),
     ],
 )

@@ -144,12 +144,12 @@ def test_rotors_of_rigid_joints(elastic):
 @pytest.mark.parametrize(
     ("parameters", "parts"),
     [
-        ({"stiffness": [-1.0]}, ["elastic.stiffness = [-1.0]", "positive"]),
-        ({"stiffness": [0.0]}, ["elastic.stiffness = [0.0]", "positive"]),
-        ({"damping": [-1.0]}, ["elastic.damping", "none negative"]),
+        ({"stiffness": [-1.0]}, ["elastic.stiffness = [-1.0]", ".inf"]),
+        ({"stiffness": [0.0]}, ["elastic.stiffness = [0.0]", ".inf"]),
+        ({"damping": [-1.0]}, ["elastic.damping", "from 0"]),
         ({"damping": [np.inf]}, ["elastic.damping", "finite"]),
         ({"rotor_inertia": [np.nan]}, ["elastic.rotor_inertia", "finite"]),
-        ({"gear_ratio": [0.0]}, ["elastic.gear_ratio", "positive"]),
+        ({"gear_ratio": [0.0]}, ["elastic.gear_ratio", "numbers from"]),
         ({"stiffness": [1e3, 1e3], "rotor_inertia": [1.0]}, ["elastic.stiffness: 2 values"]),
         ({"stiffness": [1e3]}, ["elastic.rotor_inertia: joint 'shoulder' has none", "positive"]),
     ],

@@ -22,7 +22,7 @@ def wrong(write, refused):
     return check
 
 
-MASSES = ["-2", "nan", "inf", "", "abc", "1_0", "٣", "2,5", "0x10"]
+MASSES = ["-2", "1e300", "nan", "inf", "", "abc", "1_0", "٣", "2,5", "0x10"]
 INERTIAS = [("0.02", "0.2"), ("0.02", "-0.02"), ("0.01", "nan"), ("0.01", "")]
 
 
@@ -66,6 +66,9 @@ def test_parts_of_an_inertial_that_are_missing(wrong, urdf_text, sdf_text):
         ('lower="-2"', 'lower="nan"', "lower = nan"),
         ('lower="-2"', 'lower="abc"', "lower = abc"),
         ('effort="30"', 'effort="-30"', "effort = -30"),
+        ('xyz="0 0 0.3"', 'xyz="0 0 1e300"', "origin xyz = 1e300"),
+        ('xyz="0 0 0.3"', 'xyz="0 0 x"', "origin xyz = x"),
+        ('<axis xyz="0 0 1"', '<axis xyz="0 nan 1"', "axis xyz = nan"),
         ('velocity="1.5"', 'velocity="nan"', "velocity = nan"),
         ("</joint>", '<dynamics damping="-1"/></joint>', "damping = -1"),
         ("</joint>", '<dynamics friction="x"/></joint>', "friction = x"),
@@ -96,6 +99,7 @@ def test_urdf_drives(wrong, urdf_text, key, value):
         ("<lower>-2<", "<lower>3<", "lower, upper = 3, 2"),
         ("<upper>2<", "<upper>nan<", "upper = nan"),
         ("<effort>30<", "<effort>abc<", "effort = abc"),
+        ("<axis><xyz>0", "<axis><xyz>1e300", "axis xyz = 1e300"),
         ("<damping>0.5<", "<damping>-0.5<", "damping = -0.5"),
         ("<spring_stiffness>0<", "<spring_stiffness>-7<", "spring_stiffness = -7"),
         ("<spring_stiffness>0<", "<spring_stiffness>nan<", "spring_stiffness = nan"),
@@ -156,6 +160,7 @@ MJCF = """<mujoco><worldbody>
     [
         ('mass="1"', 'mass="-1"', "body 'a': mass = -1"),
         ('"1 1 1"', '"1 1 9"', "body 'a': principal"),
+        ('<body name="a"', '<body name="a" pos="0 0 1e300"', "body 'a': pos = 1e300"),
         ('"-1 1"', '"1 -1"', "joint 'j': lower, upper = 1, -1"),
         ('damping="1"', 'damping="nan"', "joint 'j': damping = nan"),
         ("</mujoco>", "<equality><weld body1='a'/></equality></mujoco>", "equality"),

@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.joint_edits import frame_named
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
@@ -143,3 +144,17 @@ def test_an_elastic_model_on_the_ceiling(read, refused):
     foot, shoulder = (np.array(pose_function(chain)(q)).ravel()[:3] for chain in (plain, hanging))
     np.testing.assert_allclose(shoulder, down @ foot, atol=1e-12)
     refused(lambda: read(file, fixed_joints={"flex_1": 0.0}), "'flex_1'", "spring")
+
+
+def test_frames_of_models_within_models(write, read, refused, sdf_text):
+    inertial = sdf_text[sdf_text.index("<inertial>") : sdf_text.index("</link>")]
+    inner = (
+        f'<model name="sub"><link name="base">{inertial}</link></model>'
+        '<joint name="w" type="fixed"><parent>arm</parent><child>sub::base</child></joint></model>'
+    )
+    file = write(sdf_text.replace("</model>", inner), "arm.sdf")
+    refused(lambda: read(file, base="base"), "base: 'base' names several", "arm::sub::base")
+    plant, _ = read(file, base="arm::base", base_pose=X_WB)
+    same(frame_named(plant, "arm::base").CalcPoseInWorld(plant.CreateDefaultContext()), X_WB)
+    assert frame_named(plant, "sub::base").body().name() == "base"
+    assert frame_named(plant, "nothing") is None
