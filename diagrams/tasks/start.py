@@ -7,7 +7,7 @@ import numpy as np
 from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, quaternion_to_matrix, zyx_to_matrix
-from pfsc_drake.robot.inverse_kinematics import solve_pose
+from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
 from pfsc_drake.robot.robot_model import gravity_function, pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
@@ -184,8 +184,9 @@ def _fits_in_radians(
 
 def _posture(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
     if not posture_deg:
-        lower, upper = chain.gather("position_limits").T
-        return np.nan_to_num((lower + upper) / 2.0)
+        lower, upper = np.clip(chain.gather("position_limits"), -UNLIMITED, UNLIMITED).T
+        limited = np.maximum(-lower, upper) < UNLIMITED
+        return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
     if len(posture_deg) != chain.dimension:
         raise InputError(
             f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"

@@ -46,3 +46,12 @@ def test_a_pose_across_the_stop(cylinder, guess):
 def test_poses_beyond_the_limits(cylinder, target):
     with pytest.raises(InputError, match=r"start: position .* unreachable within the joint limits"):
         solve_pose(cylinder, target, None, np.array([0.5, 0.0, 0.5]), "start")
+
+
+@pytest.mark.parametrize("limit", [np.inf, 1e16, 1e150])
+def test_joints_without_limits(limit):
+    turn = link("revolute", (0, 0, 1), -0.5, limit)
+    lift, reach = link("prismatic", (0, 0, 1), -limit, 3), link("prismatic", (1, 0, 0), 0.1, limit)
+    robot = SerialChain((turn, lift, reach))
+    q = solve_pose(robot, at(2.7, -7.0, 20.0), None, np.array([2.0, 0.0, 1.0]), "start")
+    np.testing.assert_allclose(q, [2.7, -7.0, 20.0], atol=1e-7)

@@ -64,7 +64,8 @@ def _target(element: Element, including: Path, packages: PackageMap) -> Path | N
     target = _local(address, including.parent, packages)
     if target is not None and target.is_dir():
         target = _described(target)
-    return target.resolve() if target is not None and target.is_file() else None
+    # what is there but is no regular file is refused when it is read
+    return target.resolve() if target is not None and target.exists() else None
 
 
 def _local(address: str, folder: Path, packages: PackageMap) -> Path | None:

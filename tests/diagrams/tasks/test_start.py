@@ -1,6 +1,7 @@
 """The state in which a run starts, against Drake's kinematics and dynamics."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -267,3 +268,17 @@ def test_a_posture_in_radians_that_leads_astray(load_scenario, start):
     in_radians = np.deg2rad([25, 115, -40, -5, 95, -17]).round(2).tolist()
     (warning,) = posture_warnings(in_radians, arm.chain, other, True)
     assert "radians" in warning
+
+
+@pytest.mark.parametrize("limit", ["1e16", "1e150"])
+def test_without_a_posture_half_limited_joints_start_where_they_can(on_rails, start, limit):
+    """The middle of -3 and infinity is nowhere; the lift may only be above 0.1 m."""
+    file = Path(on_rails.robot.model)
+    text = file.read_text(encoding="utf-8")
+    text = text.replace('upper="3"', f'upper="{limit}"', 2)
+    second = text.index("lift_joint")
+    text = text[:second] + text[second:].replace('lower="-3"', 'lower="0.1"', 1)
+    file.write_text(text, encoding="utf-8")
+    on_rails.start.posture_deg = []
+    _, _, arm, _ = start(on_rails)
+    np.testing.assert_allclose(arm.tool_pose()[0], [0.0, 0.6, 0.2], atol=1e-8)

@@ -1,5 +1,7 @@
 """Models that include others, or themselves."""
 
+import os
+
 from pydrake.multibody.parsing import PackageMap
 
 from pfsc_drake.robot.models.inclusion import MOST_INCLUSIONS, read_with_inclusions
@@ -39,3 +41,9 @@ def test_inclusions_that_multiply(write, refused):
     write(sdf(), "m10.sdf")
     file = write(sdf("m0.sdf"), "arm.sdf")
     refused(lambda: read_with_inclusions(file, PackageMap()), file, MOST_INCLUSIONS)
+
+
+def test_inclusion_of_a_pipe(write, refused, tmp_path):
+    os.mkfifo(tmp_path / "pipe.sdf")
+    file = write(sdf("pipe.sdf"), "arm.sdf")
+    refused(lambda: read_with_inclusions(file, PackageMap()), "pipe.sdf", "regular file")

@@ -41,7 +41,7 @@ def test_one_word_changed(tmp_path, urdf_text, sdf_text, kind, tool):
     words = list(_WORD.finditer(text))
     file = tmp_path / f"arm.{kind}"
 
-    @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
     @given(st.sampled_from(words), st.sampled_from(_OTHERS))
     def check(word, other):
         changed = text[: word.start()] + other + text[word.end() :]
