@@ -1,78 +1,73 @@
-"""What running, logging and measuring need to know of a station, whatever its robot."""
+"""What running, logging and measuring need to know of a station."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
+from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
+from diagrams.tasks.task import Task
+from diagrams.workpiece import FurtherLength, Workpiece, upwards
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law import PathLaw
+from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.control.can_fail import CanFail
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 
-Plant = TypeVar("Plant")
-Robot = TypeVar("Robot", bound=RobotModel)
-
 
 @dataclass
-class FurtherLength:
-    """Something else in a station that is worth a look.
-
-    Attributes:
-        values: Signal [m], shape (samples, size).
-        labels: Name of each component.
-        limit: Magnitude up to which it is free [m].
-    """
-
-    values: np.ndarray
-    labels: list[str]
-    limit: float
-
-
-@dataclass
-class Station(ABC, Generic[Plant, Robot]):
+class Station:
     """A built station and what is needed to run it.
 
     Attributes:
         diagram: The diagram.
-        plant: The robot in it.
-        chain: The robot as the laws know it.
-        coordinates: Where its coordinates stand in the state ``[q, v]`` of its model.
-        path: The path.
-        law: The path following law.
+        part: The robot in it.
+        task: What it is to do.
+        law: The law.
         projector: Projector system.
         controller: Controller system.
-        log: Log of ``joint_state``, ``tool_pose``, ``path_point``, ``reference``, ``law``,
-            and whatever else the station has. With imperfect encoders ``joint_state`` is the
-            truth, and the law was given ``joint_state_measured``.
-        reference_duration: Length of the reference motion [s].
-        initial_state: State of the plant at the start.
+        log: Log of ``joint_state``, ``tool_pose``, ``manifold_point``, ``reference``, ``law``;
+            of what acts on the tool ``wrench_ext``, of a sensor what :func:`add_sensor`
+            returns, with compliance what :func:`add_compliance` returns, with servos
+            ``drive_torque``, with friction ``friction_torque``. With imperfect encoders
+            ``joint_state`` is the truth, and the law was given ``joint_state_measured``.
+        initial_state: State of the robot's model at the start.
         initial_theta: Path parameter at the start.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         warnings: What may not go as well as hoped, one sentence each.
+        workpiece: What the tool may touch, if anything.
     """
 
     diagram: Diagram
-    plant: Plant
-    chain: Robot
-    coordinates: PlantCoordinates
-    path: Path
-    law: PathLaw
+    part: RobotPart
+    task: Task
+    law: FollowingLaw
     projector: PathProjector
-    controller: PathFollowingController
+    controller: FollowingController
     log: SignalLog
-    reference_duration: float
     initial_state: np.ndarray
     initial_theta: float
     on_motors: bool
     warnings: list[str]
+    workpiece: Workpiece | None = None
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot as the laws know it."""
+        return self.part.robot
+
+    @property
+    def path(self) -> Path:
+        """The path."""
+        return self.task.path
+
+    @property
+    def reference_duration(self) -> float:
+        """Length of the reference motion [s]."""
+        return self.task.motion.domain[1]
 
     def set_start(self, root: Context) -> None:
         """Put the robot at the start of the scenario.
@@ -80,11 +75,19 @@ class Station(ABC, Generic[Plant, Robot]):
         Args:
             root: Context of the diagram.
         """
-        context = self.plant.GetMyMutableContextFromRoot(root)  # type: ignore[attr-defined]
-        self.place_robot(context, self.initial_state)
+        self.place_robot(root, self.initial_state)
         self.projector.set_parameter(
             self.projector.GetMyMutableContextFromRoot(root), self.initial_theta
         )
+
+    def place_robot(self, root: Context, state: np.ndarray) -> None:
+        """Put the robot into a state.
+
+        Args:
+            root: Context of the diagram.
+            state: ``[q, v]`` of its model, see :class:`PlantCoordinates`.
+        """
+        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), state)
 
     def fault(self, root: Context) -> str | None:
         """Return why a system of the station is in its safe state, or None if none is.
@@ -101,21 +104,12 @@ class Station(ABC, Generic[Plant, Robot]):
         return None
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
-        """Return what else is worth a look in a run, if anything is.
+        """Return what else is worth a look in a run, by name, if anything is.
 
         Args:
             y_t: Motion of the tool point [m], shape (samples, 3).
-
-        Returns:
-            By name.
         """
-        return {}
-
-    @abstractmethod
-    def place_robot(self, context: Context, state: np.ndarray) -> None:
-        """Put the plant into a state.
-
-        Args:
-            context: Context of the plant.
-            state: ``[q, v]``, see ``coordinates``.
-        """
+        if self.workpiece is None:
+            return {}
+        up = upwards(self.part.gravity, "notch")
+        return self.workpiece.lengths(self.path, y_t, self.initial_theta, up)

@@ -7,7 +7,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.replay import RecordedMotion, add_source
 from diagrams.scenario.notch import NotchParameters
-from diagrams.surroundings.notch import UP, notch_surface
+from diagrams.surroundings.notch import notch_surface
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL, PLATE
@@ -17,6 +17,7 @@ from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
 _HOLDER_RADIUS = 0.008  # m
+_UP = np.array([0.0, 0.0, -1.0])  # z_0 points down
 _NOTCH_VIEW = np.array([0.5, -0.4, 0.35])  # m, from the notch to the camera
 _WORKPIECE = Rgba(0.75, 0.72, 0.66, 0.75)
 
@@ -60,7 +61,7 @@ def build_delta_replay(
 
 def _draw_notch(path: Path, notch: NotchParameters, meshcat: Meshcat) -> None:
     """Draw ball and workpiece, and look down at them."""
-    vertices, triangles = notch_surface(path, notch)
+    vertices, triangles = notch_surface(path, notch, _UP)
     meshcat.SetTriangleMesh("workpiece", vertices.T, triangles.T, _WORKPIECE)
     ball = notch.ball
     holder = 0.5 * (ball.distance - ball.radius)
@@ -70,7 +71,7 @@ def _draw_notch(path: Path, notch: NotchParameters, meshcat: Meshcat) -> None:
     ):
         part = f"delta_robot/{PLATE}/{name}"
         meshcat.SetObject(part, shape, color)
-        meshcat.SetTransform(part, RigidTransform(-below * UP))
+        meshcat.SetTransform(part, RigidTransform(-below * _UP))
     target = np.array([0.0, 0.0, _CLEARANCE])
     meshcat.SetCameraPose(target + _NOTCH_VIEW, target)
 

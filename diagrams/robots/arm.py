@@ -1,130 +1,149 @@
 """A serial arm in a diagram, whichever model moves it."""
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 import numpy as np
+from pydrake.geometry import GeometryId, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
-from pydrake.systems.primitives import MatrixGain
+from pydrake.multibody.tree import Frame, Joint
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
+from diagrams.robots.contact import add_scene, connect_scene
 from diagrams.robots.model import read_robot, tool_frame
+from diagrams.robots.part import Drives, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
+    add_tool_reaction,
     connect_actuation,
     connect_push,
     connect_resistance,
+    joint_state_of,
 )
-from diagrams.scenario import RobotParameters
+from diagrams.robots.start_posture import posture_near, posture_warnings
+from diagrams.scenario import RobotParameters, StartParameters
+from diagrams.scenario.checks import require
+from diagrams.workpiece import Workpiece
+from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.inverse_kinematics import solve_pose
 from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
+from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
+from pfsc_drake.systems.physics.contact_wrench import ContactWrench
+from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.physics.full_elastic_plant import FullElasticPlant
 
 
 @dataclass(frozen=True)
-class Arm(ABC):
-    """A serial arm in a diagram: where its signals come from and where they go.
+class Arm(RobotPart):
+    """A serial arm in a diagram.
 
     Attributes:
         model: The arm as Drake knows it, finalized; bodies, frames and joints by name.
-        chain: The arm as the laws know it, N joints.
+        robot: The arm as the laws know it, N joints.
         coordinates: Where its coordinates stand in the state of ``model``.
-        tool: Frame whose origin follows the path.
+        tool: Frame whose origin follows the manifold.
         warnings: What there is to say about the model, one sentence each.
     """
 
     model: MultibodyPlant
-    chain: SerialChain
+    robot: SerialChain
     coordinates: PlantCoordinates
     tool: Frame
-    warnings: list[str]
+    warnings: list[str] = field(default_factory=list, kw_only=True)
 
     @property
-    @abstractmethod
-    def plant(self) -> LeafSystem:
-        """The system in the diagram that moves."""
+    def gravity(self) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        return self.robot.gravity
 
-    @abstractmethod
-    def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
+    @property
+    def drives(self) -> Drives:
+        """See :class:`RobotPart`."""
+        return Drives(self.robot.D_M, step=self.model.time_step() or None)
 
-    @abstractmethod
-    def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """Let drive torques ``tau_d`` act, shape (N,)."""
+    def posture(
+        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
+    ) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        near = posture_near(start.posture_deg, self.robot)
+        return solve_pose(self.robot, y_t, R_e, near, "start")
 
-    @abstractmethod
-    def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
+    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+        """See :class:`RobotPart`."""
+        return self.warnings + posture_warnings(start.posture_deg, self.robot, q_J, oriented)
 
-    @abstractmethod
-    def connect_wrench(
-        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
-    ) -> None:
-        """Let a wrench act at the tool point, world axes, shape (6,).
+    def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        weight = np.array(gravity_function(self.robot)(q_J)).ravel()
+        rest = np.zeros(self.robot.dimension)
+        return self.coordinates.plant_state(
+            np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
+        )
 
-        Args:
-            builder: Builder of the diagram.
-            wrench: The wrench [N, Nm].
-            joint_state: The true one.
-        """
-
-    @abstractmethod
-    def place(self, context: Context, state: np.ndarray) -> None:
-        """Put the plant into a state of ``model``, ``[q, v]``.
-
-        Args:
-            context: Context of the plant.
-            state: Shape (num_states,), see :class:`PlantCoordinates`.
-        """
-
-    @abstractmethod
-    def require_reaction_forces(self) -> None:
-        """Refuse a force/torque sensor if the plant does not know what its joints carry.
-
-        Raises:
-            InputError: If so.
-        """
+    def _tool_load(self, name: str) -> tuple[Joint, ToolLoad]:
+        """Return the sensor's joint and what is behind it."""
+        if not self.model.HasJointNamed(name):
+            raise InputError(f"sensor.joint: the model has no joint '{name}'")
+        joint = self.model.GetJointByName(name)
+        return joint, tool_load_from_plant(self.model, joint, self.tool)
 
 
+@dataclass(frozen=True)
 class MultibodyArm(Arm):
-    """An arm that Drake's MultibodyPlant moves: (2.42) rigid, (2.65) elastic."""
+    """An arm that Drake's MultibodyPlant moves: (2.42) rigid, (2.65) elastic.
+
+    Attributes:
+        contact: What the surroundings do to its tool, if it can touch them.
+    """
+
+    contact: ContactWrench | None = None
 
     @property
     def plant(self) -> MultibodyPlant:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         return self.model
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         return joint_state_of(builder, self.model.get_state_output_port(), self.coordinates)
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         connect_actuation(builder, self.model, self.coordinates.actuators, torque)
 
-    def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`Arm`."""
-        rows = self.coordinates.motor_rows[self.chain.dimension :]
+    def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
+        """See :class:`RobotPart`."""
+        rows = self.coordinates.motor_rows[self.robot.dimension :]
         connect_resistance(builder, self.model, rows, resistance)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
-        """See :class:`Arm`."""
-        push = add_external_wrench(builder, self.tool, self.chain, wrench, joint_state)
+        """See :class:`RobotPart`."""
+        push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
         connect_push(builder, self.model, push)
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         self.model.SetPositionsAndVelocities(context, state)
 
-    def require_reaction_forces(self) -> None:
-        """See :class:`Arm`."""
+    def sensor_mount(
+        self,
+        builder: DiagramBuilder,
+        joint: str,
+        joint_state: OutputPort,
+        wrench: OutputPort | None,
+    ) -> SensorMount:
+        """See :class:`RobotPart`."""
+        mount, load = self._tool_load(joint)
+        return SensorMount(
+            load, self.model.get_reaction_forces_output_port(), reaction_index(self.model, mount)
+        )
 
 
 @dataclass(frozen=True)
@@ -139,80 +158,117 @@ class CoupledArm(Arm):
 
     @property
     def plant(self) -> FullElasticPlant:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         return self.full
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         return self.full.GetOutputPort("joint_state")
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         builder.Connect(torque, self.full.GetInputPort("drive_torque"))
 
-    def connect_friction(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`Arm`."""
+    def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
+        """See :class:`RobotPart`."""
         builder.Connect(resistance, self.full.GetInputPort("resistance"))
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
-        """See :class:`Arm`."""
-        push = add_external_wrench(builder, self.tool, self.chain, wrench, joint_state)
+        """See :class:`RobotPart`."""
+        push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
         builder.Connect(push.GetOutputPort("tau_ext"), self.full.GetInputPort("external_torque"))
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`Arm`."""
+        """See :class:`RobotPart`."""
         rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         self.full.set_joint_state(context, rows @ state)
 
-    def require_reaction_forces(self) -> None:
-        """See :class:`Arm`."""
-        raise InputError(
-            "robot.rotor_coupling: the full model has no force/torque sensor; allowed with "
-            "compliance or measured forces: none"
-        )
+    def sensor_mount(
+        self,
+        builder: DiagramBuilder,
+        joint: str,
+        joint_state: OutputPort,
+        wrench: OutputPort | None,
+    ) -> SensorMount:
+        """See :class:`RobotPart`."""
+        _, load = self._tool_load(joint)
+        acceleration = self.full.GetOutputPort("link_acceleration")
+        reaction = add_tool_reaction(builder, self.robot, load, joint_state, acceleration, wrench)
+        return SensorMount(load, reaction)
 
 
-def add_arm(builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath) -> Arm:
-    """Add the plant of a serial arm, continuous and without geometry.
+def add_arm(
+    builder: DiagramBuilder,
+    parameters: RobotParameters,
+    folder: FilePath,
+    workpiece: Workpiece | None = None,
+) -> Arm:
+    """Add the plant of a serial arm, continuous unless its tool may touch something.
 
     Args:
         builder: Builder of the diagram.
         parameters: Which robot.
         folder: Where relative file names start.
+        workpiece: What its tool may touch, if anything.
 
     Raises:
-        InputError: If the model cannot be read, is no chain of joints, or its rotors are not
-            known.
+        InputError: If the model cannot be read, is no chain of joints, or its rotors are
+            not known.
     """
-    coupled = parameters.rotor_coupling
-    model, warnings = read_robot(parameters, folder)
-    tool = tool_frame(model, parameters)
-    chain, coordinates = chain_from_plant(model, tool)
-    if not coupled:
+    if parameters.rotor_coupling:
+        return _add_coupled_arm(builder, parameters, folder, workpiece)
+    if workpiece is None:
+        model, warnings = read_robot(parameters, folder)
         builder.AddNamedSystem("plant", model)
-        return MultibodyArm(model, chain, coordinates, tool, warnings)
+        return MultibodyArm(model, *_chain(model, parameters), warnings=warnings)
+    return _add_touching_arm(builder, parameters, folder, workpiece)
+
+
+def _add_coupled_arm(
+    builder: DiagramBuilder,
+    parameters: RobotParameters,
+    folder: FilePath,
+    workpiece: Workpiece | None,
+) -> CoupledArm:
+    coupled = parameters.rotor_coupling
+    allowed = "empty where the robot touches a workpiece; the full model has no contact"
+    require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
+    model, warnings = read_robot(parameters, folder)
+    chain, coordinates, tool = _chain(model, parameters)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
         plant = FullElasticPlant(chain, mounts_from_parameters(chain, robot))
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(model, chain, coordinates, tool, warnings, plant)
+    return CoupledArm(model, chain, coordinates, tool, plant, warnings=warnings)
 
 
-def joint_state_of(
-    builder: DiagramBuilder, plant_state: OutputPort, coordinates: PlantCoordinates
-) -> OutputPort:
-    """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+def _add_touching_arm(
+    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath, workpiece: Workpiece
+) -> MultibodyArm:
+    """Add a discrete plant; of the robot only what touches the workpiece has geometry in it."""
+    allowed = "0 on a robot that turns its tool: the ball sits at the tool point"
+    require(workpiece.reach == 0.0, "notch.ball.distance", workpiece.reach, allowed)
+    scene_graph: list[SceneGraph] = []
+    geometries: list[GeometryId] = []
 
-    Args:
-        builder: Builder of the diagram.
-        plant_state: State of the plant.
-        coordinates: Where the robot's coordinates stand in it.
-    """
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
-    builder.Connect(plant_state, encoders.get_input_port())
-    return encoders.get_output_port()
+    def add_workpiece(plant: MultibodyPlant) -> None:
+        scene_graph.append(add_scene(builder, plant))
+        geometries.extend(workpiece.add(plant, tool_frame(plant, parameters)))
+
+    model, warnings = read_robot(parameters, folder, workpiece.time_step, add_workpiece)
+    builder.AddNamedSystem("plant", model)
+    contact = connect_scene(builder, model, scene_graph[0], geometries)
+    return MultibodyArm(model, *_chain(model, parameters), contact, warnings=warnings)
+
+
+def _chain(
+    model: MultibodyPlant, parameters: RobotParameters
+) -> tuple[SerialChain, PlantCoordinates, Frame]:
+    """Return the arm as the laws know it."""
+    tool = tool_frame(model, parameters)
+    chain, coordinates = chain_from_plant(model, tool)
+    return chain, coordinates, tool

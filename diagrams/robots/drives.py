@@ -6,25 +6,28 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
-from diagrams.robots.arm import Arm
+from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
-from diagrams.scenario.checks import require_whole_fraction
+from diagrams.scenario.checks import require, require_whole_fraction
+from diagrams.scenario.simulation import AUTO
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
-from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.physics.bus_delay import add_bus_delay
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
 
 # integration schemes of fixed step that the bristles of friction are made for
-_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
+FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
+# omega h of stuck bristles whose force is read once per step, see bristles_for_step
+_BRISTLES_PER_STEP = 0.5
 
 
 def add_drives(
     builder: DiagramBuilder,
-    arm: Arm,
+    part: RobotPart,
     scenario: PathFollowingScenario,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
@@ -33,7 +36,7 @@ def add_drives(
 
     Args:
         builder: Builder of the diagram.
-        arm: The robot.
+        part: The robot.
         scenario: The scenario.
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
         initial_state: State of the plant at the start, for which servos are designed.
@@ -46,21 +49,21 @@ def add_drives(
         InputError: If the servos do not suit the robot or the controller.
     """
     period, torque = scenario.controller.sampling_time, ports["drive"]
-    chain, signals = arm.chain, {}
+    chain, signals = part.robot, {}
     if scenario.controller.law == "velocity_servo":
-        q_J = (arm.coordinates.link_rows @ initial_state)[: chain.dimension]
+        q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
         servo, period = _add_servo(builder, chain, scenario, ports, q_J)
         torque = servo.GetOutputPort("drive_torque")
         signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
     hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
     builder.Connect(torque, hold.get_input_port())
-    arm.connect_drives(builder, hold.get_output_port())
+    part.connect_drives(builder, hold.get_output_port())
     return signals
 
 
 def _add_servo(
     builder: DiagramBuilder,
-    chain: SerialChain,
+    chain: RobotModel,
     scenario: PathFollowingScenario,
     ports: dict[str, OutputPort],
     q_J: np.ndarray,
@@ -91,7 +94,7 @@ def _add_servo(
 
 def add_friction(
     builder: DiagramBuilder,
-    arm: Arm,
+    part: RobotPart,
     joint_state: OutputPort,
     scenario: PathFollowingScenario,
     folder: FilePath,
@@ -100,7 +103,7 @@ def add_friction(
 
     Args:
         builder: Builder of the diagram.
-        arm: The robot.
+        part: The robot.
         joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
         scenario: The scenario.
         folder: Where relative file names start.
@@ -111,54 +114,55 @@ def add_friction(
     Raises:
         InputError: If the friction does not suit the robot or the integration.
     """
-    if not scenario.friction.is_given:
+    drives, n = part.drives, part.robot.dimension
+    coefficients = _coefficients(scenario, part, folder)
+    if coefficients is None:
         return {}
-    chain = arm.chain
-    if not np.all(chain.D_M > 0.0):
+    if not np.all(drives.inertia > 0.0):
         raise InputError("friction: needs a robot with rotor inertia in every drive")
-    f_c, f_v = _coefficients(scenario.friction, chain, folder)
-    bristles = friction_bristles(scenario, f_c, f_v, chain.D_M, "friction")
+    bristles = _bristles(scenario, *coefficients, drives)
     friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
-    n = chain.dimension
     velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
     builder.Connect(joint_state, velocity.get_input_port())
     builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
-    arm.connect_friction(builder, friction.GetOutputPort("resistance"))
+    part.connect_resistance(builder, friction.GetOutputPort("resistance"))
     return {"friction_torque": friction.GetOutputPort("friction_torque")}
 
 
-def friction_bristles(
-    scenario: PathFollowingScenario,
-    f_c: np.ndarray,
-    f_v: np.ndarray,
-    inertia: np.ndarray,
-    key: str,
+def _bristles(
+    scenario: PathFollowingScenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
-    """Return friction whose bristles suit the integration.
-
-    Args:
-        scenario: The scenario.
-        f_c: Coulomb friction [Nm or N], shape (N,).
-        f_v: Viscous friction [Nm s/rad or N s/m], shape (N,).
-        inertia: Least inertia behind each drive, shape (N,).
-        key: Key of the scenario that asks for friction, for the message.
-
-    Raises:
-        InputError: If the bristles are not made for the integration.
-    """
+    """Return friction whose bristles suit how the plant is integrated."""
+    if drives.step is not None:
+        return bristles_for_step(
+            f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP
+        )
     simulation = scenario.simulation
-    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+    allowed = (AUTO, *FRICTION_INTEGRATORS)
+    if simulation.accuracy == 0.0 and simulation.integrator not in allowed:
         raise InputError(
-            f"simulation.integrator = {simulation.integrator} with {key}; allowed: "
-            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+            f"simulation.integrator = {simulation.integrator} with friction; allowed: "
+            f"{', '.join(allowed)}, or error control"
         )
     # stiff enough for the step of the integration, or of the hold if that is shorter
     step = min(simulation.max_step, scenario.controller.sampling_time)
-    return bristles_for_step(f_c, f_v, inertia, step)
+    return bristles_for_step(f_c, f_v, drives.inertia, step)
 
 
 def _coefficients(
-    parameters: JointFrictionParameters, chain: SerialChain, folder: FilePath
+    scenario: PathFollowingScenario, part: RobotPart, folder: FilePath
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the friction of the scenario, else of the robot's parameters, else None."""
+    own, wanted = part.drives.own_friction, scenario.drive_friction
+    allowed = "null; the parameters of this robot tell no friction, 'friction' does"
+    require(own is not None or wanted is None, "drive_friction", wanted, allowed)
+    if scenario.friction.is_given:
+        return _given_coefficients(scenario.friction, part.robot, folder)
+    return None if wanted is False else own
+
+
+def _given_coefficients(
+    parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath
 ) -> tuple[np.ndarray, np.ndarray]:
     n = chain.dimension
     if parameters.file:

@@ -1,34 +1,28 @@
 """The force/torque sensor between robot and tool."""
 
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Demultiplexer
 
+from diagrams.robots.part import RobotPart
 from diagrams.scenario import PathFollowingScenario
-from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
+from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
 
 
 def add_sensor(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    robot: RobotModel,
-    tool: Frame,
+    part: RobotPart,
     scenario: PathFollowingScenario,
-    joint_state: OutputPort,
+    ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Add a force/torque sensor with taring and compensation of the tool behind it.
 
     Args:
         builder: Builder of the diagram.
-        plant: Plant with the robot.
-        robot: The robot.
-        tool: Frame at the tool point, in the plant.
+        part: The robot.
         scenario: The scenario.
-        joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
+        ports: ``joint_state`` as measured, ``true_joint_state``, and ``wrench_ext`` if anything
+            acts on the tool.
 
     Returns:
         ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``.
@@ -37,25 +31,25 @@ def add_sensor(
         InputError: If the sensor does not suit the robot or the sampling time.
     """
     parameters, period = scenario.sensor, scenario.controller.sampling_time
-    if not plant.HasJointNamed(parameters.joint):
-        raise InputError(
-            f"sensor.joint: the model {scenario.robot.model} has no joint '{parameters.joint}'"
-        )
-    joint = plant.GetJointByName(parameters.joint)
+    true_state, wrench = ports["true_joint_state"], ports.get("wrench_ext")
+    mount = part.sensor_mount(builder, parameters.joint, true_state, wrench)
     sensor = builder.AddNamedSystem(
-        "force_torque_sensor", ForceTorqueSensor(plant, joint, parameters.transducer(), period)
+        "force_torque_sensor", ForceTorqueSensor(parameters.transducer(), period, mount.index)
     )
-    load = tool_load_from_plant(plant, joint, tool)
+    builder.Connect(mount.reaction, sensor.get_input_port())
     compensation = builder.AddNamedSystem(
         "tool_compensation",
         ToolCompensation(
-            robot, load, parameters.measurement_range, parameters.compensation(), period
+            part.robot,
+            mount.load,
+            parameters.measurement_range,
+            parameters.compensation(),
+            period,
         ),
     )
-    builder.Connect(plant.get_reaction_forces_output_port(), sensor.GetInputPort("reaction_forces"))
     reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
-    builder.Connect(joint_state, compensation.GetInputPort("joint_state"))
+    builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     whole = compensation.GetOutputPort("compensation")
     parts = _split(builder, "sensor_signals", whole, [6, 1, 1])
     return dict(zip(("wrench_measured", "tared", "sensor_fault"), parts, strict=True))

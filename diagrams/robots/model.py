@@ -1,11 +1,10 @@
 """The robot in a diagram."""
 
+from collections.abc import Callable
 from pathlib import Path as FilePath
 
-from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, FrameIndex, JointIndex
-from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
@@ -17,12 +16,19 @@ from pfsc_drake.robot.models.reading import ModelOptions, read_model
 _MOST_NAMES = 12
 
 
-def read_robot(parameters: RobotParameters, folder: FilePath) -> tuple[MultibodyPlant, list[str]]:
-    """Return a continuous plant with a robot, without geometry and in no diagram.
+def read_robot(
+    parameters: RobotParameters,
+    folder: FilePath,
+    time_step: float = 0.0,
+    before_finalizing: Callable[[MultibodyPlant], None] | None = None,
+) -> tuple[MultibodyPlant, list[str]]:
+    """Return a plant with a robot, without the robot's geometry and in no diagram.
 
     Args:
         parameters: Which robot.
         folder: Where relative file names start.
+        time_step: Of the plant [s]; 0 for a continuous one.
+        before_finalizing: What else is to be added to the plant.
 
     Returns:
         The plant, and what there is to say about the model, one sentence each.
@@ -30,41 +36,37 @@ def read_robot(parameters: RobotParameters, folder: FilePath) -> tuple[Multibody
     Raises:
         InputError: If the model cannot be read.
     """
-    plant = MultibodyPlant(time_step=0.0)
-    return plant, _read(plant, parameters, folder)
+    plant = MultibodyPlant(time_step)
+    file, options = locate_model(parameters, folder), parameters.options(folder)
+    try:
+        return plant, read_model(plant, file, options, before_finalizing)
+    except InputError as error:
+        # what starts with an option is about the key of that name, what with the file about that
+        key = str(error).split(":")[0].split(".")[0]
+        if key in ModelOptions.__dataclass_fields__:
+            raise InputError(f"robot.{error}") from None
+        if str(error).startswith(str(file.parent)):
+            raise InputError(f"robot.model: {error}") from None
+        raise
 
 
-def add_visible_robot(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath
-) -> tuple[MultibodyPlant, SceneGraph]:
-    """Add a scene graph with a robot's geometry, and return it with the (unwired) plant.
+def locate_model(parameters: RobotParameters, folder: FilePath) -> FilePath:
+    """Return the file of a robot's model.
 
     Args:
-        builder: Builder of the diagram.
         parameters: Which robot.
         folder: Where relative file names start.
 
     Raises:
-        InputError: If the model cannot be read.
+        InputError: If there is no such file.
     """
-    plant = MultibodyPlant(time_step=0.0)
-    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    _read(plant, parameters, folder)
-    return plant, scene_graph
-
-
-def _read(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath) -> list[str]:
     model = parameters.model
     if FilePath(model).suffix and not model.startswith("package://"):
         model = str(folder / model)
     try:
-        return read_model(plant, resolve_model(model), parameters.options(folder))
+        return resolve_model(model)
     except InputError as error:
-        # what starts with an option is about the key of that name, the rest about the file
-        key = str(error).split(":")[0].split(".")[0]
-        about_key = key in ModelOptions.__dataclass_fields__
-        raise InputError(f"robot.{'' if about_key else 'model: '}{error}") from None
+        raise InputError(f"robot.model: {error}") from None
 
 
 def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:

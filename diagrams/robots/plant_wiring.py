@@ -6,8 +6,11 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
+from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.physics.external_wrench import ExternalWrench
+from pfsc_drake.systems.physics.tool_reaction import ToolReaction
 
 
 def connect_actuation(
@@ -77,3 +80,45 @@ def connect_push(builder: DiagramBuilder, plant: MultibodyPlant, push: ExternalW
     builder.Connect(
         push.GetOutputPort("applied_spatial_force"), plant.get_applied_spatial_force_input_port()
     )
+
+
+def add_tool_reaction(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    load: ToolLoad,
+    joint_state: OutputPort,
+    acceleration: OutputPort,
+    wrench: OutputPort | None,
+) -> OutputPort:
+    """Return what a sensor in the flange bears, of a robot whose plant does not tell it.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        load: Everything behind the sensor.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        acceleration: Of the links, shape (N,).
+        wrench: On the tool point, world axes, shape (6,), if anything acts there.
+    """
+    reaction = builder.AddNamedSystem("tool_reaction", ToolReaction(robot, load))
+    builder.Connect(joint_state, reaction.GetInputPort("joint_state"))
+    builder.Connect(acceleration, reaction.GetInputPort("acceleration"))
+    if wrench is not None:
+        builder.Connect(wrench, reaction.GetInputPort("wrench"))
+    return reaction.GetOutputPort("reaction")
+
+
+def joint_state_of(
+    builder: DiagramBuilder, plant_state: OutputPort, coordinates: PlantCoordinates
+) -> OutputPort:
+    """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+
+    Args:
+        builder: Builder of the diagram.
+        plant_state: State of the plant.
+        coordinates: Where the robot's coordinates stand in it.
+    """
+    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
+    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
+    builder.Connect(plant_state, encoders.get_input_port())
+    return encoders.get_output_port()

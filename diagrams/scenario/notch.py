@@ -1,4 +1,4 @@
-"""The workpiece with a notch that a DELTA robot's ball runs in (Sec. 3.8.2)."""
+"""The workpiece with a notch that a ball on the tool runs in (Sec. 3.8.2)."""
 
 import dataclasses as dc
 
@@ -14,13 +14,15 @@ _STEPS = (1e-5, 1e-3)
 
 @dc.dataclass
 class BallParameters:
-    """A ball with a soft shell, held below the end-effector by a gripper.
+    """A ball with a soft shell on the tool.
 
-    Gripper, ball and force/torque sensor are the load of the robot's parameters.
+    A DELTA robot holds it by a gripper; gripper, ball and force/torque sensor are the load of
+    the robot's parameters.
 
     Attributes:
         radius: Radius [m].
-        distance: From the end-effector's centre E down to the ball's [m].
+        distance: From the tool point down to the ball's centre [m]; 0 on robots that turn
+            their tool.
         modulus: Elasticity of the shell, pressure per relative depth [Pa].
         dissipation: Of Hunt and Crossley [s/m].
         friction: Coulomb coefficient between ball and notch.
@@ -35,9 +37,9 @@ class BallParameters:
     resolution: float = 6e-3
 
     def __post_init__(self) -> None:
-        for key in ("radius", "distance", "modulus", "resolution"):
+        for key in ("radius", "modulus", "resolution"):
             require_positive(key, getattr(self, key))
-        for key in ("dissipation", "friction"):
+        for key in ("distance", "dissipation", "friction"):
             require_not_negative(key, getattr(self, key))
 
 
@@ -45,12 +47,12 @@ class BallParameters:
 class NotchParameters:
     """A rigid workpiece with a round-bottomed notch, and the ball that runs in it.
 
-    The path is where E is when the ball lies on the bottom of the notch of a workpiece that
-    stands where it stood when the path was taught.
+    The path is where the tool point is when the ball lies on the bottom of the notch of a
+    workpiece that stands where it stood when the path was taught.
 
     Attributes:
         ball: The ball.
-        displacement: Of the workpiece since then [m], axes of the inertial frame (z_0 down).
+        displacement: Of the workpiece since then [m], world axes (z_0 down for DELTA robots).
         radius: Of the bottom [m], more than the ball's.
         depth: From the rim down to the bottom [m], not less than ``radius``.
         width: Of the workpiece across the notch [m].

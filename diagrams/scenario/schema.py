@@ -15,6 +15,7 @@ from diagrams.scenario.controller import ControllerParameters
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
+from diagrams.scenario.notch import NotchParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.simulation import SimulationParameters
@@ -52,13 +53,18 @@ class PathFollowingScenario:
         start: Where it starts.
         simulation: How it is integrated.
         forces: Wrenches on the tool over time.
-        hand: An operator's hand on the tool, in addition to the forces; none without the block.
+        hand: An operator's hand on the tool, in addition to the forces; none without the block
+            or with ``hand: null``.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
         friction: Friction of the joints.
+        drive_friction: Whether the drives have the friction that the robot's own parameters
+            tell, as those of DELTA robots do; null if they do and ``friction`` is empty.
         encoders: What the encoders do to the joint state.
         compliance: How the tool yields to measured forces.
         sensor: The force/torque sensor that measures them.
+        notch: Workpiece with a notch along the path, and a ball on the tool that runs in it; it
+            starts in the middle of the notch, ``start.offset`` beside. None without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -78,9 +84,11 @@ class PathFollowingScenario:
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
     friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+    drive_friction: bool | None = None
     encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)
     compliance: ComplianceParameters = dc.field(default_factory=ComplianceParameters)
     sensor: SensorParameters = dc.field(default_factory=SensorParameters)
+    notch: NotchParameters | None = None
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)

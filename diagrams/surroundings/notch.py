@@ -1,4 +1,4 @@
-"""Ball and notch in a plant with contact."""
+"""A workpiece with a notch, and the ball that runs in it."""
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -14,85 +14,108 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, RigidBody, SpatialInertia, WeldJoint
+from pydrake.multibody.tree import Frame
 
-from diagrams.scenario.notch import BallParameters, NotchParameters
+from diagrams.scenario.notch import NotchParameters
+from diagrams.surroundings.notch_motion import place_in_notch
+from diagrams.workpiece import FurtherLength, Workpiece, upwards
 from pfsc_drake.geometry import Path
 from pfsc_drake.geometry.sweep import swept_surface
 
-UP = np.array([0.0, 0.0, -1.0])  # z_0 points down
-TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
 _SPACING = 4e-3  # m, between cross-sections
 _ARC_POINTS = 13
 
 
-def add_ball(
-    plant: MultibodyPlant, end_effector: RigidBody, mass: float, ball: BallParameters
-) -> GeometryId:
-    """Weld gripper and ball to the end-effector, with a joint for the sensor between.
-
-    The frame ``tool_point`` on it is in E; the end-effector only translates, so that the
-    inertia about the centre of mass has no effect.
+class NotchedWorkpiece(Workpiece):
+    """A rigid workpiece with a notch along a path, and a ball with a soft shell on the tool.
 
     Args:
-        plant: A plant that is registered with a scene graph and not finalized.
-        end_effector: The end-effector.
-        mass: Of everything behind the sensor [kg].
-        ball: The ball.
-
-    Returns:
-        The ball's contact geometry.
-    """
-    half = RigidTransform(-0.5 * ball.distance * UP)
-    inertia = SpatialInertia.SolidSphereWithMass(mass, ball.radius).Shift(-half.translation())
-    tool = plant.AddRigidBody(TOOL, end_effector.model_instance(), inertia)
-    plant.AddJoint(
-        WeldJoint(SENSOR_JOINT, end_effector.body_frame(), tool.body_frame(), RigidTransform())
-    )
-    plant.AddFrame(FixedOffsetFrame(TOOL_POINT, tool.body_frame(), RigidTransform()))
-    properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=ball.dissipation,
-        friction=CoulombFriction(ball.friction, ball.friction),
-        properties=properties,
-    )
-    AddCompliantHydroelasticProperties(
-        resolution_hint=ball.resolution, hydroelastic_modulus=ball.modulus, properties=properties
-    )
-    X_TB = RigidTransform(-ball.distance * UP)
-    return plant.RegisterCollisionGeometry(tool, X_TB, Sphere(ball.radius), "ball", properties)
-
-
-def add_notch(plant: MultibodyPlant, path: Path, notch: NotchParameters) -> None:
-    """Fix the workpiece to the world.
-
-    Args:
-        plant: A plant that is registered with a scene graph and not finalized.
         path: The path that was taught.
-        notch: Workpiece and ball.
+        parameters: Workpiece and ball.
     """
-    properties = ProximityProperties()
-    friction = CoulombFriction(notch.ball.friction, notch.ball.friction)
-    AddContactMaterial(friction=friction, properties=properties)
-    AddRigidHydroelasticProperties(properties)
-    obj = MemoryFile(_as_obj(*notch_surface(path, notch)), ".obj", "notch")
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform(), Mesh(InMemoryMesh(mesh_file=obj)), "notch", properties
-    )
+
+    def __init__(self, path: Path, parameters: NotchParameters) -> None:
+        self._path, self.parameters = path, parameters
+
+    @property
+    def time_step(self) -> float:
+        """See :class:`Workpiece`."""
+        return self.parameters.time_step
+
+    @property
+    def reach(self) -> float:
+        """See :class:`Workpiece`."""
+        return self.parameters.ball.distance
+
+    @property
+    def radius(self) -> float:
+        """See :class:`Workpiece`."""
+        return self.parameters.ball.radius
+
+    def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
+        """See :class:`Workpiece`."""
+        up = upwards(plant.gravity_field().gravity_vector(), "notch")
+        ball = self._add_ball(plant, tool, up)
+        self._add_notch(plant, up)
+        return [ball]
+
+    def _add_notch(self, plant: MultibodyPlant, up: np.ndarray) -> None:
+        friction = self.parameters.ball.friction
+        properties = ProximityProperties()
+        AddContactMaterial(friction=CoulombFriction(friction, friction), properties=properties)
+        AddRigidHydroelasticProperties(properties)
+        surface = notch_surface(self._path, self.parameters, up)
+        mesh = Mesh(InMemoryMesh(mesh_file=MemoryFile(_as_obj(*surface), ".obj", "notch")))
+        plant.RegisterCollisionGeometry(
+            plant.world_body(), RigidTransform(), mesh, "notch", properties
+        )
+
+    def _add_ball(self, plant: MultibodyPlant, tool: Frame, up: np.ndarray) -> GeometryId:
+        """Add the ball below the tool point, on a tool whose axes are those of the world."""
+        ball, properties = self.parameters.ball, ProximityProperties()
+        AddContactMaterial(
+            dissipation=ball.dissipation,
+            friction=CoulombFriction(ball.friction, ball.friction),
+            properties=properties,
+        )
+        AddCompliantHydroelasticProperties(
+            resolution_hint=ball.resolution,
+            hydroelastic_modulus=ball.modulus,
+            properties=properties,
+        )
+        X_BC = tool.GetFixedPoseInBodyFrame() @ RigidTransform(-ball.distance * up)
+        return plant.RegisterCollisionGeometry(
+            tool.body(), X_BC, Sphere(ball.radius), "ball", properties
+        )
+
+    def start_shift(self, up: np.ndarray) -> np.ndarray:
+        """Return the way to the middle of the notch, where the ball touches nothing."""
+        return np.array(self.parameters.displacement) + self.parameters.clearance * up
+
+    def lengths(
+        self, path: Path, y_t: np.ndarray, initial_theta: float, up: np.ndarray
+    ) -> dict[str, FurtherLength]:
+        """Return ``notch_position`` of the ball, see :func:`place_in_notch`."""
+        place = place_in_notch(path, self.parameters, y_t, initial_theta, up)
+        limit = self.parameters.clearance
+        return {"notch_position": FurtherLength(place, ["left", "above"], limit)}
 
 
-def notch_surface(path: Path, notch: NotchParameters) -> tuple[np.ndarray, np.ndarray]:
+def notch_surface(
+    path: Path, notch: NotchParameters, up: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices [m], shape (k, 3), and triangles of the workpiece's surface.
 
     Args:
         path: The path that was taught.
         notch: Workpiece and ball.
+        up: Unit vector in the world, shape (3,).
     """
     begin, end = path.position.domain
     theta = np.linspace(begin, end, 2 + int(path.length / _SPACING))
-    vertices, triangles = swept_surface(path.position, theta, _profile(notch), UP)
+    vertices, triangles = swept_surface(path.position, theta, _profile(notch), up)
     # the path is that of E; the profile's origin is the notch's axis
-    axis = np.array(notch.displacement) + (notch.clearance - notch.ball.distance) * UP
+    axis = np.array(notch.displacement) + (notch.clearance - notch.ball.distance) * up
     return vertices + axis, triangles
 
 

@@ -25,7 +25,7 @@ def reference_order(scenario: PathFollowingScenario, linearization: Linearizatio
     """
     if not scenario.compliance.is_given:
         return linearization.relative_degree
-    if linearization.time_driven:
+    if linearization.manifold.follows_time:
         raise InputError(
             "compliance: controller.manifold = trajectory has no path coordinates that could "
             "yield; must be path"
@@ -45,7 +45,7 @@ def add_compliance(
         builder: Builder of the diagram.
         scenario: The scenario, with compliance.
         linearization: Of the law that follows the reference.
-        ports: ``wrench_measured``, ``tared``, ``path_point``, ``manifold_state`` and
+        ports: ``wrench_measured``, ``tared``, ``manifold_point``, ``manifold_state`` and
             ``desired_reference`` with derivatives up to :func:`reference_order`.
 
     Returns:
@@ -54,10 +54,10 @@ def add_compliance(
     Raises:
         InputError: If the compliance does not suit the law.
     """
-    layout, period = linearization.layout, scenario.controller.sampling_time
+    manifold, period = linearization.manifold, scenario.controller.sampling_time
     law = ImpedanceLaw(
         scenario.compliance.impedance(),
-        linearization.num_outputs,
+        manifold.coordinates,
         linearization.relative_degree,
         period,
         desired_order=reference_order(scenario, linearization),
@@ -65,13 +65,13 @@ def add_compliance(
     impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
     transform = builder.AddNamedSystem(
         "manifold_force_transform",
-        ManifoldForceTransform(layout, with_turning=scenario.compliance.with_turning),
+        ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning),
     )
     reference = impedance.GetOutputPort("reference")
     force = transform.GetOutputPort("manifold_force")
     builder.Connect(ports["wrench_measured"], transform.GetInputPort("wrench"))
-    builder.Connect(ports["path_point"], transform.GetInputPort("path_point"))
-    if layout.oriented:
+    builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
+    if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
     builder.Connect(force, impedance.GetInputPort("manifold_force"))
     builder.Connect(ports["tared"], impedance.GetInputPort("ready"))

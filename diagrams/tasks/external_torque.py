@@ -6,7 +6,7 @@ from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.external_torque import ExternalTorque
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.following_controller import FollowingController
 
 
 def needs_sensor(scenario: PathFollowingScenario) -> bool:
@@ -19,7 +19,7 @@ def add_external_torque(
     builder: DiagramBuilder,
     robot: RobotModel,
     scenario: PathFollowingScenario,
-    controller: PathFollowingController,
+    controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> None:
     """Tell the law the external torques in the joints, if it is to know them.

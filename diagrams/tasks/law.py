@@ -7,49 +7,46 @@ from diagrams.scenario import (
     GainParameters,
 )
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.law import PathLaw, SafeState
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
 from pfsc_drake.control.law.linearization import (
     ActuationOptions,
-    linearize_path,
+    linearize,
 )
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
-_COORDINATES = {3: ("eta", "xi", "xi"), 6: ("eta", "xi", "xi", "phi", "phi", "phi")}
 
-
-def make_law(parameters: ControllerParameters, chain: RobotModel, oriented: bool) -> PathLaw:
-    """Return the path following law of a robot.
+def make_law(
+    parameters: ControllerParameters, robot: RobotModel, manifold: Manifold
+) -> FollowingLaw:
+    """Return the law that makes a robot follow a manifold.
 
     Args:
         parameters: What the scenario says.
-        chain: The robot.
-        oriented: Whether the path has an orientation.
+        robot: The robot.
+        manifold: What to follow.
 
     Raises:
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
     """
     law = parameters.law
     damping = parameters.boundary_layer_damping
-    linearization = linearize_path(
-        chain,
-        law,
-        oriented=oriented,
-        options=ActuationOptions(parameters.sampling_time, np.array(damping) if damping else None),
-        time_driven=parameters.manifold != "path",
-    )
+    options = ActuationOptions(parameters.sampling_time, np.array(damping) if damping else None)
+    linearization = linearize(robot, law, manifold, options)
     if law not in parameters.gains:
         given = ", ".join(parameters.gains) or "none"
         raise InputError(f"controller.gains: no gains for the law '{law}'; given are {given}")
     by_kind = parameters.gains[law]
-    names = _COORDINATES[linearization.num_outputs]
+    # coordinates of a kind share their gains
+    names = [coordinate.kind.value for coordinate in manifold.coordinates]
     relative_degree = linearization.relative_degree
     gains = [_gains(getattr(by_kind, name), relative_degree, law, name) for name in names]
-    effort = chain.gather("effort_limit") * parameters.effort_scale
-    limits = chain.gather("velocity_limit") if relative_degree == 1 else effort
-    return PathLaw(
-        chain,
+    effort = robot.gather("effort_limit") * parameters.effort_scale
+    limits = robot.gather("velocity_limit") if relative_degree == 1 else effort
+    return FollowingLaw(
+        robot,
         linearization,
         Stabilization(gains, relative_degree, names),
         DecouplingInverse(parameters.min_rcond),

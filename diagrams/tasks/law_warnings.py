@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.scenario import ControllerParameters, PathFollowingScenario
 from pfsc_drake.robot.resonance import joint_resonances
-from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.robot_model import RobotModel
 
 # rad per sampling interval, up to which the exact elastic law keeps its accuracy
 _FASTEST_RESONANCE = 1.0
@@ -13,30 +13,30 @@ _FASTEST_DAMPING = 1.8
 
 
 def law_warnings(
-    scenario: PathFollowingScenario, chain: SerialChain, link_state: np.ndarray
+    scenario: PathFollowingScenario, robot: RobotModel, link_state: np.ndarray
 ) -> list[str]:
     """Return what a scenario's sampled law will not do well, one sentence each.
 
     Args:
         scenario: The scenario.
-        chain: The robot.
+        robot: The robot.
         link_state: ``[q_J, v_J]`` at the start, shape (2N,).
     """
     parameters = scenario.controller
     return [
-        *_fast_resonance(parameters, chain, link_state),
-        *_fast_damping(parameters, chain),
-        *_unknown_forces(scenario, chain),
+        *_fast_resonance(parameters, robot, link_state),
+        *_fast_damping(parameters, robot),
+        *_unknown_forces(scenario, robot),
     ]
 
 
 def _fast_resonance(
-    parameters: ControllerParameters, chain: SerialChain, link_state: np.ndarray
+    parameters: ControllerParameters, robot: RobotModel, link_state: np.ndarray
 ) -> list[str]:
     if parameters.law != "elastic":
         return []
     period = parameters.sampling_time
-    resonance = joint_resonances(chain, link_state[: chain.dimension])[-1]
+    resonance = joint_resonances(robot, link_state[: robot.dimension])[-1]
     if resonance * period <= _FASTEST_RESONANCE:
         return []
     return [
@@ -47,11 +47,11 @@ def _fast_resonance(
     ]
 
 
-def _fast_damping(parameters: ControllerParameters, chain: SerialChain) -> list[str]:
+def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[str]:
     if parameters.law != "singular_perturbation":
         return []
     damping = np.array(parameters.boundary_layer_damping)
-    rate = float(np.max(chain.K_s * damping * parameters.sampling_time / chain.D_M))
+    rate = float(np.max(robot.K_s * damping * parameters.sampling_time / robot.D_M))
     if rate <= _FASTEST_DAMPING:
         return []
     return [
@@ -61,11 +61,11 @@ def _fast_damping(parameters: ControllerParameters, chain: SerialChain) -> list[
     ]
 
 
-def _unknown_forces(scenario: PathFollowingScenario, chain: SerialChain) -> list[str]:
+def _unknown_forces(scenario: PathFollowingScenario, robot: RobotModel) -> list[str]:
     parameters = scenario.controller
     scripted = bool(scenario.forces) or scenario.hold_back.force != 0.0
     pushed = scripted or scenario.hand is not None
-    exact = parameters.law in ("elastic", "visco_elastic") and chain.is_elastic
+    exact = parameters.law in ("elastic", "visco_elastic") and robot.is_elastic
     if not (exact and pushed and parameters.external_torque.source == "none"):
         return []
     return [

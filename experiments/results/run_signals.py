@@ -9,7 +9,7 @@ from diagrams.station import Station
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.linearization import path_output_function
+from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
 from pfsc_drake.robot.robot_model import pose_function
 
@@ -38,21 +38,21 @@ def collect_log(station: Station, root: Context) -> RunLog:
     linearization, layout = station.law.linearization, station.law.layout
     Y = raw["law"][:, layout.manifold_state]
     Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
-    points = raw["path_point"]
-    if linearization.time_driven or station.on_motors or measured is not None:
-        if linearization.time_driven:
+    points = raw["manifold_point"]
+    if linearization.manifold.follows_time or station.on_motors or measured is not None:
+        if linearization.manifold.follows_time:
             log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
         else:
             _add_seen(log, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose, linearization.relative_degree)
         seen = _path_output(station, raw["joint_state"], points)
         # the orientation errors of trajectory tracking stay those from the moving reference
-        replaced = slice(0, 3) if linearization.time_driven else slice(None)
+        replaced = slice(0, 3) if linearization.manifold.follows_time else slice(None)
         Y[:, :2, replaced] = seen[:, : Y.shape[1], replaced]
-    log.add("theta", points[:, linearization.layout.theta], "1")
-    log.add("alpha", points[:, linearization.layout.alpha], "1")
+    log.add("theta", points[:, station.task.place.layout.theta], "1")
+    log.add("alpha", points[:, station.task.place.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
-    _add_orientation(log, station, raw["path_point"], points, pose)
+    _add_orientation(log, station, raw["manifold_point"], points, pose)
     _add_forces(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -86,10 +86,10 @@ def _add_seen(log: RunLog, y: np.ndarray, suffix: str) -> None:
 
 def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
     """Return ``[y_t, R_e]`` of the links, shape (samples, 12)."""
-    q_J = joint_state[:, : station.chain.dimension]
+    q_J = joint_state[:, : station.robot.dimension]
     if len(q_J) == 0:
         return np.zeros((0, 12))
-    return np.array(pose_function(station.chain).map(len(q_J))(q_J.T)).T
+    return np.array(pose_function(station.robot).map(len(q_J))(q_J.T)).T
 
 
 def collect_motion(station: Station, root: Context, period: float) -> RecordedMotion:
@@ -101,21 +101,21 @@ def collect_motion(station: Station, root: Context, period: float) -> RecordedMo
         period: Time between frames [s].
     """
     times, raw = station.log.read(root)
-    finite = np.isfinite(np.hstack([raw["path_point"], raw["joint_state"]])).all(axis=1)
+    finite = np.isfinite(np.hstack([raw["manifold_point"], raw["joint_state"]])).all(axis=1)
     usable = np.flatnonzero(finite)
     stride = max(1, round(period / station.controller.period))
     frames = usable[::stride]
     state = raw["joint_state"][frames]
-    states = [station.coordinates.plant_state(x) for x in state]
-    half = station.coordinates.num_states // 2
+    states = [station.part.coordinates.plant_state(x) for x in state]
+    half = station.part.coordinates.num_states // 2
     positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
     return RecordedMotion(
-        times[frames], positions, _tool_poses(station, state), raw["path_point"][frames]
+        times[frames], positions, _tool_poses(station, state), raw["manifold_point"][frames]
     )
 
 
 def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
-    chain, n = station.chain, station.chain.dimension
+    chain, n = station.robot, station.robot.dimension
     q_J, v_J, q_M, v_M = np.hsplit(state, 4)
     effort, axes = _joint_units(station)[2], [str(i + 1) for i in range(n)]
     _add_joint_state(log, station, state)
@@ -131,15 +131,15 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
 def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
     angle, rate, _ = _joint_units(station)
     names = ["q_J", "v_J"]
-    if np.isfinite(station.chain.K_s).any():  # motors of rigid joints move as the links do
+    if np.isfinite(station.robot.K_s).any():  # motors of rigid joints move as the links do
         names += ["q_M", "v_M"]
     for name, values in zip(names, np.hsplit(state, 4), strict=False):
-        labels = [f"{name}{suffix}_{i + 1}" for i in range(station.chain.dimension)]
+        labels = [f"{name}{suffix}_{i + 1}" for i in range(station.robot.dimension)]
         log.add(f"{name}{suffix}", values, angle if name.startswith("q") else rate, labels)
 
 
 def _joint_units(station: Station) -> tuple[str, str, str]:
-    is_revolute = station.chain.gather("is_revolute")
+    is_revolute = station.robot.gather("is_revolute")
     if is_revolute.all():
         return "rad", "rad/s", "Nm"
     if is_revolute.any():
@@ -184,8 +184,8 @@ def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.nda
 
 def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the virtual output of the links and its rate, shape (samples, 2, m)."""
-    n, linearization = station.chain.dimension, station.law.linearization
-    function = path_output_function(station.chain, linearization.layout).map(len(points))
+    n, linearization = station.robot.dimension, station.law.linearization
+    function = virtual_output_function(station.robot, station.task.place).map(len(points))
     Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)
 
@@ -208,11 +208,11 @@ def _add_orientation(
     And how far that reference is away from the orientation that belongs to the tool's place.
     """
     linearization = station.law.linearization
-    if not linearization.layout.oriented:
+    if not station.task.place.layout.oriented:
         return
-    point = followed if linearization.time_driven else place
-    R_e, R_d = _rotations(linearization.layout, pose, point)
-    _, R_place = _rotations(linearization.layout, pose, place)
+    point = followed if linearization.manifold.follows_time else place
+    R_e, R_d = _rotations(station.task.place.layout, pose, point)
+    _, R_place = _rotations(station.task.place.layout, pose, place)
     unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
     for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
         angles = np.unwrap(matrix_to_zyx(R), axis=0)
@@ -241,7 +241,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         if name in raw:
             log.add(name, raw[name], unit, labels)
     if "wrench_ext" in raw:
-        labels = [f"tau_ext_{i + 1}" for i in range(station.chain.dimension)]
+        labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
     if "desired_reference" in raw:
         desired = raw["desired_reference"][:, :m]
@@ -253,21 +253,21 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
     """Return what the wrench on the tool means in the joints, shape (samples, N)."""
-    q_J, wrench = raw["joint_state"][:, : station.chain.dimension], raw["wrench_ext"]
+    q_J, wrench = raw["joint_state"][:, : station.robot.dimension], raw["wrench_ext"]
     if len(q_J) == 0:
         return np.zeros_like(q_J)
-    return np.array(joint_torque_function(station.chain).map(len(q_J))(q_J.T, wrench.T)).T
+    return np.array(joint_torque_function(station.robot).map(len(q_J))(q_J.T, wrench.T)).T
 
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add the torques that a velocity servo gives, and what friction takes."""
     effort = _joint_units(station)[2]
     if "drive_torque" in raw:
-        limits = station.chain.gather("effort_limit")
-        labels = [f"tau_d_{i + 1}" for i in range(station.chain.dimension)]
+        limits = station.robot.gather("effort_limit")
+        labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
         names = [fault.name.lower() for fault in Fault]
         log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
     if "friction_torque" in raw:
-        labels = [f"tau_f_{i + 1}" for i in range(station.chain.dimension)]
+        labels = [f"tau_f_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_f", raw["friction_torque"], effort, labels)

@@ -28,18 +28,17 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     sensor = _sensor(station, root)
     controller = station.controller.GetMyContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
-    plant = station.plant.GetMyMutableContextFromRoot(root)
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
     states = np.hstack([log[name].values for name in names])
     finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
     usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
     chosen = usable[:: max(1, len(usable) // _SAMPLES)]
-    plant_states = [station.coordinates.plant_state(x) for x in states[chosen]]
+    plant_states = [station.part.coordinates.plant_state(x) for x in states[chosen]]
     elapsed = []
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
         station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
-        station.place_robot(plant, x)
+        station.place_robot(root, x)
         sensor()  # what the plant needs to know its forces is not the controller's time
         begin = time.perf_counter()
         drive.Eval(controller)

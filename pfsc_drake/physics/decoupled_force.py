@@ -3,13 +3,11 @@
 import casadi as ca
 
 from pfsc_drake.control.law.actuation import joint_jets
-from pfsc_drake.control.law.linearization import path_geometry
-from pfsc_drake.control.manifolds.path_coordinates import path_coordinates
-from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.control.manifolds.path import PathManifold, path_coordinates
 from pfsc_drake.robot.robot_model import RobotModel
 
 
-def decoupled_force_function(robot: RobotModel, layout: PathPointLayout) -> ca.Function:
+def decoupled_force_function(robot: RobotModel, manifold: PathManifold) -> ca.Function:
     """Return the wrench whose effect on the slow dynamics (3.68) is along ``eta`` alone.
 
     An external wrench w accelerates the virtual output by ``A (D_E + D_M)^-1 J_g' w``.
@@ -18,16 +16,16 @@ def decoupled_force_function(robot: RobotModel, layout: PathPointLayout) -> ca.F
 
     Args:
         robot: A robot with six axes.
-        layout: Layout of an oriented path's points.
+        manifold: A path with orientation.
 
     Returns:
-        CasADi function ``(q, path_point) -> [force, torque]`` at the tool point, world
+        CasADi function ``(q, manifold_point) -> [force, torque]`` at the tool point, world
         axes, shapes (6,), (size,) and (6,).
     """
     n = robot.dimension
     q, rate = ca.SX.sym("q", n), ca.SX.sym("rate", n)
-    point = ca.SX.sym("path_point", layout.size)
-    path = path_geometry(layout, point)
+    point = ca.SX.sym("manifold_point", manifold.layout.size)
+    path = manifold.geometry(point)
     y, R_e = robot.tool_pose(joint_jets([q, rate]))
     output = path_coordinates(y, R_e, path)
     A = ca.jacobian(ca.vertcat(*[x.coefficients[1] for x in output]), rate)

@@ -85,7 +85,7 @@ class ForceProfile:
         self._spans = [(pulse.begin, pulse.end) for pulse in pulses]
 
     @property
-    def needs_path(self) -> bool:
+    def needs_manifold(self) -> bool:
         """Whether a pulse is given in manifold coordinates."""
         return bool(self._by_frame["manifold"])
 
@@ -98,7 +98,7 @@ class ForceProfile:
 
         Args:
             time: [s].
-            axes: See :func:`manifold_axes`, shape (3, 3).
+            axes: Directions of the frame ``manifold`` as columns, shape (3, 3).
         """
         if not self.is_active(time, time):
             return np.zeros(6)

@@ -12,7 +12,7 @@ from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
@@ -22,9 +22,9 @@ SPAN = 0.2
 # system, output port
 OUTPUTS = [
     ("tool_kinematics", "tool_pose"),
-    ("path_projector", "path_point"),
+    ("path_projector", "manifold_point"),
     ("reference_generator", "reference"),
-    ("path_following_controller", "law"),
+    ("following_controller", "law"),
     ("force_torque_sensor", "measurement"),
     ("tool_compensation", "compensation"),
     ("manifold_force_transform", "manifold_force"),
@@ -45,7 +45,7 @@ class Loop:
         for pulse in self.scenario.forces:
             pulse.begin, pulse.end = 0.1, 10.0
         with compiled_when_bound():
-            self.station = build_path_following(self.scenario, SCENARIOS)
+            self.station = build_station(self.scenario, SCENARIOS)
         self.simulator = Simulator(self.station.diagram)
         simulation = self.scenario.simulation
         ApplySimulatorConfig(
@@ -135,7 +135,7 @@ def test_update(loop, benchmark, name):
 
 def test_plant(loop, benchmark):
     """Accelerations and reaction forces, as the sensor asks for them."""
-    plant = loop.station.plant
+    plant = loop.station.part.plant
     context = plant.CreateDefaultContext()
     state = loop.station.initial_state
     plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))

@@ -14,10 +14,11 @@ from scipy.optimize import least_squares
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law import PathLaw, SafeState
-from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -27,7 +28,7 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -89,14 +90,14 @@ class Chain:
         measured = builder.AddSystem(MatrixGain(rows))
         kinematics = builder.AddSystem(ToolKinematics(self.robot))
         projector = builder.AddSystem(PathProjector(self.path, r, PERIOD))
-        controller = builder.AddSystem(PathFollowingController(self.law, PERIOD))
+        controller = builder.AddSystem(FollowingController(self.law, PERIOD))
         motion = rest_to_rest([0.0, 5.0], velocity=1.5, acceleration=5.0)
         reference = builder.AddSystem(ReferenceGenerator(motion, r, m))
         builder.ExportInput(measured.get_input_port(), "plant_state")
         builder.Connect(measured.get_output_port(), kinematics.GetInputPort("joint_state"))
         builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))
         builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
-        builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
+        builder.Connect(projector.get_output_port(), controller.GetInputPort("manifold_point"))
         builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))
         builder.ExportOutput(controller.GetOutputPort("drive_torque"), "drive")
         self.diagram = builder.Build()
@@ -131,11 +132,13 @@ def make_path(oriented):
 
 
 def make_law(robot, law, oriented):
-    linearization = linearize_path(robot, law, oriented=oriented, options=ActuationOptions(PERIOD))
+    linearization = linearize(
+        robot, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), ActuationOptions(PERIOD)
+    )
     r, m, n = linearization.relative_degree, linearization.num_outputs, robot.dimension
     stabilization = Stabilization([gains_from_poles([-50.0] * r)] * m, r, NAMES[:m])
     inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(n, 30.0))
-    return PathLaw(robot, linearization, stabilization, inverse, np.full(n, 1e6), 0.9, safe)
+    return FollowingLaw(robot, linearization, stabilization, inverse, np.full(n, 1e6), 0.9, safe)
 
 
 @pytest.fixture(scope="module", params=CASES, name="chain")
@@ -154,7 +157,7 @@ def test_whole_tick(chain, benchmark):
     assert not np.array_equal(drive, before)
 
 
-def test_projection_and_path_point(chain, benchmark):
+def test_projection_and_manifold_point(chain, benchmark):
     evaluator = chain.path.evaluator(chain.law.linearization.relative_degree)
     y_t = (chain.path.position.derivatives(THETA, 0)[0] - 0.002).tolist()
     point = benchmark(evaluator, y_t, THETA - 0.006)

@@ -11,9 +11,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.law import PathLaw, SafeState
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -33,11 +34,14 @@ class Robot:
     Nothing in here uses the chain's own kinematics and dynamics.
     """
 
-    def __init__(self, model, joint_damping=()):
+    def __init__(self, model, joint_damping=(), drive_damping=()):
         self.plant = MultibodyPlant(0.0)
         Parser(self.plant).AddModels(str(resolve_model(model)))
         for i, damping in enumerate(joint_damping):
             self.plant.GetJointByName(f"flex_{i + 1}").set_default_damping(damping)
+        drive = "motor" if self.plant.HasJointNamed("motor_1") else "joint"
+        for i, damping in enumerate(drive_damping):
+            self.plant.GetJointByName(f"{drive}_{i + 1}").set_default_damping(damping)
         self.plant.Finalize()
         self.tool = self.plant.GetFrameByName("tool_point")
         self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
@@ -101,8 +105,8 @@ class Robot:
 @pytest.fixture(scope="session")
 def load_robot():
     @cache
-    def load(model, joint_damping=()):
-        return Robot(model, joint_damping)
+    def load(model, joint_damping=(), drive_damping=()):
+        return Robot(model, joint_damping, drive_damping)
 
     return load
 
@@ -151,7 +155,9 @@ def make_law():
         damping = changes.pop("boundary_layer_damping", None)
         integral = changes.pop("integral", 0.0)
         options = ActuationOptions(sampling_time, damping)
-        linearization = linearize_path(chain, law, oriented=oriented, options=options)
+        linearization = linearize(
+            chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), options
+        )
         r, m, n = RELATIVE_DEGREE[law], linearization.num_outputs, chain.dimension
         poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
         gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]
@@ -164,6 +170,6 @@ def make_law():
             "max_alpha": 0.9,
             "safe_state": SafeState(np.full(n, 50.0)),
         }
-        return PathLaw(**(arguments | changes))
+        return FollowingLaw(**(arguments | changes))
 
     return make

@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from experiments import simulation
 from experiments.catalog.scenario_catalog import find_scenario
@@ -39,7 +39,7 @@ def run(settings):
     def simulated(duration, **changes):
         for key, value in changes.items():
             setattr(settings.simulation, key, value)
-        station = build_path_following(settings, None)
+        station = build_station(settings, None)
         listener = Listener()
         result = simulate(station, copy.deepcopy(settings.simulation), duration, listener)
         return station, result, collect_log(station, result.root), listener.calls
@@ -103,10 +103,10 @@ def test_motion_at_the_frames(settings, run):
     station, result, log, _ = run(0.1)
     motion = collect_motion(station, result.root, 0.032)
     np.testing.assert_allclose(motion.times, [0.0, 0.032, 0.064, 0.096], atol=1e-9)
-    context = station.plant.CreateDefaultContext()
-    tool = station.plant.GetFrameByName("tool_point")
+    context = station.part.plant.CreateDefaultContext()
+    tool = station.part.plant.GetFrameByName("tool_point")
     for time, positions, pose in zip(motion.times, motion.positions, motion.tool_pose, strict=True):
-        station.plant.SetPositions(context, positions)
+        station.part.plant.SetPositions(context, positions)
         y_t = tool.CalcPoseInWorld(context).translation()
         np.testing.assert_allclose(pose[:3], y_t, atol=1e-12)
         np.testing.assert_array_equal(pose[:3], log["y_t"].values[round(time / 1e-3)])

@@ -5,8 +5,9 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
-from pfsc_drake.control.law.linearization import path_output_function
-from pfsc_drake.geometry import FourierCurve, OrientationCurve, Path, PathPointLayout
+from pfsc_drake.control.law.linearization import virtual_output_function
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.geometry import FourierCurve, OrientationCurve, Path
 from pfsc_drake.physics.decoupled_force import decoupled_force_function
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -25,10 +26,10 @@ def test_only_the_arc_length_is_accelerated():
     center = np.add(y_t, [0.0, 0.1, 0.02])
     curve = FourierCurve.circle(center, 0.12, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
     path = Path(curve, OrientationCurve.fixed([0.2, 0.1, 0.9, 0.3], curve.domain))
-    layout = PathPointLayout(1, True)
+    manifold = PathManifold(1, oriented=True)
     point = path.evaluator(1)(y_t.tolist(), path.project_globally(y_t).theta)
 
-    wrench = np.array(decoupled_force_function(chain, layout)(q, point)).ravel()
+    wrench = np.array(decoupled_force_function(chain, manifold)(q, point)).ravel()
     J = plant.CalcJacobianSpatialVelocity(
         context,
         JacobianWrtVariable.kV,
@@ -40,8 +41,8 @@ def test_only_the_arc_length_is_accelerated():
     tau = J.T @ np.concatenate([wrench[3:], wrench[:3]])
     acceleration = np.linalg.solve(plant.CalcMassMatrix(context), tau)
     # the rate of the virtual output is linear in the joint velocity
-    rate = path_output_function(chain, layout)
+    rate = virtual_output_function(chain, manifold)
     effect = np.array(rate(q, acceleration, point))[:, 1]
     assert np.max(np.abs(effect[1:])) < 1e-12 * abs(effect[0])
-    slope = point[layout.position][3:6]
+    slope = point[manifold.layout.position][3:6]
     assert np.isclose(wrench[:3] @ slope / np.linalg.norm(slope), 1.0)

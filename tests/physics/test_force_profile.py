@@ -77,8 +77,8 @@ def test_pulses_add_up_over_frames():
     expected = [1 + 30, 2 + 10, 3 + 20, 4 + 60, 5 + 40, 6 + 50]
     assert profile.at(5.0, axes) == pytest.approx(expected)
     assert profile.at(20.5, axes) == pytest.approx([7, 0, 0, 0, 0, 0])
-    assert profile.needs_path
-    assert not ForceProfile([ForcePulse()]).needs_path
+    assert profile.needs_manifold
+    assert not ForceProfile([ForcePulse()]).needs_manifold
     assert not np.any(ForceProfile([]).at(0.0, axes))
 
 

@@ -7,9 +7,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import least_squares
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.law import PathLaw, SafeState
-from pfsc_drake.control.law.linearization import ActuationOptions, linearize_path
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import FourierCurve, Path
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -58,11 +59,13 @@ def make_law(arm):
 
     def make(integral=0.0, law="rigid"):
         options = ActuationOptions(1e-3)
-        linearization = linearize_path(arm.chain, law, oriented=False, options=options)
+        linearization = linearize(
+            arm.chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=False), options
+        )
         r = linearization.relative_degree
         gains = CoordinateGains(gains_from_poles([-20.0] * r).proportional, integral)
         stabilization = Stabilization([gains] * 3, r, ["eta", "xi_1", "xi_2"])
-        return PathLaw(
+        return FollowingLaw(
             arm.chain,
             linearization,
             stabilization,

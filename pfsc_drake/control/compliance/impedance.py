@@ -3,7 +3,7 @@
 import enum
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,10 +15,13 @@ from pfsc_drake.control.compliance.impedance_functions import (
     reference_function,
     update_function,
 )
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.schema_check import REQUIRED
 
 MASS, DAMPING, STIFFNESS = range(3)
+# what a profile over the size of all transversal coordinates goes over
+_ACROSS = Kind.TRANSVERSAL.value
 
 
 class ImpedanceStatus(enum.IntFlag):
@@ -40,7 +43,8 @@ class Profile:
 
     Attributes:
         value: The constant, if there are no breakpoints.
-        over: ``eta`` [m], or ``xi`` for ``|(xi_1, xi_2)|`` [m].
+        over: Name of a coordinate, e.g. ``eta`` [m], or ``xi`` for the size of all transversal
+            ones, e.g. ``|(xi_1, xi_2)|`` [m].
         at: Breakpoints, increasing; none or at least two.
         values: Values there.
     """
@@ -53,8 +57,6 @@ class Profile:
     def __post_init__(self) -> None:
         if not self.value >= 0.0:
             raise InputError(f"value: {self.value}; must be zero or a positive number")
-        if self.over not in ("eta", "xi"):
-            raise InputError(f"over: {self.over!r}; must be eta or xi")
         if len(self.at) != len(self.values) or len(self.at) == 1:
             counts = f"values: {len(self.values)} at {len(self.at)} breakpoints"
             raise InputError(f"{counts}; as many, and none or at least two, are needed")
@@ -64,7 +66,7 @@ class Profile:
             raise InputError(f"values: {self.values}; must be finite, none negative")
 
     def interpolant(self) -> Callable[[float], float]:
-        """Return the parameter as a function of eta or of ``|xi|`` [m]."""
+        """Return the parameter as a function of what it goes over."""
         if not self.at:
             constant = self.value
             return lambda _: constant
@@ -112,20 +114,28 @@ class ImpedanceParameters:
     """Impedance of all coordinates; those not given are position-controlled.
 
     Attributes:
-        tangential: Of eta.
-        transversal: Of xi_1 and xi_2.
-        rotational: Of the three angles, if there are any.
+        tangential: Of the tangential coordinates.
+        transversal: Of the transversal ones.
+        rotational: Of the angles.
     """
 
     tangential: CoordinateImpedance = field(default_factory=CoordinateImpedance)
     transversal: CoordinateImpedance = field(default_factory=CoordinateImpedance)
     rotational: CoordinateImpedance = field(default_factory=CoordinateImpedance)
 
+    def of(self, kind: Kind) -> CoordinateImpedance:
+        """Return the impedance of a kind of coordinates."""
+        return {
+            Kind.TANGENTIAL: self.tangential,
+            Kind.TRANSVERSAL: self.transversal,
+            Kind.ROTATIONAL: self.rotational,
+        }[kind]
+
 
 class ImpedanceLaw:
     """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, of every coordinate, sampled.
 
-    It is (3.42) for eta and xi, (3.44) for the angles. The state is the *motion itself*,
+    For a path it is (3.42) for eta and xi, (3.44) for the angles. The state is the *motion itself*,
     y_p and y_p', with the force and the parameters of the last interval. Whatever
     changes - parameters, external reference, force - changes only how the motion goes on:
     e is formed anew at every tick and absorbs it. Hence no step in y_p or y_p'.
@@ -142,7 +152,7 @@ class ImpedanceLaw:
 
     Args:
         parameters: Masses, dampings, stiffnesses.
-        num_outputs: m, 3 or 6.
+        coordinates: The m coordinates of the virtual output.
         relative_degree: r of the law that follows the reference, 1..4.
         period: Sampling time T [s].
         desired_order: Highest derivative of y_d that is given, at least max(r, 2), which
@@ -160,17 +170,16 @@ class ImpedanceLaw:
     def __init__(
         self,
         parameters: ImpedanceParameters,
-        num_outputs: int,
+        coordinates: Sequence[Coordinate],
         relative_degree: int,
         period: float,
         *,
         desired_order: int | None = None,
         response_order: int = 2,
     ) -> None:
-        least = max(relative_degree, 2)
+        m, least = len(coordinates), max(relative_degree, 2)
         self.desired_order = least if desired_order is None else desired_order
         for name, value, allowed, is_allowed in [
-            ("num_outputs", num_outputs, "3 or 6", num_outputs in (3, 6)),
             ("relative_degree", relative_degree, "1 to 4", 1 <= relative_degree <= 4),
             ("period", period, "a positive number of seconds", 0.0 < period < math.inf),
             ("desired_order", desired_order, f"{least} or more", self.desired_order >= least),
@@ -178,20 +187,35 @@ class ImpedanceLaw:
         ]:
             if not is_allowed:
                 raise InputError(f"impedance filter, {name}: {value}; must be {allowed}")
-        self.num_outputs, self.relative_degree, self.period = num_outputs, relative_degree, period
+        self.num_outputs, self.relative_degree, self.period = m, relative_degree, period
         self._response_order = min(response_order, relative_degree)
-        kinds = [parameters.tangential, parameters.transversal, parameters.rotational]
+        self._across = indices(coordinates, Kind.TRANSVERSAL)
+        self._names = [coordinate.name for coordinate in coordinates]
+        used = {coordinate.kind: parameters.of(coordinate.kind) for coordinate in coordinates}
         # they may have been changed since they were made
-        for part in (p for k in kinds for p in (k.mass, k.damping, k.stiffness, k)):
+        for part in (p for k in used.values() for p in (k.mass, k.damping, k.stiffness, k)):
             part.__post_init__()
-        self._repeats = [1, 2] if num_outputs == 3 else [1, 2, 3]
-        table = [[kind.mass, kind.damping, kind.stiffness] for kind in kinds[: len(self._repeats)]]
+        self._check_profiles(used)
+        table = [[kind.mass, kind.damping, kind.stiffness] for kind in used.values()]
         self._profiles = [[(p.over, p.interpolant()) for p in row] for row in table]
+        self._row = [list(used).index(coordinate.kind) for coordinate in coordinates]
         self.is_constant = not any(p.at for row in table for p in row)
-        self._constant = self._at({"eta": 0.0, "xi": 0.0})
+        self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], 0.0))
         # the impedance that the coefficients belong to
-        self._key, self._coefficients = b"", np.zeros((8, num_outputs))
+        self._key, self._coefficients = b"", np.zeros((8, m))
         self._bind_functions()
+
+    def _check_profiles(self, used: dict[Kind, CoordinateImpedance]) -> None:
+        """Refuse profiles over something that the manifold does not have."""
+        allowed = list(dict.fromkeys([*self._names, _ACROSS]))
+        for kind, impedance in used.items():
+            for name in ("mass", "damping", "stiffness"):
+                over = getattr(impedance, name).over
+                if over not in allowed:
+                    raise InputError(
+                        f"compliance.{kind.name.lower()}.{name}.over: {over!r}; must be one of "
+                        f"{', '.join(allowed)}"
+                    )
 
     def _bind_functions(self) -> None:
         """Give both functions one set of arrays for what they have in common."""
@@ -220,11 +244,12 @@ class ImpedanceLaw:
         """Return masses, dampings, stiffnesses, shape (3, m), at a virtual output y (m,)."""
         if self.is_constant:
             return self._constant
-        return self._at({"eta": float(y[0]), "xi": math.hypot(y[1], y[2])})
+        x = dict(zip(self._names, y.tolist(), strict=True))
+        return self._at(x | {_ACROSS: math.hypot(*y[self._across])})
 
     def _at(self, x: dict[str, float]) -> np.ndarray:
         rows = [[function(x[over]) for over, function in row] for row in self._profiles]
-        return np.repeat(np.array(rows).T, self._repeats, axis=1)
+        return np.array(rows).T[:, self._row]
 
     def start(self, motion: np.ndarray) -> np.ndarray:
         """Return a state, shape (6, m), that moves on from ``[y_p, y_p']``, shape (2, m).

@@ -1,4 +1,4 @@
-"""Exact input-output linearization of a robot along a path, compiled once."""
+"""Exact input-output linearization of a robot along a manifold, compiled once."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,8 @@ import numpy as np
 
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
-from pfsc_drake.control.manifolds.path_coordinates import PathGeometry, path_coordinates
-from pfsc_drake.control.manifolds.trajectory_errors import trajectory_errors
+from pfsc_drake.control.manifolds.manifold import Kind, Manifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -47,80 +45,79 @@ class Linearization:
     ``yhat^(r) = A q^(r) + b`` and ``u = gain q^(r) + drift + offset``.
 
     Attributes:
-        function: CasADi function ``(state, tau_ext, path_point) -> (Y, A, b, gain, drift,
-            offset)``; for trajectories with a fourth argument, the derivatives 0..r of
-            the reference point's arc length, shape (r + 1,).
+        function: CasADi function ``(state, tau_ext, manifold_point) -> (Y, A, b, gain,
+            drift, offset)``; for manifolds that follow time with a fourth argument, the
+            derivatives 0..r of the reference's first coordinate, shape (r + 1,).
             ``state`` is ``[q_J, v_J, q_M, v_M]``, shape (4N,); ``tau_ext`` holds the
             external torques and their derivatives up to order r - 2, shape
-            (N max(r - 1, 0),); ``path_point`` is laid out by ``layout``. ``Y`` holds the
-            derivatives 0..r-1 of the virtual output in its columns, shape (m, r).
+            (N max(r - 1, 0),). ``Y`` holds the derivatives 0..r-1 of the virtual output in
+            its columns, shape (m, r).
         relative_degree: ``r``.
-        layout: Layout of the path point.
+        manifold: The manifold, which lays out its point.
         num_joints: ``N``.
-        num_outputs: ``m``, 3 (position) or 6 (position and orientation).
         lead: By how many sampling intervals ``gain q^(r) + drift`` is to be extrapolated:
             to the middle of the interval (``elastic``) or to its end (``visco_elastic``).
-        time_driven: Whether the virtual output is the error from a reference point that
-            moves with time, instead of the path coordinates.
     """
 
     function: ca.Function
     relative_degree: int
-    layout: PathPointLayout
+    manifold: Manifold
     num_joints: int
-    num_outputs: int
     lead: float
-    time_driven: bool = False
+
+    @property
+    def num_outputs(self) -> int:
+        """Number of coordinates of the virtual output ``m``."""
+        return len(self.manifold.coordinates)
 
 
-def linearize_path(
+def linearize(
     robot: RobotModel,
     law: str,
-    *,
-    oriented: bool,
+    manifold: Manifold,
     options: ActuationOptions | None = None,
-    time_driven: bool = False,
 ) -> Linearization:
-    """Derive the path following law of a robot, see (3.28), (3.50), (3.57), (3.64).
+    """Derive the law that makes a robot follow a manifold.
 
-    Or, for a point that moves along the path with time, the computed torque law
-    (Sec. 3.8.4): the same on the same drives, with the errors of
-    :func:`trajectory_errors` in place of the path coordinates.
+    For a path it is (3.28), (3.50), (3.57), (3.64); for a point that moves along the path with
+    time, the computed torque law (Sec. 3.8.4).
 
     Args:
         robot: The robot.
         law: Actuation model that the law is made for, a key of ``RELATIVE_DEGREE``.
-        oriented: Whether the tool's orientation follows the path too.
+        manifold: What to follow; its order is the relative degree of the law.
         options: What the actuation model needs besides.
-        time_driven: Whether a point that moves with time is followed.
 
     Raises:
-        InputError: If the law is unknown, or does not suit the robot or the path.
+        InputError: If the law is unknown, or does not suit the robot or the manifold.
     """
     options = options or ActuationOptions()
     if law not in RELATIVE_DEGREE:
         raise InputError(f"law '{law}': unknown; allowed are {', '.join(RELATIVE_DEGREE)}")
-    r, n, m = RELATIVE_DEGREE[law], robot.dimension, 6 if oriented else 3
+    r, n, m = RELATIVE_DEGREE[law], robot.dimension, len(manifold.coordinates)
+    if manifold.layout.order != r:
+        raise InputError(
+            f"law '{law}': manifold of order {manifold.layout.order}; must be {r}, the relative "
+            "degree of the law"
+        )
     if n != m:
+        turns = any(c.kind is Kind.ROTATIONAL for c in manifold.coordinates)
         raise InputError(
             f"law '{law}': {n} joints for {m} outputs "
-            f"({'position and orientation' if oriented else 'position only'}); "
+            f"({'position and orientation' if turns else 'position only'}); "
             "they must be as many"
         )
-    layout = PathPointLayout(r, oriented)
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    point, progress = ca.SX.sym("path_point", layout.size), ca.SX.sym("progress", r + 1)
+    point = ca.SX.sym("manifold_point", manifold.layout.size)
+    progress = ca.SX.sym("progress", r + 1)
     external = ca.vertsplit(tau_ext, n) if r > 1 else []
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
     motion = _driven_motion(robot, law, DriveState(q_J, v_J, q_M, v_M, external), options)
-    path = path_geometry(layout, point)
-    eta_d = Jet.from_derivatives(ca.vertsplit(progress))
+    lead = Jet.from_derivatives(ca.vertsplit(progress))
 
     def virtual_output(derivatives: list[ca.SX]) -> list[Jet]:
         y, R_e = robot.tool_pose(joint_jets(derivatives))
-        if time_driven:
-            return trajectory_errors(y, R_e, path, eta_d)
-        return path_coordinates(y, R_e, path)
+        return manifold.virtual_output(y, R_e, point, lead)
 
     output = virtual_output([*motion.q, ca.SX(n, 1)])
     Y = ca.horzcat(*[ca.vertcat(*[y.derivative(k) for y in output]) for k in range(r)])
@@ -130,32 +127,32 @@ def linearize_path(
     slopes = ca.vertcat(*[y.coefficients[1] for y in virtual_output([motion.q[0], rate])])
     results = [Y, ca.jacobian(slopes, rate), b, motion.gain, motion.drift, motion.offset]
     function = ca.Function(
-        f"{'trajectory' if time_driven else 'path'}_{law}",
-        [state, tau_ext, point, *([progress] if time_driven else [])],
+        f"{manifold.name}_{law}",
+        [state, tau_ext, point, *([progress] if manifold.follows_time else [])],
         [ca.densify(e) for e in ca.cse(results)],
-        ["state", "tau_ext", "path_point", *(["progress"] if time_driven else [])],
+        ["state", "tau_ext", "manifold_point", *(["progress"] if manifold.follows_time else [])],
         ["Y", "A", "b", "gain", "drift", "offset"],
     )
-    lead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
-    return Linearization(function, r, layout, n, m, lead, time_driven)
+    ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
+    return Linearization(function, r, manifold, n, ahead)
 
 
-def path_output_function(robot: RobotModel, layout: PathPointLayout) -> ca.Function:
+def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     """Return the virtual output and its rate of any joint motion.
 
     Args:
         robot: The robot.
-        layout: Layout of the path point.
+        manifold: A manifold that does not follow time.
 
     Returns:
-        CasADi function ``(q, v, path_point) -> Y``, shapes (N,), (N,), (size,) and (m, 2).
+        CasADi function ``(q, v, manifold_point) -> Y``, shapes (N,), (N,), (size,) and (m, 2).
     """
     q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
-    point = ca.SX.sym("path_point", layout.size)
+    point = ca.SX.sym("manifold_point", manifold.layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, v]))
-    output = path_coordinates(y, R_e, path_geometry(layout, point))
+    output = manifold.virtual_output(y, R_e, point, Jet([ca.SX(0), ca.SX(0)]))
     Y = ca.horzcat(*[ca.vertcat(*[x.derivative(k) for x in output]) for k in range(2)])
-    return ca.Function("path_output", [q, v, point], [ca.densify(Y)])
+    return ca.Function("virtual_output", [q, v, point], [ca.densify(Y)])
 
 
 def _driven_motion(
@@ -187,14 +184,3 @@ def _driven_motion(
         "rigid": actuation.rigid,
     }
     return models[law](robot, state)
-
-
-def path_geometry(layout: PathPointLayout, point: ca.SX) -> PathGeometry:
-    """Return the parts of a path point as the path map needs them."""
-    quaternion = ca.vertsplit(point[layout.quaternion], 4) if layout.oriented else []
-    return PathGeometry(
-        eta=point[layout.eta],
-        normal=point[layout.normal],
-        position=ca.vertsplit(point[layout.position], 3),
-        quaternion=quaternion,
-    )

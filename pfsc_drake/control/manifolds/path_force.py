@@ -1,33 +1,8 @@
-"""External wrench at the tool point to generalized forces along the virtual output."""
-
-import functools
-import math
+"""External wrench at the tool point to generalized forces along the coordinates of a path."""
 
 import casadi as ca
-import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.geometry import PathPointLayout
-
-
-def euler_rate_matrix(phi: np.ndarray) -> np.ndarray:
-    """Return ``T_ZYX(phi)`` (2.21): ``omega = T_ZYX phi'`` in the axes that phi starts from.
-
-    Args:
-        phi: ZYX angles [rad], shape (3,).
-
-    Returns:
-        Matrix of determinant ``-cos(phi_2)``, shape (3, 3).
-    """
-    sin_1, cos_1 = math.sin(phi[0]), math.cos(phi[0])
-    sin_2, cos_2 = math.sin(phi[1]), math.cos(phi[1])
-    return np.array(
-        [
-            [0.0, -sin_1, cos_1 * cos_2],
-            [0.0, cos_1, sin_1 * cos_2],
-            [1.0, 0.0, -sin_2],
-        ]
-    )
 
 
 def translational_force(force: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX:
@@ -96,70 +71,3 @@ def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX
     # vector part of q' q*, twice which is the angular velocity per theta
     rate = w * v_1 - w_1 * v + ca.cross(v, v_1)
     return ca.dot(rate, torque) * (2.0 / ca.sumsqr(quaternion[:4])) / ca.norm_2(slope)
-
-
-def manifold_force_function(layout: PathPointLayout, *, with_turning: bool) -> ca.Function:
-    """Return :func:`manifold_force` as a function of numbers.
-
-    Args:
-        layout: Layout of the path point.
-        with_turning: Whether torques act along eta where the orientation turns.
-
-    Returns:
-        ``(wrench, path_point[, phi]) -> force``, phi for oriented paths only.
-    """
-    wrench, point = ca.SX.sym("wrench", 6), ca.SX.sym("path_point", layout.size)
-    force = translational_force(wrench[:3], point, layout)
-    arguments, names = [wrench, point], ["wrench", "path_point"]
-    if layout.oriented:
-        phi = ca.SX.sym("phi", 3)
-        if with_turning:
-            force[0] += turning_force(wrench[3:], point, layout)
-        force = ca.vertcat(force, rotational_force(wrench[3:], point, layout, phi))
-        arguments, names = [*arguments, phi], [*names, "phi"]
-    return ca.Function("manifold_force", arguments, ca.cse([ca.densify(force)]), names, ["force"])
-
-
-def manifold_force(
-    wrench: np.ndarray,
-    point: np.ndarray,
-    layout: PathPointLayout,
-    phi: np.ndarray | None = None,
-    *,
-    with_turning: bool = False,
-) -> np.ndarray:
-    """Return the generalized forces along ``yhat = (eta, xi_1, xi_2[, phi])``.
-
-    They are (3.41) for the translational coordinates, (3.44) and (3.45) for the
-    angles. Their power ``tau . yhat'`` is ``f . y_t' + mu . (omega - omega_d)``: the
-    power of the wrench, the rotation being that relative to the path's orientation.
-    With ``with_turning`` :func:`turning_force` is added to the tangential one; the
-    power is then ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with
-    ``A = d yhat / dq``.
-
-    Args:
-        wrench: Force [N] and torque [Nm] on the tool at the tool point, world axes,
-            shape (6,).
-        point: Path point next to the tool, laid out by ``layout``.
-        layout: Layout of ``point``; an oriented one has the rotational forces too.
-        phi: ``phi_pd`` [rad], shape (3,); oriented paths only.
-        with_turning: Whether torques act along eta where the orientation turns.
-
-    Returns:
-        ``(tau_par, tau_perp, tau_cross[, tau_phi])``, shape (3,) [N] or (6,) [N, Nm].
-        Values that are not finite come out as they went in.
-    """
-    angles = layout.oriented and phi is not None
-    function = _bound(layout.order, layout.oriented, with_turning and angles)
-    function.arguments["wrench"][:], function.arguments["path_point"][:] = wrench, point
-    if layout.oriented:
-        function.arguments["phi"][:] = 0.0 if phi is None else phi
-    function.evaluate()
-    return function.results["force"][: 6 if angles else 3].copy()
-
-
-@functools.lru_cache(maxsize=16)
-def _bound(order: int, oriented: bool, with_turning: bool) -> BoundFunction:
-    """Return the compiled function, which is the same for every path of a kind."""
-    layout = PathPointLayout(order, oriented)
-    return BoundFunction(manifold_force_function(layout, with_turning=with_turning))

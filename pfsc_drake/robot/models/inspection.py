@@ -25,6 +25,7 @@ class ModelFacts:
 
     Attributes:
         without_inertia: Where each link without ``<inertial>`` stands, by its name.
+        assumed_inertia: Links for whose moments of inertia SDF takes 1 kg m^2.
         effort_limits: Effort limits of URDF joints, by name [Nm or N].
         friction: Joints with dry friction.
         springs: Stiffness of the sprung joints of the model itself, by name.
@@ -32,6 +33,7 @@ class ModelFacts:
     """
 
     without_inertia: dict[str, str] = field(default_factory=dict)
+    assumed_inertia: list[str] = field(default_factory=list)
     effort_limits: dict[str, float] = field(default_factory=dict)
     friction: list[str] = field(default_factory=list)
     springs: dict[str, float] = field(default_factory=dict)
@@ -121,7 +123,8 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
                 link.refuse("inertial auto", "true", "mass and inertia in numbers", inertial)
             inertia = inertial.first("inertia")
             moments = {} if inertia is None else {c.name: c.text for c in inertia.children}
-            check_inertia(link, _text(inertial, "mass"), moments, inertial)
+            if check_inertia(link, _text(inertial, "mass"), moments, inertial):
+                facts.assumed_inertia.append(link.name)
         edges = []
         for element in one.all("joint"):
             joint = ModelPart(model, element, "joint")

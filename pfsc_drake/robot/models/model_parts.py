@@ -103,7 +103,7 @@ class ModelPart:
 
 def check_inertia(
     link: ModelPart, mass_text: str | None, inertia: dict[str, str], at: Element
-) -> None:
+) -> bool:
     """Refuse a mass and an inertia about the centre of mass that no body has.
 
     Args:
@@ -112,20 +112,24 @@ def check_inertia(
         inertia: What is written of ``MOMENTS`` and ``PRODUCTS``, by key.
         at: The element with all this.
 
+    Returns:
+        Whether moments of inertia are missing for which SDF takes 1 kg m^2.
+
     Raises:
         InputError: If a number is none, a moment is missing or no body has them.
     """
     mass = link.number("mass", mass_text, _NOT_NEGATIVE, at)
-    # for what is missing SDF takes 1 kg m^2
-    needed = mass > 0.0 or link.model.root.name == "sdf"
-    for key in MOMENTS:
-        if needed and key not in inertia:
-            link.refuse(key, "missing", "moments of inertia with the mass", at)
-    values = [link.number(key, inertia.get(key, "0"), _ANY, at) for key in (*MOMENTS, *PRODUCTS)]
+    is_sdf = link.model.root.name == "sdf"
+    missing = [key for key in MOMENTS if key not in inertia]
+    if missing and (is_sdf == (mass == 0.0)):
+        link.refuse(missing[0], "missing", "moments of inertia with the mass", at)
+    written = dict.fromkeys(PRODUCTS, "0") | dict.fromkeys(MOMENTS, "1" if is_sdf else "0")
+    written |= inertia
+    values = [link.number(key, written[key], _ANY, at) for key in (*MOMENTS, *PRODUCTS)]
     if mass == 0.0:
         if any(values):
             link.refuse("inertia", values, "zeros without mass; or a positive mass", at)
-        return
+        return False
     # Drake's own test, which has its tolerance; what fails there is replaced in silence
     I_C = np.array(values)[[[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
     principal = np.linalg.eigvalsh(I_C)
@@ -138,6 +142,7 @@ def check_inertia(
             "none negative, none above the sum of the other two",
             at,
         )
+    return bool(missing)
 
 
 def _acceptable_to_drake(values: list[float]) -> bool:

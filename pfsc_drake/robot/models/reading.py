@@ -1,6 +1,6 @@
 """From a robot's model file to a finalized plant, with what there is to say about the model."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -80,7 +80,12 @@ class ModelOptions:
         return placed or bool(self.fixed_joints)
 
 
-def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None = None) -> list[str]:
+def read_model(
+    plant: MultibodyPlant,
+    file: Path,
+    options: ModelOptions | None = None,
+    before_finalizing: Callable[[MultibodyPlant], None] | None = None,
+) -> list[str]:
     """Add a robot to an empty plant and finalize it.
 
     Joints that the model does not drive are driven at their joint, up to the effort limit that a
@@ -90,6 +95,7 @@ def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None =
         plant: An empty plant.
         file: The model, URDF, SDF or MJCF.
         options: What is to be made of it.
+        before_finalizing: What else is to be added to the plant.
 
     Returns:
         What there is to say about the model, one sentence each: Drake's own warnings, and what
@@ -128,6 +134,8 @@ def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None =
             set_joint_damping(plant, options.joint_damping)
             _require_rotors(plant, file)
             plant.mutable_gravity_field().set_gravity_vector(options.gravity)
+            if before_finalizing is not None:
+                before_finalizing(plant)
             plant.Finalize()
             _require_regular_mass_matrix(plant, file)
     rubbing = [name for name in facts.friction if name not in options.fixed_joints]
@@ -138,6 +146,9 @@ def read_model(plant: MultibodyPlant, file: Path, options: ModelOptions | None =
             f"{file}: dry friction in the model ({', '.join(rubbing)}) is not simulated; "
             "give it as friction of the joints"
         )
+    if facts.assumed_inertia:
+        named = ", ".join(facts.assumed_inertia)
+        warnings.append(f"{file}: without <inertia> SDF takes 1 kg m^2 for moments of {named}")
     if unlimited:
         named = ", ".join(unlimited)
         warnings.append(f"{file}: velocity limits of 0 ({named}) are taken for none")

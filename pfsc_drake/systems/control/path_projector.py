@@ -18,7 +18,7 @@ class PathProjector(LeafSystem):
 
     Ports:
         tool_pose (input): ``[y_t, R_e]``, shape (12,); see :class:`ToolKinematics`.
-        path_point (output): The path next to the tool, laid out by ``layout``.
+        manifold_point (output): The path next to the tool, laid out by ``layout``.
 
     State:
         Discrete, shape (1,): ``theta*``, unwrapped. Until it is set, NaN; then the
@@ -37,10 +37,10 @@ class PathProjector(LeafSystem):
         self.layout: PathPointLayout = self._evaluator.layout
         theta = self.DeclareDiscreteState(np.array([np.nan]))
         self._tool_pose = self.DeclareVectorInputPort("tool_pose", 12)
-        self._path_point = self.DeclareVectorOutputPort(
-            "path_point",
+        self._manifold_point = self.DeclareVectorOutputPort(
+            "manifold_point",
             self.layout.size,
-            self._calc_path_point,
+            self._calc_manifold_point,
             prerequisites_of_calc={
                 self._tool_pose.ticket(),
                 self.discrete_state_ticket(theta),
@@ -61,12 +61,12 @@ class PathProjector(LeafSystem):
         state.set_value(np.array([theta]))
         return EventStatus.Succeeded()
 
-    def _calc_path_point(self, context: Context, output: BasicVector) -> None:
+    def _calc_manifold_point(self, context: Context, output: BasicVector) -> None:
         y_t = self._tool_pose.Eval(context)[:3].tolist()
         output.set_value(self._evaluator(y_t, context.get_discrete_state_vector()[0]))
 
     def _remember(self, context: Context, state: DiscreteValues) -> None:
-        theta = self._path_point.Eval(context).item(0)
+        theta = self._manifold_point.Eval(context).item(0)
         # a tool that is nowhere must not make the path's parameter forgotten
         if math.isfinite(theta):
             state[0] = theta

@@ -11,7 +11,7 @@ class TrajectoryPoint(LeafSystem):
     Ports:
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,);
             its first entry is the arc length ``eta_d`` [m].
-        path_point (output): The path at ``eta_d``, laid out by ``layout``.
+        manifold_point (output): The path at ``eta_d``, laid out by ``layout``.
 
     Args:
         path: The path.
@@ -29,12 +29,12 @@ class TrajectoryPoint(LeafSystem):
             "reference", (relative_degree + 1) * num_outputs
         )
         self.DeclareVectorOutputPort(
-            "path_point",
+            "manifold_point",
             self.layout.size,
-            self._calc_path_point,
+            self._calc_manifold_point,
             prerequisites_of_calc={self._reference.ticket()},
         )
 
-    def _calc_path_point(self, context: Context, output: BasicVector) -> None:
+    def _calc_manifold_point(self, context: Context, output: BasicVector) -> None:
         eta_d = self._reference.Eval(context).item(0)
         output.set_value(self._evaluate_at(self._parameter(eta_d)))

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.decoupled_force import decoupled_force_function
 from pfsc_drake.physics.force_profile import smooth_pulse
 from pfsc_drake.robot.robot_model import RobotModel
@@ -17,7 +17,7 @@ class DecoupledForce(LeafSystem):
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        path_point (input): The path next to the tool.
+        manifold_point (input): The path next to the tool.
         wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
             shape (6,) [N, Nm].
 
@@ -26,7 +26,7 @@ class DecoupledForce(LeafSystem):
 
     Args:
         robot: A robot with six axes.
-        layout: Layout of the path point.
+        manifold: A path with orientation.
         pulse: ``begin, end, ramp`` [s] and ``force`` along the tangent [N].
         period: Sampling time [s].
     """
@@ -34,18 +34,18 @@ class DecoupledForce(LeafSystem):
     def __init__(
         self,
         robot: RobotModel,
-        layout: PathPointLayout,
+        manifold: PathManifold,
         pulse: tuple[float, float, float, float],
         period: float,
     ) -> None:
         super().__init__()
-        function = BoundFunction(decoupled_force_function(robot, layout))
+        function = BoundFunction(decoupled_force_function(robot, manifold))
         self._q, self._point = function.arguments.values()
         (self._unit,), self._evaluate = function.results.values(), function.evaluate
         self._begin, self._end, self._ramp, self._force = pulse
         unit = self.DeclareDiscreteState(6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * robot.dimension)
-        self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
+        self._manifold_point = self.DeclareVectorInputPort("manifold_point", manifold.layout.size)
         self.DeclareVectorOutputPort(
             "wrench",
             6,
@@ -62,7 +62,7 @@ class DecoupledForce(LeafSystem):
         # nothing is needed of the direction while there is no force
         if self._begin - 0.1 <= context.get_time() <= self._end:
             self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
-            self._point[:] = self._path_point.Eval(context)
+            self._point[:] = self._manifold_point.Eval(context)
             self._evaluate()
             if np.isfinite(self._unit).all():
                 state.set_value(self._unit)

@@ -31,11 +31,14 @@ class DeltaPlant(LeafSystem):
     which slide it was. (The constrained plant of ``add_delta_plant`` has stops.)
 
     Ports:
-        actuation (input): Drive forces less friction ``tau`` [N], shape (3,).
+        actuation (input): Drive forces ``tau`` [N], shape (3,).
+        resistance (input): ``-tau_f`` of friction, adds to ``tau`` [N], shape (3,); zero if not
+            connected.
         external_force (input): ``f_ext`` at the end-effector [N], axes of the inertial frame
             (z_0 down), shape (3,); zero if not connected.
         state (output): ``[q, v]``, slide positions [m] and velocities [m/s], shape (6,).
         tool_position (output): ``y_t`` [m], axes of the inertial frame, shape (3,).
+        acceleration (output): ``q''`` [m/s^2], shape (3,).
 
     State:
         Continuous: ``[q, v]``, shape (6,); by default at rest in the middle of the travel.
@@ -51,12 +54,20 @@ class DeltaPlant(LeafSystem):
         default = BasicVector(np.concatenate([middle, np.zeros(n)]))
         self.DeclareContinuousState(default, n, n, 0)
         self._actuation = self.DeclareVectorInputPort("actuation", n)
+        self._resistance = self.DeclareVectorInputPort("resistance", n)
         self._external_force = self.DeclareVectorInputPort("external_force", 3)
         self.DeclareVectorOutputPort(
             "state", 2 * n, self._calc_state, prerequisites_of_calc={self.xc_ticket()}
         )
         self.DeclareVectorOutputPort(
             "tool_position", 3, self._calc_tool_position, prerequisites_of_calc={self.q_ticket()}
+        )
+        inputs = (self._actuation, self._resistance, self._external_force)
+        self.DeclareVectorOutputPort(
+            "acceleration",
+            n,
+            self._calc_acceleration,
+            prerequisites_of_calc={self.xc_ticket(), *(port.ticket() for port in inputs)},
         )
         self.DeclarePerStepPublishEvent(self._check_travel)
         self._robot = robot
@@ -80,12 +91,20 @@ class DeltaPlant(LeafSystem):
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Evaluate ``[v, q'']``."""
+        derivatives.SetFromVector(self._calc_rate(context))
+
+    def _calc_rate(self, context: Context) -> np.ndarray:
         self._x[:] = context.get_continuous_state_vector().CopyToVector()
         self._tau[:] = self._actuation.Eval(context)
+        if self._resistance.HasValue(context):
+            self._tau += self._resistance.Eval(context)
         connected = self._external_force.HasValue(context)
         self._f_ext[:] = self._external_force.Eval(context) if connected else 0.0
         self._evaluate_dynamics()
-        derivatives.SetFromVector(self._rate)
+        return self._rate
+
+    def _calc_acceleration(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._calc_rate(context)[self._robot.dimension :])
 
     def _check_travel(self, context: Context) -> EventStatus:
         q = context.get_continuous_state_vector().CopyToVector()[: self._robot.dimension]

@@ -1,4 +1,4 @@
-"""A six-axis force/torque sensor in a fixed joint of a MultibodyPlant."""
+"""A six-axis force/torque sensor in a fixed joint between flange and tool."""
 
 from dataclasses import dataclass, field
 
@@ -71,7 +71,9 @@ class ForceTorqueSensor(LeafSystem):
     sampled and one of its steps old, unless it was told otherwise.
 
     Ports:
-        reaction_forces (input): The plant's reaction forces, abstract.
+        reaction_forces (input): The plant's reaction forces, abstract; or, of plants that do
+            not tell them, ``reaction``, F as ``[torque, force]`` in S, shape (6,), see
+            :class:`ToolReaction`.
         measured_wrench (output): ``[force, torque]`` in S, shape (6,) [N, Nm].
         load (output): ``-F``, what an ideal sensor would read, shape (6,) [N, Nm].
         measurement (output): ``[measured_wrench, load]`` and the filter's next state, shape
@@ -83,26 +85,20 @@ class ForceTorqueSensor(LeafSystem):
         tick k depends on seed and k alone.
 
     Args:
-        plant: A finalized plant.
-        joint: The joint with the sensor in it.
         parameters: The sensor's properties.
         period: Sampling time [s].
+        index: Of the sensor's joint in the plant's reactions, see :func:`reaction_index`;
+            without it F comes from the port ``reaction``.
 
     Raises:
-        InputError: If the joint is not fixed or the bandwidth is too large for the period.
+        InputError: If the bandwidth is too large for the period.
     """
 
     def __init__(
-        self, plant: MultibodyPlant, joint: Joint, parameters: ForceTorqueParameters, period: float
+        self, parameters: ForceTorqueParameters, period: float, index: int | None = None
     ) -> None:
         super().__init__()
-        if not isinstance(joint, WeldJoint):
-            raise InputError(
-                f"joint '{joint.name()}' of the force/torque sensor: type '{joint.type_name()}'; "
-                "must be a fixed joint"
-            )
-        # reactions are numbered without gaps, also where joints were removed
-        self._joint = list(plant.GetJointIndices()).index(joint.index())
+        self._joint = index
         self._parameters = parameters
         self._result = np.zeros(18)
         low_pass = LowPass(parameters.bandwidth, period)
@@ -116,8 +112,10 @@ class ForceTorqueSensor(LeafSystem):
         self._reaction, self._state, self._sample = transducer.arguments.values()
         memory = np.concatenate([np.full(6, np.nan), [0.0], self._draw(0)])
         state = self.discrete_state_ticket(self.DeclareDiscreteState(memory))
-        self._reactions = self.DeclareAbstractInputPort(
-            "reaction_forces", Value[list[SpatialForce]]()
+        self._reactions = (
+            self.DeclareVectorInputPort("reaction", 6)
+            if index is None
+            else self.DeclareAbstractInputPort("reaction_forces", Value[list[SpatialForce]]())
         )
         reactions = self._reactions.ticket()
         self._measurement = self.DeclareVectorOutputPort(
@@ -138,7 +136,8 @@ class ForceTorqueSensor(LeafSystem):
 
     def _read_reaction(self, context: Context) -> np.ndarray:
         """Return ``[torque, force]`` on the tool."""
-        return self._reactions.Eval(context)[self._joint].get_coeffs()
+        reaction = self._reactions.Eval(context)
+        return reaction if self._joint is None else reaction[self._joint].get_coeffs()
 
     def _calc_measurement(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
@@ -162,6 +161,25 @@ class ForceTorqueSensor(LeafSystem):
         memory[_TICK] = tick
         if tick % _BLOCK == 0:
             memory[_NOISE:] = self._draw(tick // _BLOCK)
+
+
+def reaction_index(plant: MultibodyPlant, joint: Joint) -> int:
+    """Return where a joint stands in a plant's reaction forces.
+
+    Args:
+        plant: A finalized plant.
+        joint: The joint with the sensor in it.
+
+    Raises:
+        InputError: If the joint is not fixed.
+    """
+    if not isinstance(joint, WeldJoint):
+        raise InputError(
+            f"joint '{joint.name()}' of the force/torque sensor: type '{joint.type_name()}'; "
+            "must be a fixed joint"
+        )
+    # reactions are numbered without gaps, also where joints were removed
+    return list(plant.GetJointIndices()).index(joint.index())
 
 
 def _check(key: str, value: np.ndarray, *, positive: bool) -> None:

@@ -28,6 +28,7 @@ class FullElasticPlant(LeafSystem):
         external_torque (input): ``tau_ext`` at the links [Nm or N], shape (N,); 0 if not
             connected.
         joint_state (output): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        link_acceleration (output): ``q_J''``, shape (N,) [rad/s^2 or m/s^2].
 
     State:
         Continuous: ``[q_J, q_M]`` and ``[v_J, v_M]``, shape (4N,), all 0 at the start; see
@@ -57,6 +58,13 @@ class FullElasticPlant(LeafSystem):
             self._calc_joint_state,
             prerequisites_of_calc={self.xc_ticket()},
         )
+        inputs = (self._drive, self._resistance, self._external)
+        self.DeclareVectorOutputPort(
+            "link_acceleration",
+            n,
+            self._calc_link_acceleration,
+            prerequisites_of_calc={self.xc_ticket(), *(port.ticket() for port in inputs)},
+        )
         self._half = 2 * n
         function = BoundFunction(dynamics)
         self._state, self._tau_d, self._tau_ext = function.arguments.values()
@@ -77,10 +85,18 @@ class FullElasticPlant(LeafSystem):
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Calculate velocities and accelerations; the framework calls this."""
+        acceleration = self._calc_acceleration(context)
+        derivatives.SetFromVector(np.concatenate([self._state[self._half :], acceleration]))
+
+    def _calc_acceleration(self, context: Context) -> np.ndarray:
+        """Return the accelerations of links and motors, shape (2N,)."""
         self._state[:] = context.get_continuous_state_vector().CopyToVector()
         self._tau_d[:] = self._drive.Eval(context)
         if self._resistance.HasValue(context):
             self._tau_d += self._resistance.Eval(context)
         self._tau_ext[:] = self._external.Eval(context) if self._external.HasValue(context) else 0.0
         self._evaluate()
-        derivatives.SetFromVector(np.concatenate([self._state[self._half :], self._acceleration]))
+        return self._acceleration
+
+    def _calc_link_acceleration(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._calc_acceleration(context)[: self._half // 2])

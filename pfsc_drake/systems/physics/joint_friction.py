@@ -1,4 +1,4 @@
-"""Coulomb and viscous friction of the joints in front of a plant."""
+"""Coulomb and viscous friction of the joints."""
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
@@ -7,17 +7,16 @@ from pfsc_drake.physics.friction import BristleFriction
 
 
 class JointFriction(LeafSystem):
-    """Takes the friction torque (2.34), (2.41) off the drive torque.
+    """Friction torques (2.34), (2.41) beside the drive torques.
 
-    ``tau_net = tau_d - tau_f``, ``tau_f = f_c sat(s + tau v / delta) + f_v v`` with the
+    ``tau_f = f_c sat(s + tau v / delta) + f_v v`` with the
     deflection s of the bristles as state; see :class:`BristleFriction` for the law and
     for what sticking means. For elastic joints the velocity is that of the motors and
     ``tau_f`` is ``tau_fM`` of (2.65b), for rigid joints it is that of the joints.
 
-    A plant with effort limits would apply them to ``tau_net``, while drives are limited
-    in ``tau_d``: there, connect ``resistance`` to the plant's generalized forces (through
-    the transpose of the rows that give ``velocity`` from the plant's velocities) and the
-    drive torque to its actuation instead.
+    Drives are limited in ``tau_d``, not in ``tau_d - tau_f``: connect ``resistance`` to the
+    plant's generalized forces (through the transpose of the rows that give ``velocity`` from
+    the plant's velocities), beside its actuation.
 
     With a continuous plant, integrate at the step the bristles were made for
     (:func:`~pfsc_drake.physics.friction.bristles_for_step`) or with error control. With a
@@ -25,8 +24,6 @@ class JointFriction(LeafSystem):
 
     Ports:
         velocity (input): ``v`` [rad/s or m/s], shape (N,).
-        drive_torque (input): ``tau_d`` [Nm or N], shape (N,); needed for ``net_torque`` only.
-        net_torque (output): ``tau_d - tau_f`` [Nm or N], shape (N,).
         friction_torque (output): ``tau_f`` [Nm or N], shape (N,).
         resistance (output): ``-tau_f``, the generalized force on the joints, shape (N,).
 
@@ -44,19 +41,12 @@ class JointFriction(LeafSystem):
         n = friction.dimension
         self.DeclareContinuousState(n)
         self._velocity = self.DeclareVectorInputPort("velocity", n)
-        self._drive = self.DeclareVectorInputPort("drive_torque", n)
         sources = {self._velocity.ticket(), self.xc_ticket()}
         self._torque = self.DeclareVectorOutputPort(
             "friction_torque", n, self._calc_torque, prerequisites_of_calc=sources
         )
         self.DeclareVectorOutputPort(
             "resistance", n, self._calc_resistance, prerequisites_of_calc=sources
-        )
-        self.DeclareVectorOutputPort(
-            "net_torque",
-            n,
-            self._calc_net_torque,
-            prerequisites_of_calc=sources | {self._drive.ticket()},
         )
 
     def set_load(self, context: Context, torque: np.ndarray) -> None:
@@ -74,9 +64,6 @@ class JointFriction(LeafSystem):
 
     def _calc_resistance(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(-self._torque.Eval(context))
-
-    def _calc_net_torque(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._drive.Eval(context) - self._torque.Eval(context))
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Calculate ``s'``; the framework calls this."""

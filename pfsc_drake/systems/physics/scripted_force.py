@@ -4,11 +4,10 @@ import math
 
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
-from pfsc_drake.geometry import PathPointLayout
-from pfsc_drake.geometry.paths.frame import manifold_axes
+from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.physics.force_profile import ForceProfile
 
-# how long before a force the path is looked at
+# how long before a force the manifold is looked at
 _TICKS_AHEAD = 100
 
 
@@ -16,28 +15,29 @@ class ScriptedForce(LeafSystem):
     """Force and torque at the tool point over time, see :class:`ForcePulse`.
 
     The value follows the time continuously. Directions in manifold coordinates are
-    those of the path point at the last tick; a path point that is not finite leaves
-    them as they were. The path is looked at while there is a force or will be soon.
+    those of the manifold's point at the last tick; a point that is not finite leaves
+    them as they were. The manifold is looked at while there is a force or will be soon.
 
     Ports:
-        path_point (input): From :class:`PathProjector`; only if a pulse is given in
+        manifold_point (input): Where on the manifold the tool is; only if a pulse is given in
             manifold coordinates.
         wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
             shape (6,) [N, Nm].
 
     State:
-        Discrete: the matrix with the columns ``e_par, e_perp, e_cross``, by rows, shape
-        (9,); zero before initialization.
+        Discrete: the matrix with the manifold's axes as columns, by rows, shape (9,); zero
+        before initialization.
 
     Args:
         profile: The profile.
-        layout: Layout of the path point.
-        period: Time between looks at the path [s].
+        manifold: The manifold that the tool follows.
+        period: Time between looks at the manifold [s].
     """
 
-    def __init__(self, profile: ForceProfile, layout: PathPointLayout, period: float) -> None:
+    def __init__(self, profile: ForceProfile, manifold: Manifold, period: float) -> None:
         super().__init__()
-        self._profile, self._layout, self._ahead = profile, layout, _TICKS_AHEAD * period
+        self._profile, self._axes_at = profile, manifold.axes
+        self._ahead = _TICKS_AHEAD * period
         axes = self.DeclareDiscreteState(9)
         self.DeclareVectorOutputPort(
             "wrench",
@@ -45,8 +45,9 @@ class ScriptedForce(LeafSystem):
             self._calc_wrench,
             prerequisites_of_calc={self.time_ticket(), self.discrete_state_ticket(axes)},
         )
-        if profile.needs_path:
-            self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
+        if profile.needs_manifold:
+            size = manifold.layout.size
+            self._manifold_point = self.DeclareVectorInputPort("manifold_point", size)
             self.DeclareInitializationDiscreteUpdateEvent(self._look)
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
 
@@ -58,8 +59,7 @@ class ScriptedForce(LeafSystem):
         time = context.get_time()
         if not self._profile.is_active(time, time + self._ahead):
             return EventStatus.DidNothing()
-        point = self._path_point.Eval(context)
-        axes = manifold_axes(point[self._layout.position][3:6], point[self._layout.normal])
+        axes = self._axes_at(self._manifold_point.Eval(context))
         # a sum is finite only if all its terms are
         if math.isfinite(axes.sum()):
             state.set_value(axes.ravel())

@@ -17,10 +17,12 @@ from pfsc_drake.control.compliance.impedance import (
     Profile,
 )
 from pfsc_drake.control.compliance.impedance_functions import transition
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 
 PERIOD = 1e-3
+POSITION, POSE = (PathManifold(2, oriented=o).coordinates for o in (False, True))
 # Tab. 3.2, mass, damping, stiffness
 TANGENTIAL, TRANSVERSAL = (0.3, 300.0, 3000.0), (0.3, 122.47, 500.0)
 
@@ -31,7 +33,7 @@ def constant(m, d, k):
 
 def make_law(tangential=TANGENTIAL, transversal=TRANSVERSAL, r=2, period=PERIOD, **options):
     parameters = ImpedanceParameters(constant(*tangential), constant(*transversal))
-    return ImpedanceLaw(parameters, 3, r, period, **options)
+    return ImpedanceLaw(parameters, POSITION, r, period, **options)
 
 
 def by_exponential(damping, stiffness, time):
@@ -244,7 +246,7 @@ def test_inputs_that_cannot_be_used():
 def test_infinite_stiffness_is_position_control():
     """A coordinate is rigid exactly, whatever its state; released, it goes on from y_d."""
     parameters = ImpedanceParameters(transversal=constant(*TRANSVERSAL))
-    law, rng = ImpedanceLaw(parameters, 6, 4, PERIOD), np.random.default_rng(6)
+    law, rng = ImpedanceLaw(parameters, POSE, 4, PERIOD), np.random.default_rng(6)
     state = law.start(rng.uniform(-1, 1, (2, 6)))
     desired, rigid = rng.uniform(-1, 1, (5, 6)), [0, 3, 4, 5]
     assert np.array_equal(law.reference(state, desired)[:, rigid], desired[:, rigid])
@@ -276,25 +278,38 @@ def test_profiles():
     kinds = CoordinateImpedance(
         Profile(1.0), profile, Profile(over="eta", at=[1, 2], values=[3, 9])
     )
-    law = ImpedanceLaw(ImpedanceParameters(kinds, kinds, kinds), 6, 2, PERIOD)
+    law = ImpedanceLaw(ImpedanceParameters(kinds, kinds, kinds), POSE, 2, PERIOD)
     impedance = law.impedance(np.array([1.5, 0.024, -0.032, 1.0, 1.0, 1.0]))
     assert np.allclose(impedance, np.array([[1.0], [80.0], [6.0]]) * np.ones(6))
     kinds.mass.value = 0.0
     with pytest.raises(InputError, match="mass"):
-        ImpedanceLaw(ImpedanceParameters(kinds), 3, 2, PERIOD)
+        ImpedanceLaw(ImpedanceParameters(kinds), POSITION, 2, PERIOD)
+
+
+def over(what):
+    soft = CoordinateImpedance(damping=Profile(over=what, at=[0.0, 1.0], values=[1.0, 2.0]))
+    return ImpedanceParameters(transversal=soft)
+
+
+def test_profiles_over_a_single_coordinate():
+    law = ImpedanceLaw(over("xi_2"), POSITION, 2, 1e-3)
+    damping = law.impedance(np.array([9.0, 9.0, 1.0]))[1]
+    assert np.array_equal(damping, [0.0, 2.0, 2.0])
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: Profile(-1.0), "value: -1.0"),
-        (lambda: Profile(over="theta"), "over: 'theta'"),
+        (
+            lambda: ImpedanceLaw(over("theta"), POSITION, 2, 1e-3),
+            "compliance.transversal.damping.over: 'theta'; must be one of eta, xi_1, xi_2, xi",
+        ),
         (lambda: Profile(at=[0.0, 0.0], values=[1.0, 2.0]), "at: .* increasing"),
         (lambda: CoordinateImpedance(mass=Profile(0.0)), "mass: .* positive"),
         (lambda: CoordinateImpedance(damping=Profile(math.inf)), "damping: inf"),
         (lambda: make_law(r=5), "relative_degree: 5; must be 1 to 4"),
         (lambda: make_law(r=3, desired_order=2), "desired_order: 2; must be 3 or more"),
-        (lambda: ImpedanceLaw(ImpedanceParameters(), 4, 2, 1e-3), "num_outputs: 4"),
     ],
 )
 def test_errors(make, message):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize_path
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
 
@@ -79,15 +80,15 @@ def test_relative_degrees_are_the_dissertations():
 @pytest.mark.parametrize("law", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
 def test_shapes(law, load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r").chain
-    linearization = linearize_path(chain, law, oriented=False)
+    linearization = linearize(chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=False))
     r = RELATIVE_DEGREE[law]
     function = linearization.function
-    assert linearization.relative_degree == r == linearization.layout.order
+    assert linearization.relative_degree == r == linearization.manifold.layout.order
     assert (linearization.num_joints, linearization.num_outputs) == (3, 3)
     assert [function.size_in(i)[0] for i in range(3)] == [
         12,
         3 * max(r - 1, 0),
-        linearization.layout.size,
+        linearization.manifold.layout.size,
     ]
     assert [function.size_out(i) for i in range(6)] == [
         (3, r),
@@ -104,7 +105,9 @@ def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
     for law in ("rigid", "visco_elastic", "elastic"):
         for sampling_time in (0.0, 1e-3):
             options = ActuationOptions(sampling_time)
-            linearization = linearize_path(chain, law, oriented=False, options=options)
+            linearization = linearize(
+                chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=False), options
+            )
             lead = {"elastic": 0.5, "visco_elastic": 1.0}.get(law, 0.0)
             assert linearization.lead == (lead if sampling_time > 0.0 else 0.0)
 
@@ -118,13 +121,23 @@ def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
     ],
 )
 def test_laws_that_do_not_suit_are_refused(law, oriented, message, load_robot):
+    manifold = PathManifold(RELATIVE_DEGREE.get(law, 2), oriented=oriented)
     with pytest.raises(InputError, match=message):
-        linearize_path(load_robot("comau_racer_1_4_3r").chain, law, oriented=oriented)
+        linearize(load_robot("comau_racer_1_4_3r").chain, law, manifold)
+
+
+def test_a_manifold_of_another_order_is_refused(load_robot):
+    with pytest.raises(InputError, match=r"law 'rigid': manifold of order 3; must be 2"):
+        linearize(load_robot("comau_racer_1_4_3r").chain, "rigid", PathManifold(3, oriented=False))
 
 
 def test_six_joints_for_three_outputs_are_refused(load_robot):
     with pytest.raises(InputError, match=r"6 joints for 3 outputs \(position only\)"):
-        linearize_path(load_robot("comau_racer_1_4").chain, "rigid", oriented=False)
+        linearize(
+            load_robot("comau_racer_1_4").chain,
+            "rigid",
+            PathManifold(RELATIVE_DEGREE["rigid"], oriented=False),
+        )
 
 
 @pytest.mark.parametrize(
@@ -134,7 +147,12 @@ def test_boundary_layer_damping_is_checked(damping, load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r").chain
     options = ActuationOptions(boundary_layer_damping=damping)
     with pytest.raises(InputError, match=r"boundary_layer_damping.*3 positive values"):
-        linearize_path(chain, "singular_perturbation", oriented=False, options=options)
+        linearize(
+            chain,
+            "singular_perturbation",
+            PathManifold(RELATIVE_DEGREE["singular_perturbation"], oriented=False),
+            options,
+        )
 
 
 @pytest.mark.parametrize("law", ["elastic", "visco_elastic"])
@@ -142,12 +160,27 @@ def test_boundary_layer_damping_is_checked(damping, load_robot):
 def test_sampling_time_is_checked(law, sampling_time, load_robot):
     chain = load_robot("comau_racer_1_4_elastic_3r", (10.0,) * 3).chain
     with pytest.raises(InputError, match="sampling_time"):
-        linearize_path(chain, law, oriented=False, options=ActuationOptions(sampling_time))
+        linearize(
+            chain,
+            law,
+            PathManifold(RELATIVE_DEGREE[law], oriented=False),
+            ActuationOptions(sampling_time),
+        )
 
 
 def test_a_continuous_visco_elastic_law_needs_damping(load_robot):
     """(3.58) divides by K_d; with a hold it does not."""
     chain = load_robot("comau_racer_1_4_elastic_3r").chain
-    linearize_path(chain, "visco_elastic", oriented=False, options=ActuationOptions(1e-3))
+    linearize(
+        chain,
+        "visco_elastic",
+        PathManifold(RELATIVE_DEGREE["visco_elastic"], oriented=False),
+        ActuationOptions(1e-3),
+    )
     with pytest.raises(InputError, match="damping"):
-        linearize_path(chain, "visco_elastic", oriented=False, options=ActuationOptions(0.0))
+        linearize(
+            chain,
+            "visco_elastic",
+            PathManifold(RELATIVE_DEGREE["visco_elastic"], oriented=False),
+            ActuationOptions(0.0),
+        )

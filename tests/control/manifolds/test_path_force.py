@@ -6,11 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.manifolds.path_force import euler_rate_matrix, manifold_force
+from pfsc_drake.control.manifolds.manifold import manifold_force_function
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import FourierCurve, Path, PathStatus, PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
 
 OFFSET = np.array([0.02, -0.03, 0.025])
+
+
+def manifold_force(wrench, point, layout, phi=None, *, with_turning=False):
+    """Return the force along the coordinates for a reference with angles phi."""
+    manifold = PathManifold(layout.order, oriented=layout.oriented)
+    function = manifold_force_function(manifold, with_turning=with_turning)
+    reference = np.concatenate([np.full(3, 0.7), [] if phi is None else phi])
+    return np.array(function(wrench, point, reference)).ravel()
 
 
 def random_phi(rng):
@@ -147,17 +156,6 @@ def test_the_norm_of_the_quaternion_does_not_matter(oriented_path):
     point[layout.quaternion] *= 3.0
     tau = manifold_force(wrench, point, layout, phi, with_turning=True)
     assert np.allclose(tau, expected, rtol=1e-13, atol=1e-13)
-
-
-def test_rates_of_the_angles():
-    """(2.21) and its determinant -cos(phi_2); finite at the singularity too."""
-    rng = np.random.default_rng(4)
-    phi, rates, h = random_phi(rng), rng.uniform(-1, 1, 3), 1e-5
-    before, after = (Rotation.from_euler("ZYX", phi + s * h * rates) for s in (-1, 1))
-    w = (after * before.inv()).as_rotvec() / (2 * h)
-    assert np.allclose(euler_rate_matrix(phi) @ rates, w, rtol=0, atol=1e-9)
-    assert np.linalg.det(euler_rate_matrix(phi)) == pytest.approx(-math.cos(phi[1]), abs=1e-13)
-    assert np.isfinite(euler_rate_matrix(np.array([0.3, math.pi / 2, 0.1]))).all()
 
 
 def test_what_is_not_finite_stays_so(oriented_path):

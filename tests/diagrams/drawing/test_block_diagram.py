@@ -5,15 +5,15 @@ from xml.etree import ElementTree
 
 import pytest
 
+from diagrams.builder import build_station
 from diagrams.drawing.block_diagram import block_diagram_dot, block_diagram_svg
-from diagrams.path_following import build_path_following
 
 BLOCKS = (
     "plant",
     "joint_encoders",
     "tool_kinematics",
     "path_projector",
-    "path_following_controller",
+    "following_controller",
     "reference_generator",
     "hold",
 )
@@ -23,7 +23,7 @@ BLOCKS = (
 def diagram(load_scenario):
     settings = load_scenario("pfc_elastic_3r")
     settings.controller.law = "rigid"
-    return build_path_following(settings, Path()).diagram
+    return build_station(settings, Path()).diagram
 
 
 def put_dot(folder, monkeypatch, script):

@@ -1,21 +1,18 @@
 """Arms whose model the scenario changes: rotor coupling (2.64) and joint damping."""
 
-import copy
 import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario, RobotParameters
-from diagrams.scenario.delta import DeltaFollowingScenario
 from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.systems.physics.full_elastic_plant import FullElasticPlant
-from pfsc_drake.yaml.typed import load_typed
 
 COMAU = "comau_racer_1_4"
 
@@ -35,7 +32,7 @@ def coupled(settings):
 
 
 def run(settings, duration):
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     result = simulate(station, settings.simulation, duration, lambda *_: None)
     assert result.fault is None
     return station, result.root, collect_log(station, result.root)
@@ -59,7 +56,7 @@ def test_rotors_on_the_base_make_no_difference(settings, tmp_path):
     _, _, expected = run(settings, 0.25)
     settings.robot.rotor_coupling = str(uncoupled_parameters(tmp_path))
     station, _, got = run(settings, 0.25)
-    assert isinstance(station.plant, FullElasticPlant)
+    assert isinstance(station.part.plant, FullElasticPlant)
     assert expected.signals.keys() == got.signals.keys()
     assert np.ptp(expected["q_J"].values, axis=0).max() > 1e-3
     for name in ("q_J", "v_J", "q_M", "v_M", "tau_d", "tau_J", "tau_f", "tau_ext", "xi"):
@@ -99,11 +96,11 @@ def test_start_and_replay(coupled):
     assert np.abs(log["v_J"].values[0]).max() < 1e-15
     np.testing.assert_allclose(log["xi"].values[0], [0.01, 0.0], atol=1e-9)
     motion = collect_motion(station, root, 0.01)
-    model = station.arm.model
+    model = station.part.model
     context = model.CreateDefaultContext()
     for positions, pose in zip(motion.positions, motion.tool_pose, strict=True):
         model.SetPositions(context, positions)
-        y_t = station.arm.tool.CalcPoseInWorld(context).translation()
+        y_t = station.part.tool.CalcPoseInWorld(context).translation()
         np.testing.assert_allclose(y_t, pose[:3], atol=1e-12)
 
 
@@ -119,30 +116,45 @@ def test_robots_that_cannot_be_coupled(settings, model, rotors, part):
     settings.controller.law = "rigid"
     settings.robot.model, settings.robot.rotor_coupling = model, rotors
     with pytest.raises(InputError, match=part) as caught:
-        build_path_following(settings, Path())
+        build_station(settings, Path())
     assert str(caught.value).startswith("robot.rotor_coupling: ")
 
 
-def test_the_full_model_has_no_sensor(coupled, load_scenario):
-    coupled.compliance = copy.deepcopy(load_scenario("pfc_compliant_6r").compliance)
-    with pytest.raises(InputError, match=r"robot\.rotor_coupling: .*no force/torque sensor"):
-        build_path_following(coupled, Path())
+def test_the_sensor_of_the_full_model_reads_what_a_joint_bears(settings, tmp_path):
+    """With rotors on the base both plants move alike; one tells its reactions, the other not."""
+    settings.controller.external_torque.source = "measured"
+    settings.forces = [ForcePulse(0.05, 0.2, np.array([30.0, -40.0, 50.0]), ramp=0.02)]
+    _, _, expected = run(settings, 0.25)
+    settings.robot.rotor_coupling = str(uncoupled_parameters(tmp_path))
+    _, _, got = run(settings, 0.25)
+    force = expected["wrench_measured"].values
+    assert np.abs(force).max() > 40.0
+    np.testing.assert_allclose(got["wrench_measured"].values, force, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("joint", ["nowhere", "motor_2"])
+def test_a_sensor_needs_its_joint(coupled, joint):
+    coupled.controller.external_torque.source = "measured"
+    coupled.sensor.joint = joint
+    coupled.forces = [ForcePulse(0.05, 0.2, np.array([30.0, -40.0, 50.0]), ramp=0.02)]
+    with pytest.raises(InputError, match=joint):
+        build_station(coupled, Path())
 
 
 def test_joint_damping_is_the_models_but_for_its_damping(settings, load_arm):
     settings.controller.law = "elastic"
     settings.robot.joint_damping = [10.0, 20.0, 30.0]
-    station = build_path_following(settings, Path())
-    np.testing.assert_array_equal(station.chain.K_d, [10.0, 20.0, 30.0])
+    station = build_station(settings, Path())
+    np.testing.assert_array_equal(station.robot.K_d, [10.0, 20.0, 30.0])
     arm = load_arm(settings.robot.model)
     np.testing.assert_array_equal(arm.chain.K_d, np.zeros(3))
-    for ours, theirs in zip(station.chain.links, arm.chain.links, strict=True):
+    for ours, theirs in zip(station.robot.links, arm.chain.links, strict=True):
         for field in dataclasses.fields(ours):
             if field.name != "damping":
                 value = getattr(theirs, field.name)
                 np.testing.assert_array_equal(getattr(ours, field.name), value)
     # the plant has it too, axis by axis
-    damped, undamped = station.plant, arm.plant
+    damped, undamped = station.part.plant, arm.plant
     x = station.initial_state.copy()
     x[damped.num_positions() :] = 0.1 * np.arange(1.0, 7.0)
     torques = []
@@ -169,20 +181,13 @@ def test_joint_damping_is_the_models_but_for_its_damping(settings, load_arm):
 def test_joint_damping_of_another_robot(settings, model, damping, part):
     settings.robot.model, settings.robot.joint_damping = model, damping
     with pytest.raises(InputError, match=rf"robot\.joint_damping: {part}"):
-        build_path_following(settings, Path())
+        build_station(settings, Path())
 
 
 @pytest.mark.parametrize("damping", [[-1.0, 1.0, 1.0], [np.nan, 1.0, 1.0], [np.inf]])
 def test_joint_damping_out_of_range(damping):
     with pytest.raises(InputError, match=r"joint_damping = .*finite numbers, none negative"):
         RobotParameters(joint_damping=damping)
-
-
-@pytest.mark.parametrize("option", [{"rotor_coupling": COMAU}, {"joint_damping": [1.0]}])
-def test_a_delta_robot_has_neither(option):
-    data = {"robot": {"model": "festo_expt_45", **option}}
-    with pytest.raises(InputError, match=rf"robot\.{next(iter(option))}"):
-        load_typed(DeltaFollowingScenario, data, "mine.yaml")
 
 
 def test_the_visco_elastic_law_converges(load_scenario):

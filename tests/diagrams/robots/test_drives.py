@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
@@ -32,7 +32,7 @@ def settings(load_scenario) -> PathFollowingScenario:
 
 
 def build(settings):
-    return build_path_following(settings, Path())
+    return build_station(settings, Path())
 
 
 def run(settings, duration):
@@ -73,13 +73,13 @@ def test_velocity_servos_follow_the_path(settings):
     settings.controller.law = "velocity_servo"
     station, t, signals = run(settings, 0.4)
     assert t[-1] == pytest.approx(0.4)
-    n = station.chain.dimension
+    n = station.robot.dimension
     wanted = signals["law"][:, station.law.layout.drive]
     # the default bandwidth of 200 rad/s at up to 1 rad/s^2
     assert np.abs(wanted - signals["joint_state"][:, 3 * n :])[t > 0.01].max() < 0.02
     assert np.abs(wanted).max() > 0.1
     assert deviation(station, signals).max() < 1e-3
-    limits = station.chain.gather("effort_limit")
+    limits = station.robot.gather("effort_limit")
     assert (np.abs(signals["drive_torque"]) <= limits).all()
 
 
@@ -141,9 +141,11 @@ def test_friction_reaches_the_joints(settings):
     root = station.diagram.CreateDefaultContext()
     x = without.initial_state.copy()
     x[3:] = [0.3, -0.2, 0.1]
-    station.plant.SetPositionsAndVelocities(station.plant.GetMyMutableContextFromRoot(root), x)
-    force = station.plant.get_applied_generalized_force_input_port()
-    applied = force.Eval(station.plant.GetMyContextFromRoot(root))
+    station.part.plant.SetPositionsAndVelocities(
+        station.part.plant.GetMyMutableContextFromRoot(root), x
+    )
+    force = station.part.plant.get_applied_generalized_force_input_port()
+    applied = force.Eval(station.part.plant.GetMyContextFromRoot(root))
     np.testing.assert_allclose(applied, [-3.0, 4.0, -3.0], atol=1e-12)
 
 

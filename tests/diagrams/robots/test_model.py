@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.geometry import Role
-from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.robots.model import add_visible_robot, read_robot, tool_frame
+from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
 from diagrams.scenario.robot import ElasticParameters, PoseParameters
 from pfsc_drake.errors import InputError
@@ -41,17 +39,6 @@ def test_shipped_robots_are_continuous_and_without_geometry(model, positions, dr
     assert plant.is_finalized()
     assert plant.time_step() == 0.0
     assert not plant.geometry_source_is_registered()
-
-
-def test_visible_robot_has_pictures_and_nothing_to_collide():
-    builder = DiagramBuilder()
-    plant, scene_graph = add_visible_robot(builder, RobotParameters(SHIPPED), Path())
-    inspector = scene_graph.model_inspector()
-    assert inspector.NumGeometriesWithRole(Role.kIllustration) > 10
-    assert inspector.NumGeometriesWithRole(Role.kProximity) == 0
-    assert plant.geometry_source_is_registered()
-    assert builder.HasSubsystemNamed("scene_graph")
-    assert not builder.HasSubsystemNamed("plant")  # positions come from the recording
 
 
 def test_a_file_is_relative_to_the_folder(tmp_path, monkeypatch):

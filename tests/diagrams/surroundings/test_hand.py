@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, HandParameters, HandWaypoint, PathFollowingScenario
-from diagrams.scenario.delta import DeltaFollowingScenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
@@ -38,7 +37,7 @@ def settings(load_scenario) -> PathFollowingScenario:
 
 
 def run(settings, duration, folder=SCENARIOS):
-    station = build_path_following(settings, folder)
+    station = build_station(settings, folder)
     result = simulate(station, settings.simulation, duration, lambda *_: None)
     assert result.fault is None
     return station, collect_log(station, result.root)
@@ -48,10 +47,10 @@ def test_a_stiff_robot_is_pulled_by_the_whole_spring(settings):
     """Without compliance: 300 N/m times 40 mm, in world axes; with a pulse on top."""
     settings.compliance.tangential = CoordinateImpedance()
     settings.compliance.transversal = CoordinateImpedance()
-    station = build_path_following(settings, SCENARIOS)
-    pose = station.arm.tool.CalcPoseInWorld
-    context = station.arm.model.CreateDefaultContext()
-    station.arm.model.SetPositionsAndVelocities(context, station.initial_state)
+    station = build_station(settings, SCENARIOS)
+    pose = station.part.tool.CalcPoseInWorld
+    context = station.part.model.CreateDefaultContext()
+    station.part.model.SetPositionsAndVelocities(context, station.initial_state)
     start = pose(context).translation()
     settings.hand = steady_hand(start + np.array([0.0, 0.04, 0.0]))
     settings.forces = [ForcePulse(0.1, 0.3, np.array([5.0, 0.0, 0.0]), ramp=0.02)]
@@ -94,13 +93,13 @@ def test_the_hand_sees_the_links_and_the_truth(settings, load_scenario):
     settings.compliance.transversal = CoordinateImpedance()
     settings.encoders.link_increments = [500.0]
     settings.hand = steady_hand([0.7, 0.1, 0.9], stiffness=100.0, force_limit=1e3)
-    station = build_path_following(settings, SCENARIOS)
+    station = build_station(settings, SCENARIOS)
     result = simulate(station, settings.simulation, 0.2, lambda *_: None)
     diagram, root = station.diagram, result.root
     view = diagram.GetSubsystemByName("hand_view")
     seen = view.GetOutputPort("tool_pose").Eval(view.GetMyContextFromRoot(root))
-    plant = station.arm.model
-    X_WT = station.arm.tool.CalcPoseInWorld(plant.GetMyContextFromRoot(root))
+    plant = station.part.model
+    X_WT = station.part.tool.CalcPoseInWorld(plant.GetMyContextFromRoot(root))
     np.testing.assert_allclose(seen[:3], X_WT.translation(), atol=1e-12)
 
 
@@ -141,7 +140,7 @@ def test_hands_that_cannot_be(load_scenario, change, part):
     settings = load_scenario("operator_hand_6r")
     settings.hand = HandParameters(**change)
     with pytest.raises(InputError, match=part):
-        build_path_following(settings, SCENARIOS)
+        build_station(settings, SCENARIOS)
 
 
 @pytest.mark.parametrize(
@@ -158,12 +157,6 @@ def test_values_out_of_range(data, part):
     with pytest.raises(InputError, match=part) as caught:
         load_typed(PathFollowingScenario, {"hand": data}, "mine.yaml")
     assert "\n" not in str(caught.value)
-
-
-def test_a_delta_robot_has_no_hand():
-    data = {"robot": {"model": "festo_expt_45"}, "hand": {"stiffness": 100.0}}
-    with pytest.raises(InputError, match="hand = a block; allowed: none for a DELTA robot"):
-        load_typed(DeltaFollowingScenario, data, "mine.yaml")
 
 
 def test_the_shipped_operator(load_scenario):

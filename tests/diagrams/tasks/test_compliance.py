@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.errors import InputError
@@ -37,7 +37,7 @@ def settings(load_scenario) -> PathFollowingScenario:
 
 
 def run(settings, duration):
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     simulator = Simulator(station.diagram)
     configuration = SimulatorConfig(
         integration_scheme="runge_kutta2", max_step_size=TICK, use_error_control=False
@@ -115,7 +115,7 @@ def test_the_filter_knows_four_derivatives(settings):
 def test_a_trajectory_does_not_yield(settings):
     settings.controller.manifold = "trajectory"
     with pytest.raises(InputError, match=r"compliance.*controller\.manifold = trajectory.*path"):
-        build_path_following(settings, Path())
+        build_station(settings, Path())
 
 
 @pytest.mark.parametrize(
@@ -125,16 +125,16 @@ def test_a_trajectory_does_not_yield(settings):
 def test_a_sensor_in_the_wrong_place(settings, joint, part):
     settings.sensor.joint = joint
     with pytest.raises(InputError, match=part):
-        build_path_following(settings, Path())
+        build_station(settings, Path())
 
 
 def test_differentiated_encoders_are_warned_of(settings):
-    assert build_path_following(settings, Path()).warnings == []
+    assert build_station(settings, Path()).warnings == []
     settings.encoders.difference_quotient = True
-    (warning,) = build_path_following(settings, Path()).warnings
+    (warning,) = build_station(settings, Path()).warnings
     assert "tared" in warning
     settings.sensor.inertia = "none"
-    assert build_path_following(settings, Path()).warnings == []
+    assert build_station(settings, Path()).warnings == []
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, PathFollowingScenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
@@ -47,7 +47,7 @@ def arm(settings):
 
 
 def run(settings, duration):
-    station = build_path_following(settings, SCENARIOS)
+    station = build_station(settings, SCENARIOS)
     result = simulate(station, settings.simulation, duration, lambda *_: None)
     assert result.fault is None
     return station, collect_log(station, result.root), station.log.read(result.root)[1]
@@ -152,5 +152,5 @@ def test_a_reference_that_sets_off_before_taring_is_warned_of(arm, load_scenario
     settings = arm(load_scenario("pfc_elastic_3r"))
     settings.compliance.tangential = impedance(3.0, 85.0, Profile(600.0))
     settings.reference.dwell, settings.sensor.taring_time = 0.1, 0.2
-    (warning,) = build_path_following(settings, SCENARIOS).warnings
+    (warning,) = build_station(settings, SCENARIOS).warnings
     assert "reference.dwell" in warning and "taring_time" in warning

@@ -10,6 +10,7 @@ from diagrams.scenario import (
 )
 from diagrams.tasks.law import make_law
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 
 
@@ -22,6 +23,11 @@ def controller(law, eta, xi, phi=None, **changes):
     return ControllerParameters(law=law, gains=gains, **changes)
 
 
+def make(parameters, robot, *, oriented=False):
+    manifold = PathManifold(RELATIVE_DEGREE[parameters.law], oriented=oriented)
+    return make_law(parameters, robot, manifold)
+
+
 @pytest.mark.parametrize("law", ["rigid", "visco_elastic", "elastic"])
 def test_gains_reach_their_coordinates(load_arm, law):
     r = RELATIVE_DEGREE[law]
@@ -30,7 +36,7 @@ def test_gains_reach_their_coordinates(load_arm, law):
     parameters = controller(
         law, by_poles(*eta), by_poles(*xi), GainParameters(coefficients=coefficients.tolist())
     )
-    law = make_law(parameters, load_arm("comau_racer_1_4_elastic").chain, True)
+    law = make(parameters, load_arm("comau_racer_1_4_elastic").chain, oriented=True)
     expected = [np.poly(poles)[:0:-1] for poles in (eta, xi, xi)] + [coefficients] * 3
     np.testing.assert_allclose(law.stabilization.proportional.T, expected, rtol=1e-12)
     assert not law.stabilization.has_integral_part
@@ -39,16 +45,15 @@ def test_gains_reach_their_coordinates(load_arm, law):
 
 def test_integral_part(load_arm):
     eta = GainParameters(coefficients=[900.0, 60.0], integral=500.0)
-    law = make_law(
-        controller("rigid", eta, by_poles(-3.0, -3.0)), load_arm("comau_racer_1_4_3r").chain, False
-    )
+    parameters = controller("rigid", eta, by_poles(-3.0, -3.0))
+    law = make(parameters, load_arm("comau_racer_1_4_3r").chain)
     np.testing.assert_array_equal(law.stabilization.integral, [500.0, 0.0, 0.0])
 
 
 def test_gains_of_the_law_in_use_are_taken(load_arm):
     parameters = controller("rigid", by_poles(-3.0, -3.0), by_poles(-4.0, -4.0))
     parameters.gains["elastic"] = LawGains()  # of another law: not looked at
-    law = make_law(parameters, load_arm("comau_racer_1_4_3r").chain, False)
+    law = make(parameters, load_arm("comau_racer_1_4_3r").chain)
     expected = [[9, 6], [16, 8], [16, 8]]
     np.testing.assert_allclose(law.stabilization.proportional.T, expected, rtol=1e-12)
 
@@ -56,7 +61,7 @@ def test_gains_of_the_law_in_use_are_taken(load_arm):
 def test_limits_are_those_of_the_model_scaled(load_arm):
     chain = load_arm("comau_racer_1_4_3r").chain
     parameters = controller("rigid", by_poles(-3, -3), by_poles(-3, -3), effort_scale=0.5)
-    np.testing.assert_array_equal(make_law(parameters, chain, False).limits, [900, 900, 450])
+    np.testing.assert_array_equal(make(parameters, chain).limits, [900, 900, 450])
 
 
 @pytest.mark.parametrize(
@@ -94,7 +99,7 @@ def test_limits_are_those_of_the_model_scaled(load_arm):
 )
 def test_refused_controllers(load_arm, parameters, parts):
     with pytest.raises(InputError) as caught:
-        make_law(parameters, load_arm("comau_racer_1_4_3r").chain, False)
+        make(parameters, load_arm("comau_racer_1_4_3r").chain)
     for part in parts:
         assert part in str(caught.value)
 
@@ -105,7 +110,7 @@ def test_boundary_layer_damping_suits_the_robot(load_arm, damping):
     parameters = controller("singular_perturbation", poles, poles)
     chain = load_arm("comau_racer_1_4_elastic_3r").chain
     parameters.boundary_layer_damping = [0.04, 0.04, 0.02]
-    make_law(parameters, chain, False)
+    make(parameters, chain)
     parameters.boundary_layer_damping = damping
     with pytest.raises(InputError, match=r"boundary_layer_damping.*3 positive"):
-        make_law(parameters, chain, False)
+        make(parameters, chain)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from diagrams.robots.arm import MultibodyArm
+from diagrams.robots.start_posture import describe_posture, posture_warnings
 from diagrams.scenario import Circle, Line
-from diagrams.tasks.path import make_path
-from diagrams.tasks.start import describe_posture, posture_warnings, start_state
+from diagrams.tasks.path_following import make_task
 from pfsc_drake.errors import InputError
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
@@ -22,10 +23,12 @@ def start(load_arm):
 
     def put(settings):
         arm = load_arm(settings.robot.model)
-        path = make_path(settings.path, settings.controller.law, None)
-        x, theta = start_state(settings, path, arm.chain, arm.coordinates)
+        task = make_task(settings, None)
+        begin = task.start(np.zeros(3))
+        part = MultibodyArm(arm.plant, arm.chain, arm.coordinates, arm.tool)
+        x = part.state_at_rest(part.posture(begin.y_t, begin.R_e, settings.start))
         arm.set_state(x)
-        return path, theta, arm, x
+        return task.path, begin.theta, arm, x
 
     return put
 

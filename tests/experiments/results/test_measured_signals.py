@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions, GainParameters, LawGains, PathFollowingScenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.run_signals import collect_log, collect_motion
@@ -28,7 +28,7 @@ def settings():
 
 
 def run(settings):
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     result = simulate(station, settings.simulation, DURATION, lambda *_: None)
     return station, result.root, collect_log(station, result.root)
 
@@ -52,9 +52,9 @@ def test_truth_and_measurement(settings):
     assert log["v_J_measured"].unit == "rad/s"
     assert "q_M_measured" not in log  # rigid joints
     # the pose is where Drake says the tool really is
-    plant = station.arm.model
+    plant = station.part.model
     context = plant.GetMyContextFromRoot(root)
-    y_t = station.arm.tool.CalcPoseInWorld(context).translation()
+    y_t = station.part.tool.CalcPoseInWorld(context).translation()
     np.testing.assert_allclose(log["y_t"].values[-1], y_t, atol=1e-9)
 
 

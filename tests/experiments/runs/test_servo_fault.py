@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
@@ -32,7 +32,7 @@ def settings():
 def test_the_arm_comes_to_rest(settings, component):
     """Nobody stops the simulation; the arm was moving with up to 0.2 rad/s."""
     settings.simulation.sensor_failure.component = component
-    station = build_path_following(settings, SCENARIO.parent)
+    station = build_station(settings, SCENARIO.parent)
     simulator = Simulator(station.diagram)
     fixed = SimulatorConfig(
         integration_scheme="runge_kutta2", max_step_size=1e-3, use_error_control=False
@@ -41,7 +41,7 @@ def test_the_arm_comes_to_rest(settings, component):
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    plant = station.arm.model
+    plant = station.part.model
     speeds = []
     for end in (FAILS_AT, FAILS_AT + 0.5):
         simulator.AdvanceTo(end)
@@ -53,7 +53,7 @@ def test_the_arm_comes_to_rest(settings, component):
     assert np.delete(v, [] if unknown is None else unknown).max() < 0.05 * speeds[0]
     _, raw = station.log.read(root)
     assert np.isfinite(raw["drive_torque"]).all()
-    assert np.all(np.abs(raw["drive_torque"]) <= station.chain.gather("effort_limit") + 1e-9)
+    assert np.all(np.abs(raw["drive_torque"]) <= station.robot.gather("effort_limit") + 1e-9)
     assert raw["servo_fault"][-1, 0] == Fault.INPUT_NOT_FINITE
 
 
@@ -77,7 +77,7 @@ def test_the_run_ends_and_keeps_its_log(tmp_path, capsys):
 
 def test_a_servo_alone_stops_the_run(settings, monkeypatch):
     settings.simulation.sensor_failure.time = 0.06
-    station = build_path_following(settings, SCENARIO.parent)
+    station = build_station(settings, SCENARIO.parent)
     monkeypatch.setattr(station.controller, "fault", lambda _: Fault.NONE)
     result = simulate(station, settings.simulation, 2.0, lambda *_: None)
     assert result.fault == f"velocity_servo: {Fault.INPUT_NOT_FINITE.explanation}"

@@ -49,7 +49,7 @@ def test_parts_of_an_inertial_that_are_missing(wrong, urdf_text, sdf_text):
     wrong(urdf_text, "a.urdf", 'izz="0.01"', "", "izz = missing")
     wrong(urdf_text, "a.urdf", '<mass value="2"/>', '<mass value="0"/>', "inertia = [0.02", "zeros")
     wrong(sdf_text, "a.sdf", "<mass>2</mass>", "", "mass = empty")
-    wrong(sdf_text, "a.sdf", "<ixx>0.02</ixx>", "", "ixx = missing")
+    wrong(sdf_text, "a.sdf", "<ixx>0.02</ixx>", "", "[0.01, 0.02, 1]")
     wrong(sdf_text, "a.sdf", "<inertial>", "<inertial auto='true'>", "auto")
     # without numbers SDF takes 1 kg m^2
     massless = "<inertial><mass>0</mass></inertial></link>\n<link"

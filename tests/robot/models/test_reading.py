@@ -222,3 +222,12 @@ def test_motors_of_elastic_joints_without_inertia(write, read, refused, old, new
     assert old in text
     file = write(text.replace(old, new), "arm.sdf")
     refused(lambda: read(file), file, "'motor_1'", "rotor_inertia", "positive")
+
+
+def test_moments_that_sdf_takes_for_granted_are_said(write, read, sdf_text):
+    moments = "<inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.01</izz></inertia>"
+    first, second, third = sdf_text.split(moments)
+    plant, (warning,) = read(write(first + moments + second + third, "arm.sdf"))
+    assert warning.endswith("SDF takes 1 kg m^2 for moments of arm")
+    inertia = plant.GetBodyByName("arm").default_rotational_inertia().get_moments()
+    np.testing.assert_allclose(inertia, [1.02, 1.02, 1.0], rtol=1e-12)

@@ -21,18 +21,19 @@ from pfsc_drake.control.compliance.impedance import (
     Profile,
 )
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
+COORDINATES = {3 * (1 + o): PathManifold(2, oriented=o).coordinates for o in (False, True)}
 TAU = np.array([4.0, -6.0, 9.0])
 DESIRED = np.array([0.5, 0.0, 0.0, 0.2, 0.0, 0.0, 0.1, 0.0, 0.0])
 MEASURED = np.array([0.48, 0.01, -0.02, 0.1, 0.03, 0.05])
@@ -44,7 +45,7 @@ def make_law(r=2, m=3, far=300.0, **options):
     tangential = CoordinateImpedance(Profile(0.3), Profile(300.0), Profile(3000.0))
     transversal = CoordinateImpedance(Profile(0.3), damping, Profile(500.0))
     parameters = ImpedanceParameters(tangential, transversal)
-    return ImpedanceLaw(parameters, m, r, PERIOD, **options)
+    return ImpedanceLaw(parameters, COORDINATES[m], r, PERIOD, **options)
 
 
 class Bench:
@@ -235,7 +236,7 @@ def test_the_rotational_forces_may_depend_on_the_reference():
     """phi_pd of (3.44) is the filter's own output; that is no algebraic loop."""
     builder = DiagramBuilder()
     system = builder.AddSystem(ImpedanceFilter(make_law(m=6)))
-    transform = builder.AddSystem(ManifoldForceTransform(PathPointLayout(2, True)))
+    transform = builder.AddSystem(ManifoldForceTransform(PathManifold(2, oriented=True)))
     builder.Connect(system.GetOutputPort("reference"), transform.GetInputPort("reference"))
     builder.Connect(transform.get_output_port(), system.GetInputPort("manifold_force"))
     builder.Build()
@@ -251,7 +252,7 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
     chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
     theta, force = 0.6, np.array([3.0, -4.0, 5.0, 0.0, 0.0, 0.0])
     desired = np.array([path.arc_length.at(theta), *np.zeros(8)])
-    controller = PathFollowingController(request.getfixturevalue("make_law")(), PERIOD)
+    controller = FollowingController(request.getfixturevalue("make_law")(), PERIOD)
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     parts = {
         "measured": builder.AddSystem(MatrixGain(rows)),
@@ -259,7 +260,7 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
         "projector": builder.AddSystem(PathProjector(path, 2, PERIOD)),
         "controller": builder.AddSystem(controller),
         "filter": builder.AddSystem(ImpedanceFilter(make_law(far=60.0), start=start)),
-        "transform": builder.AddSystem(ManifoldForceTransform(path.evaluator(2).layout)),
+        "transform": builder.AddSystem(ManifoldForceTransform(PathManifold(2, oriented=False))),
         "desired": builder.AddSystem(ConstantVectorSource(desired)),
         "wrench": builder.AddSystem(ConstantVectorSource(force)),
         "hold": builder.AddSystem(ZeroOrderHold(PERIOD, 3)),
@@ -270,8 +271,8 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
         ("measured", "kinematics.joint_state"),
         ("measured", "controller.joint_state"),
         ("kinematics", "projector.tool_pose"),
-        ("projector", "controller.path_point"),
-        ("projector", "transform.path_point"),
+        ("projector", "controller.manifold_point"),
+        ("projector", "transform.manifold_point"),
         ("wrench", "transform.wrench"),
         ("desired", "filter.desired_reference"),
         ("transform", "filter.manifold_force"),

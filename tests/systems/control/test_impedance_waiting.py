@@ -10,9 +10,11 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceParameters,
     Profile,
 )
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 
 PERIOD = 1e-3
+POSITION = PathManifold(2, oriented=False).coordinates
 MASS, DAMPING, STIFFNESS = 0.3, 122.47, 500.0
 DESIRED = np.array([0.5, 0.0, 0.0, 0.2, 0.0, 0.0, 0.1, 0.0, 0.0])
 ACTUAL = np.array([0.48, 0.01, -0.02, 0.1, 0.03, 0.05])
@@ -24,7 +26,7 @@ class Bench:
 
     def __init__(self, start):
         soft = CoordinateImpedance(Profile(MASS), Profile(DAMPING), Profile(STIFFNESS))
-        law = ImpedanceLaw(ImpedanceParameters(soft, soft), 3, 2, PERIOD)
+        law = ImpedanceLaw(ImpedanceParameters(soft, soft), POSITION, 2, PERIOD)
         self.system = ImpedanceFilter(law, start=start)
         self.context = self.system.CreateDefaultContext()
         self.fix(desired_reference=DESIRED, manifold_force=FORCE, manifold_state=ACTUAL, ready=[0])

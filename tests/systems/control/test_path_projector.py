@@ -30,7 +30,9 @@ class Bench:
 
     def point(self, field):
         layout = self.system.layout
-        return self.system.GetOutputPort("path_point").Eval(self.context)[getattr(layout, field)]
+        return self.system.GetOutputPort("manifold_point").Eval(self.context)[
+            getattr(layout, field)
+        ]
 
     @property
     def memory(self):
@@ -54,7 +56,7 @@ def test_the_output_is_the_paths_own(path):
     bench.move_to(y_t)
     bench.start()
     expected = path.evaluator(3)(y_t.tolist(), 1.2)
-    output = bench.system.GetOutputPort("path_point").Eval(bench.context)
+    output = bench.system.GetOutputPort("manifold_point").Eval(bench.context)
     assert output.shape == (bench.system.layout.size,)
     assert np.allclose(output, expected, rtol=1e-10, atol=1e-11)
 

@@ -10,14 +10,18 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain, ZeroOrderHold
 
 from pfsc_drake.control.compliance.tool_load import SensorFault, ToolCompensationParameters
-from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
 from pfsc_drake.systems.physics.external_wrench import ExternalWrench
-from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
+from pfsc_drake.systems.physics.force_torque_sensor import (
+    ForceTorqueParameters,
+    ForceTorqueSensor,
+    reaction_index,
+)
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 
 PERIOD = 1e-3
@@ -89,7 +93,7 @@ def run(
     mover = builder.AddSystem(Mover(chain, np.full(6, amplitude), frequency))
     sensor = sensor or ForceTorqueParameters(noise=np.zeros(6))
     compensation = compensation or ToolCompensationParameters()
-    ft = builder.AddSystem(ForceTorqueSensor(plant, weld, sensor, PERIOD))
+    ft = builder.AddSystem(ForceTorqueSensor(sensor, PERIOD, reaction_index(plant, weld)))
     tool_compensation = builder.AddSystem(
         ToolCompensation(
             chain,
@@ -100,7 +104,7 @@ def run(
         )
     )
     script = builder.AddSystem(
-        ScriptedForce(ForceProfile(pulses), PathPointLayout(2, False), PERIOD)
+        ScriptedForce(ForceProfile(pulses), PathManifold(2, oriented=False), PERIOD)
     )
     external = builder.AddSystem(ExternalWrench(tool, chain))
     connect = builder.Connect

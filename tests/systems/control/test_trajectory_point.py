@@ -13,7 +13,7 @@ def test_it_is_where_the_reference_says():
     reference = np.zeros(9)
     reference[0] = 0.7
     system.GetInputPort("reference").FixValue(context, reference)
-    point = system.GetOutputPort("path_point").Eval(context)
+    point = system.GetOutputPort("manifold_point").Eval(context)
     position, _ = path.pose(0.7)
     assert np.allclose(point[system.layout.position][:3], position, atol=1e-12)
     assert np.isclose(point[system.layout.eta][0], 0.7, atol=1e-10)

@@ -16,7 +16,11 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
+from pfsc_drake.systems.physics.force_torque_sensor import (
+    ForceTorqueParameters,
+    ForceTorqueSensor,
+    reaction_index,
+)
 
 PERIOD = 1e-3
 TOOL_MASS, TOOL_COM = 1.5, np.array([0.0, 0.0, 0.06])
@@ -62,7 +66,9 @@ def record(plant, parameters, load, duration):
     builder = DiagramBuilder()
     source = builder.AddSystem(Source(load))
     sensor = builder.AddSystem(
-        ForceTorqueSensor(plant, plant.GetJointByName("weld_tool"), parameters, PERIOD)
+        ForceTorqueSensor(
+            parameters, PERIOD, reaction_index(plant, plant.GetJointByName("weld_tool"))
+        )
     )
     builder.Connect(source.get_output_port(), sensor.get_input_port())
     log = LogVectorOutput(sensor.GetOutputPort("measured_wrench"), builder, PERIOD)
@@ -107,7 +113,9 @@ def reading_at_rest(model, q, wrench=None):
     state = np.concatenate([q, np.zeros(6), q + weight / chain.K_s, np.zeros(6)])
     plant.SetPositionsAndVelocities(context, coordinates.plant_state(state))
     plant.get_actuation_input_port().FixValue(context, weight)
-    sensor = ForceTorqueSensor(plant, plant.GetJointByName("weld_tool"), quiet(), PERIOD)
+    sensor = ForceTorqueSensor(
+        quiet(), PERIOD, reaction_index(plant, plant.GetJointByName("weld_tool"))
+    )
     own = sensor.CreateDefaultContext()
     sensor.get_input_port().FixValue(own, plant.get_reaction_forces_output_port().Eval(context))
     R_WS = tool.EvalPoseInWorld(context).rotation().matrix()
@@ -159,9 +167,8 @@ def test_noise_is_the_seeds(rigid):
 
 
 def test_an_output_calculation_does_not_draw(rigid):
-    sensor = ForceTorqueSensor(
-        rigid, rigid.GetJointByName("weld_tool"), ForceTorqueParameters(), PERIOD
-    )
+    index = reaction_index(rigid, rigid.GetJointByName("weld_tool"))
+    sensor = ForceTorqueSensor(ForceTorqueParameters(), PERIOD, index)
     context = sensor.CreateDefaultContext()
     reactions = [SpatialForce.Zero()] * 8
     values = []
@@ -217,7 +224,7 @@ def test_joints_removed_from_the_plant_do_not_shift_it():
     plant.Finalize()
     context = plant.CreateDefaultContext()
     for i, joint in enumerate(joints):
-        sensor = ForceTorqueSensor(plant, joint, quiet(), PERIOD)
+        sensor = ForceTorqueSensor(quiet(), PERIOD, reaction_index(plant, joint))
         own = sensor.CreateDefaultContext()
         sensor.get_input_port().FixValue(own, plant.get_reaction_forces_output_port().Eval(context))
         weight = -9.81 * 2.0 * (3 - i)
@@ -228,7 +235,7 @@ def test_joints_removed_from_the_plant_do_not_shift_it():
 
 def test_a_moving_joint_is_refused(rigid):
     with pytest.raises(InputError, match=r"joint 'joint_6' .* 'revolute'; must be a fixed joint"):
-        ForceTorqueSensor(rigid, rigid.GetJointByName("joint_6"), quiet(), PERIOD)
+        ForceTorqueSensor(quiet(), PERIOD, reaction_index(rigid, rigid.GetJointByName("joint_6")))
 
 
 @pytest.mark.parametrize(
@@ -249,7 +256,7 @@ def test_parameters_out_of_range(key, value):
 def test_the_measurement_holds_its_parts(rigid):
     """Reading and load are the ports of that name; the filter takes over the rest."""
     joint = rigid.GetJointByName("weld_tool")
-    sensor = ForceTorqueSensor(rigid, joint, ForceTorqueParameters(seed=4), PERIOD)
+    sensor = ForceTorqueSensor(ForceTorqueParameters(seed=4), PERIOD, reaction_index(rigid, joint))
     context, random = sensor.CreateDefaultContext(), np.random.default_rng(2)
     for _ in range(3):
         load = random.uniform(-5.0, 5.0, 6)

@@ -106,7 +106,9 @@ def test_rests_in_equilibrium(robot):
 
 def test_ports_and_two_contexts(robot):
     full = FullElasticPlant(robot[1], MOUNTS)
-    assert not full.HasAnyDirectFeedthrough()
+    for name in ("joint_state", "link_acceleration"):
+        needs_inputs = full.HasDirectFeedthrough(full.GetOutputPort(name).get_index())
+        assert needs_inputs == (name == "link_acceleration")
     contexts = [full.CreateDefaultContext() for _ in range(2)]
     rates = []
     for seed, context in enumerate(contexts):

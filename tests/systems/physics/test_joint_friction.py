@@ -65,9 +65,9 @@ class Slide:
         builder.Connect(state, force.get_input_port())
         builder.Connect(state, velocity.get_input_port())
         builder.Connect(velocity.get_output_port(), self.friction.GetInputPort("velocity"))
-        builder.Connect(force.get_output_port(), self.friction.GetInputPort("drive_torque"))
-        net = self.friction.GetOutputPort("net_torque")
-        builder.Connect(net, self.plant.get_actuation_input_port())
+        builder.Connect(force.get_output_port(), self.plant.get_actuation_input_port())
+        resistance = self.friction.GetOutputPort("resistance")
+        builder.Connect(resistance, self.plant.get_applied_generalized_force_input_port())
         logs = [state, self.friction.GetOutputPort("friction_torque")]
         self.logs = [LogVectorOutput(port, builder, step) for port in logs]
         self.simulator = Simulator(builder.Build())
@@ -261,10 +261,6 @@ def test_ports():
     context = system.CreateDefaultContext()
     assert context.num_continuous_states() == 2
     system.GetInputPort("velocity").FixValue(context, [0.5, -1.0])
-    # without a drive torque the other outputs still work
     torque = system.GetOutputPort("friction_torque").Eval(context)
     assert np.allclose(torque, [2.5, -3.0], rtol=0, atol=1e-15)
     assert np.array_equal(system.GetOutputPort("resistance").Eval(context), -torque)
-    system.GetInputPort("drive_torque").FixValue(context, [10.0, 20.0])
-    net = system.GetOutputPort("net_torque").Eval(context)
-    assert np.allclose(net, [7.5, 23.0], rtol=0, atol=1e-15)

@@ -7,13 +7,14 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 
 PERIOD = 1e-3
-LAYOUT = PathPointLayout(2, False)
+MANIFOLD = PathManifold(2, oriented=False)
+LAYOUT = MANIFOLD.layout
 
 
 def simulate(path, pulses, tool, duration):
@@ -21,9 +22,9 @@ def simulate(path, pulses, tool, duration):
     builder = DiagramBuilder()
     way = builder.AddSystem(TrajectorySource(tool))
     projector = builder.AddSystem(PathProjector(path, 2, PERIOD))
-    script = builder.AddSystem(ScriptedForce(ForceProfile(pulses), projector.layout, PERIOD))
+    script = builder.AddSystem(ScriptedForce(ForceProfile(pulses), MANIFOLD, PERIOD))
     builder.Connect(way.get_output_port(), projector.get_input_port())
-    builder.Connect(projector.get_output_port(), script.GetInputPort("path_point"))
+    builder.Connect(projector.get_output_port(), script.GetInputPort("manifold_point"))
     logs = [LogVectorOutput(s.get_output_port(), builder, PERIOD) for s in (script, projector)]
     simulator = Simulator(builder.Build())
     simulator.AdvanceTo(duration)
@@ -32,7 +33,7 @@ def simulate(path, pulses, tool, duration):
 
 
 def test_in_the_world_it_needs_no_path():
-    script = ScriptedForce(ForceProfile([ForcePulse(0.1, 1.0, [3.0, 0, 0])]), LAYOUT, PERIOD)
+    script = ScriptedForce(ForceProfile([ForcePulse(0.1, 1.0, [3.0, 0, 0])]), MANIFOLD, PERIOD)
     assert script.num_input_ports() == 0
     context = script.CreateDefaultContext()
     for time, value in ((0.0, 0.0), (0.125, 1.5), (0.5, 3.0), (2.0, 0.0)):
@@ -62,7 +63,7 @@ def test_against_the_motion_is_along_the_path(path):
 def test_a_lost_path_point_leaves_the_direction():
     builder = DiagramBuilder()
     profile = ForceProfile([ForcePulse(-1.0, 1.0, [5.0, 0, 0], frame="manifold")])
-    script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
+    script = builder.AddSystem(ScriptedForce(profile, MANIFOLD, PERIOD))
     lost = builder.AddSystem(ConstantVectorSource(np.full(LAYOUT.size, np.nan)))
     builder.Connect(lost.get_output_port(), script.get_input_port())
     simulator = Simulator(builder.Build())
@@ -76,18 +77,18 @@ def test_a_lost_path_point_leaves_the_direction():
 
 def test_it_does_not_feed_through():
     profile = ForceProfile([ForcePulse(frame="manifold")])
-    assert not ScriptedForce(profile, LAYOUT, PERIOD).HasAnyDirectFeedthrough()
+    assert not ScriptedForce(profile, MANIFOLD, PERIOD).HasAnyDirectFeedthrough()
 
 
 def test_the_path_is_looked_at_in_time():
     """Well before a force the direction is not kept up to date, from 100 ticks before it is."""
     builder = DiagramBuilder()
     profile = ForceProfile([ForcePulse(0.3, 0.5, [5.0, 0, 0], frame="manifold")])
-    script = builder.AddSystem(ScriptedForce(profile, LAYOUT, PERIOD))
+    script = builder.AddSystem(ScriptedForce(profile, MANIFOLD, PERIOD))
     point = np.zeros(LAYOUT.size)
     point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
-    path_point = builder.AddSystem(ConstantVectorSource(point))
-    builder.Connect(path_point.get_output_port(), script.get_input_port())
+    manifold_point = builder.AddSystem(ConstantVectorSource(point))
+    builder.Connect(manifold_point.get_output_port(), script.get_input_port())
     simulator = Simulator(builder.Build())
     context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     simulator.AdvanceTo(0.19)

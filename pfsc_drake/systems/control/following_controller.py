@@ -1,4 +1,4 @@
-"""The path following law as a Drake system."""
+"""The law that makes a robot follow a manifold, as a Drake system."""
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -13,13 +13,13 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law import PathLaw
+from pfsc_drake.control.law.following_law import FollowingLaw
 
 
-class PathFollowingController(LeafSystem):
-    """Exact linearization and stabilization along a path, see :class:`PathLaw`.
+class FollowingController(LeafSystem):
+    """Exact linearization and stabilization along a manifold, see :class:`FollowingLaw`.
 
-    With ``yhat = (eta, xi_1, xi_2[, phi])`` and relative degree r the closed loop is
+    With the virtual output ``yhat`` and relative degree r the closed loop is
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
     The integral is held while a drive is at its limit. After a fault (:class:`Fault`)
@@ -28,7 +28,8 @@ class PathFollowingController(LeafSystem):
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-        path_point (input): From :class:`PathProjector`.
+        manifold_point (input): Where on the manifold the tool is, e.g. from
+            :class:`PathProjector`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
@@ -52,7 +53,7 @@ class PathFollowingController(LeafSystem):
         period: Sampling time [s].
     """
 
-    def __init__(self, law: PathLaw, period: float) -> None:
+    def __init__(self, law: FollowingLaw, period: float) -> None:
         super().__init__()
         self._law, self.period, self.layout = law, period, law.layout
         linearization = law.linearization
@@ -62,14 +63,14 @@ class PathFollowingController(LeafSystem):
         self._held, self._last_good = slice(m + 2, m + 2 + n), slice(m + 2 + n, m + 2 + 5 * n)
         memory = self.DeclareDiscreteState(self._last_good.stop)
         self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
-        self._path_point: InputPort = self.DeclareVectorInputPort(
-            "path_point", linearization.layout.size
+        self._manifold_point: InputPort = self.DeclareVectorInputPort(
+            "manifold_point", linearization.manifold.layout.size
         )
         self._reference: InputPort = self.DeclareVectorInputPort("reference", (r + 1) * m)
         self._tau_ext: InputPort | None = None
         sources = {
             self._joint_state.ticket(),
-            self._path_point.ticket(),
+            self._manifold_point.ticket(),
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
@@ -108,7 +109,7 @@ class PathFollowingController(LeafSystem):
             tau_ext = self._tau_ext.Eval(context)
         result = self._law.evaluate(
             state,
-            self._path_point.Eval(context),
+            self._manifold_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
             memory[self._held] if memory[self._known] else None,
@@ -140,6 +141,5 @@ class PathFollowingController(LeafSystem):
         memory[self._last_good] = self._joint_state.Eval(context)
         saturated = result[self.layout.status.stop - 1]
         if self._law.stabilization.has_integral_part and not saturated:
-            m = self._fault
-            y = result[self.layout.manifold_state][:m]
-            memory[self._integral] += self.period * (y - self._reference.Eval(context)[:m])
+            error = self._law.error(result, self._reference.Eval(context))
+            memory[self._integral] += self.period * error

@@ -8,8 +8,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import linearize_path
-from pfsc_drake.control.manifolds.path_coordinates import PathGeometry, path_coordinates
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
+from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, path_coordinates
 from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.jets import Jet
 
@@ -229,7 +229,9 @@ def test_decoupling_matrix_is_the_path_jacobian(load_robot, oriented_path):
     relative = R_d.T @ (J_w - np.outer(w_d, theta_rate))
     expected = np.vstack([E_p @ J_t, np.linalg.solve(euler_rate_matrix(phi), relative)])
 
-    linearization = linearize_path(robot.chain, "rigid", oriented=True)
+    linearization = linearize(
+        robot.chain, "rigid", PathManifold(RELATIVE_DEGREE["rigid"], oriented=True)
+    )
     state = np.concatenate([q, np.zeros(6), q, np.zeros(6)])
     A = np.array(linearization.function(state, np.zeros(6), point)[1])
     assert np.allclose(A[:3], expected[:3], rtol=0, atol=1e-11)

@@ -5,7 +5,7 @@ import pytest
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law import SafeState
+from pfsc_drake.control.law.following_law import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PathStatus
@@ -78,7 +78,7 @@ def test_a_state_that_is_not_finite_is_a_fault(tick, bad):
 def test_motor_state_that_is_not_finite_is_a_fault_where_it_is_used(load_robot, make_law, q, tick):
     robot = load_robot("comau_racer_1_4_elastic_3r")
     law = make_law(robot.chain, "elastic", False)
-    point = np.zeros(law.linearization.layout.size)
+    point = np.zeros(law.linearization.manifold.layout.size)
     point[: tick.point.size] = tick.point
     for index in range(6, 12):
         state = tick.changed("state", index, np.nan)["state"]
@@ -96,7 +96,7 @@ def test_nothing_else_that_is_not_finite_passes(tick, name):
 
 
 def test_the_projections_faults(tick):
-    layout = tick.law.linearization.layout
+    layout = tick.law.linearization.manifold.layout
     not_converged = tick.changed("point", layout.status.start, PathStatus.NOT_CONVERGED)
     beyond = tick.changed("point", layout.status.start, PathStatus.BEYOND_END)
     assert tick.fault(**not_converged) == Fault.PROJECTION_FAILED

@@ -1,4 +1,4 @@
-"""The path following law as a function of measurement, path and reference."""
+"""The following law as a function of measurement, manifold point and reference."""
 
 import math
 from dataclasses import dataclass
@@ -53,8 +53,10 @@ class SafeState:
     damping: np.ndarray
 
 
-class PathLaw:
-    """The path following law (3.29), (3.50), (3.58), (3.65), (3.70) of one robot.
+class FollowingLaw:
+    """The law that makes one robot follow a manifold.
+
+    For a path it is (3.29), (3.50), (3.58), (3.65) or (3.70), as the drives are.
 
     Evaluation writes into buffers that are made once; the object holds no state
     of the controlled system.
@@ -118,8 +120,8 @@ class PathLaw:
         self.function = _law_function(linearization, stabilization)
         self._completion = _completion_function(linearization, self.limits)
         self._fault_index = self.layout.status.start
-        self._alpha_index = linearization.layout.alpha.start
-        self._status_index = linearization.layout.status.start
+        self._alpha_index = linearization.manifold.layout.alpha.start
+        self._status_index = linearization.manifold.layout.status.start
         self._bind_buffers()
 
     def _bind_buffers(self) -> None:
@@ -129,7 +131,7 @@ class PathLaw:
         second = BoundFunction(self._completion, **arrays)
         arrays |= second.arguments | second.results
         self._linearize, self._complete = first.evaluate, second.evaluate
-        self._state, self._point = arrays["state"], arrays["path_point"]
+        self._state, self._point = arrays["state"], arrays["manifold_point"]
         self._reference, self._integral = arrays["reference"], arrays["integral"]
         self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
         self._lead, self._rhs = arrays["lead"], arrays["rhs"]
@@ -151,7 +153,7 @@ class PathLaw:
 
         Args:
             state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-            point: Path point next to the tool, laid out by the linearization's layout.
+            point: The manifold's point, laid out by the manifold's layout.
             reference: Derivatives 0..r of the virtual output's reference by rows,
                 shape ((r + 1) m,).
             integral: Integral of the virtual output's error, shape (m,).
@@ -199,6 +201,18 @@ class PathLaw:
             return Fault.PROJECTION_FAILED
         return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
 
+    def error(self, result: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """Return the error of the virtual output, which is to vanish, shape (m,).
+
+        Args:
+            result: From :meth:`evaluate`.
+            reference: See there.
+        """
+        m = self.linearization.num_outputs
+        y = result[self.layout.manifold_state][:m]
+        # where the point moves with time, the virtual output is the error
+        return y if self.linearization.manifold.follows_time else y - reference[:m]
+
     def safe_drive(self, state: np.ndarray, last_good_state: np.ndarray) -> np.ndarray:
         """Return the drive input of the safe state, shape (N,).
 
@@ -222,21 +236,21 @@ def _law_function(linearization: Linearization, stabilization: Stabilization) ->
     n, m = linearization.num_joints, linearization.num_outputs
     r = linearization.relative_degree
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    point = ca.SX.sym("path_point", linearization.layout.size)
+    point = ca.SX.sym("manifold_point", linearization.manifold.layout.size)
     reference, integral = ca.SX.sym("reference", (r + 1) * m), ca.SX.sym("integral", m)
     y_p = ca.vertsplit(reference, m)
     progress = []
-    if linearization.time_driven:
+    if linearization.manifold.follows_time:
         # the reference point moves with time, and the errors from it shall vanish
         progress = [ca.vertcat(*[y[0] for y in y_p])]
         y_p = [ca.SX(m, 1)] * (r + 1)
     Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point, *progress)
     v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
     return ca.Function(
-        "path_law",
+        "following_law",
         [state, point, reference, integral, tau_ext],
         [Y, ca.densify(v), A, v - b, gain, drift, offset],
-        ["state", "path_point", "reference", "integral", "tau_ext"],
+        ["state", "manifold_point", "reference", "integral", "tau_ext"],
         ["Y", "v", "A", "rhs", "gain", "drift", "offset"],
     )
 

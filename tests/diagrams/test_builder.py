@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from diagrams.path_following import build_path_following
+from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
@@ -16,20 +16,20 @@ WIRES = {
     ("plant", "state"): {("joint_encoders", "u0")},
     ENCODERS: {
         ("tool_kinematics", "joint_state"),
-        ("path_following_controller", "joint_state"),
+        ("following_controller", "joint_state"),
         ("log_signals", "u0"),
     },
     ("tool_kinematics", "tool_pose"): {("path_projector", "tool_pose"), ("log_signals", "u1")},
-    ("path_projector", "path_point"): {
-        ("path_following_controller", "path_point"),
+    ("path_projector", "manifold_point"): {
+        ("following_controller", "manifold_point"),
         ("log_signals", "u2"),
     },
     ("reference_generator", "reference"): {
-        ("path_following_controller", "reference"),
+        ("following_controller", "reference"),
         ("log_signals", "u3"),
     },
-    ("path_following_controller", "law"): {("log_signals", "u4")},
-    ("path_following_controller", "drive_torque"): {("hold", "u")},
+    ("following_controller", "law"): {("log_signals", "u4")},
+    ("following_controller", "drive_torque"): {("hold", "u")},
     ("hold", "y"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
     ("log_signals", "y0"): {("log", "data")},
@@ -46,7 +46,7 @@ def settings(load_scenario):
 
 @pytest.fixture
 def station(settings):
-    return build_path_following(settings, Path())
+    return build_station(settings, Path())
 
 
 def wires(diagram):
@@ -74,16 +74,16 @@ def test_wiring(station):
 def test_the_rigid_law_sees_the_motors_only(settings):
     """Its path point belongs to where the tool would be without deflection."""
     settings.controller.law = "rigid"
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     _, root = start(station)
     kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
     pose = kinematics.GetOutputPort("tool_pose").Eval(kinematics.GetMyContextFromRoot(root))
     x = station.initial_state.copy()
     assert np.abs(x[1:6:2]).max() > 1e-3
     x[1:6:2] = 0.0  # the joints' deflections
-    context = station.plant.CreateDefaultContext()
-    station.plant.SetPositionsAndVelocities(context, x)
-    tool = station.plant.GetFrameByName("tool_point").CalcPoseInWorld(context)
+    context = station.part.plant.CreateDefaultContext()
+    station.part.plant.SetPositionsAndVelocities(context, x)
+    tool = station.part.plant.GetFrameByName("tool_point").CalcPoseInWorld(context)
     np.testing.assert_allclose(pose[:3], tool.translation(), atol=1e-12)
 
 
@@ -92,7 +92,7 @@ def test_a_failing_sensor_is_between_encoders_and_everything_else(settings):
     expected = dict(WIRES)
     expected[("sensor_failure", "delivered")] = expected[ENCODERS]
     expected[ENCODERS] = {("sensor_failure", "measured")}
-    assert wires(build_path_following(settings, Path()).diagram) == expected
+    assert wires(build_station(settings, Path()).diagram) == expected
 
 
 @pytest.mark.parametrize("component", [-1, 12])
@@ -100,7 +100,7 @@ def test_a_sensor_that_is_not_there(settings, component):
     settings.simulation.sensor_failure.time = 0.1
     settings.simulation.sensor_failure.component = component
     with pytest.raises(InputError) as caught:
-        build_path_following(settings, Path())
+        build_station(settings, Path())
     for part in ("sensor_failure.component", str(component), "0 to 11"):
         assert part in str(caught.value)
 
@@ -108,7 +108,9 @@ def test_a_sensor_that_is_not_there(settings, component):
 def test_encoders_measure_links_and_motors(station, load_arm):
     _, root = start(station)
     x = np.random.default_rng(3).normal(size=12)
-    station.plant.SetPositionsAndVelocities(station.plant.GetMyMutableContextFromRoot(root), x)
+    station.part.plant.SetPositionsAndVelocities(
+        station.part.plant.GetMyMutableContextFromRoot(root), x
+    )
     encoders = station.diagram.GetSubsystemByName("joint_encoders")
     measured = encoders.get_output_port().Eval(encoders.GetMyContextFromRoot(root))
     arm = load_arm("comau_racer_1_4_elastic_3r")
@@ -124,13 +126,13 @@ def test_encoders_measure_links_and_motors(station, load_arm):
 
 def test_start(station):
     _, root = start(station)
-    plant = station.plant.GetMyContextFromRoot(root)
-    x = station.plant.GetPositionsAndVelocities(plant)
+    plant = station.part.plant.GetMyContextFromRoot(root)
+    x = station.part.plant.GetPositionsAndVelocities(plant)
     np.testing.assert_array_equal(x, station.initial_state)
-    point = station.projector.GetOutputPort("path_point").Eval(
+    point = station.projector.GetOutputPort("manifold_point").Eval(
         station.projector.GetMyContextFromRoot(root)
     )
-    layout = station.law.linearization.layout
+    layout = station.task.place.layout
     assert point[layout.theta][0] == pytest.approx(station.initial_theta, abs=1e-12)
     assert point[layout.eta][0] == pytest.approx(0.96, abs=1e-9)
 
@@ -141,8 +143,8 @@ def test_torque_is_held_from_the_tick_on(station):
     held = []
     for tick in range(1, 6):
         simulator.AdvanceTo((tick + 0.5) * 1e-3)
-        plant = station.plant.GetMyContextFromRoot(root)
-        held.append(station.plant.get_actuation_input_port().Eval(plant))
+        plant = station.part.plant.GetMyContextFromRoot(root)
+        held.append(station.part.plant.get_actuation_input_port().Eval(plant))
     times, signals = station.log.read(root)
     np.testing.assert_allclose(times, np.arange(6) * 1e-3, atol=1e-12)
     drive = signals["law"][:, station.law.layout.drive]
@@ -154,11 +156,11 @@ def test_log_holds_every_signal(station):
     simulator, root = start(station)
     simulator.AdvanceTo(2e-3)
     _, signals = station.log.read(root)
-    layout = station.law.linearization.layout
+    layout = station.task.place.layout
     assert {name: x.shape for name, x in signals.items()} == {
         "joint_state": (3, 12),
         "tool_pose": (3, 12),
-        "path_point": (3, layout.size),
+        "manifold_point": (3, layout.size),
         "reference": (3, 9),
         "law": (3, station.law.layout.size),
     }
@@ -171,7 +173,7 @@ def test_reference_lasts_as_long_as_its_moves(settings):
     settings.reference.points = [0.96, 1.0]
     settings.reference.velocity, settings.reference.acceleration = 0.01, 1.0
     settings.reference.dwell = 0.25
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     # two rests, cruise and two ramps that cover half of the cruise's way: 35/16 v/a each
     expected = 2 * 0.25 + 0.04 / 0.01 + 35.0 / 16.0 * 0.01 / 1.0
     assert station.reference_duration == pytest.approx(expected, abs=1e-9)
@@ -184,16 +186,16 @@ def test_a_joint_without_drive(settings, tmp_path):
     (tmp_path / "lame.sdf").write_text(lame, encoding="utf-8")
     settings.robot.model = "lame.sdf"
     with pytest.raises(InputError, match=r"robot\.model.*actuator"):
-        build_path_following(settings, tmp_path)
+        build_station(settings, tmp_path)
 
 
 def test_a_law_for_velocity_servos_needs_its_own_gains(settings):
     settings.controller.law = "velocity_servo"
     with pytest.raises(InputError, match=r"controller\.gains.*velocity_servo"):
-        build_path_following(settings, Path())
+        build_station(settings, Path())
     poles = GainParameters(poles=[-3.0])
     settings.controller.gains["velocity_servo"] = LawGains(poles, poles)
-    station = build_path_following(settings, Path())
+    station = build_station(settings, Path())
     assert station.diagram.HasSubsystemNamed("velocity_servo")
 
 
@@ -206,8 +208,8 @@ def test_drives_go_to_their_joints_in_any_order(settings, tmp_path):
     moved = (text[:begin] + text[end:]).replace("</model>", joint + "</model>", 1)
     (tmp_path / "moved.sdf").write_text(moved, encoding="utf-8")
     settings.robot.model = "moved.sdf"
-    station = build_path_following(settings, tmp_path)
-    plant = station.plant
+    station = build_station(settings, tmp_path)
+    plant = station.part.plant
     actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
     order = [actuator.joint().name() for actuator in actuators]
     assert order != ["motor_1", "motor_2", "motor_3"]
@@ -221,9 +223,9 @@ def test_drives_go_to_their_joints_in_any_order(settings, tmp_path):
 
 def test_warning_only_where_joints_resonate_too_fast(settings):
     settings.controller.law = "elastic"
-    assert build_path_following(settings, Path()).warnings == []
+    assert build_station(settings, Path()).warnings == []
     settings.controller.sampling_time = 1e-2
-    (warning,) = build_path_following(settings, Path()).warnings
+    (warning,) = build_station(settings, Path()).warnings
     assert "Hz" in warning
     settings.controller.law = "rigid"
-    assert build_path_following(settings, Path()).warnings == []
+    assert build_station(settings, Path()).warnings == []

@@ -4,9 +4,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake import jets
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.path_force import (
+    rotational_force,
+    translational_force,
+    turning_force,
+)
+from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
+
+_TRANSLATIONAL = (
+    Coordinate("eta", Kind.TANGENTIAL, "tau_par"),
+    Coordinate("xi_1", Kind.TRANSVERSAL, "tau_perp"),
+    Coordinate("xi_2", Kind.TRANSVERSAL, "tau_cross"),
+)
+_ROTATIONAL = tuple(
+    Coordinate(f"phi_{axis}", Kind.ROTATIONAL, f"tau_{axis}") for axis in ("z", "y", "x")
+)
 
 
 @dataclass(frozen=True)
@@ -127,3 +145,62 @@ def quaternion_rotation(q: Jet) -> Jet:
             for k in range(q.order + 1)
         ]
     )
+
+
+class PathManifold:
+    """A path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
+
+    Its coordinates are arc length, two transversal ones and, with orientation, ZYX angles.
+
+    Args:
+        order: Relative degree r of the law, 1 to 5.
+        oriented: Whether the path has an orientation.
+
+    Raises:
+        InputError: If the order is out of range.
+    """
+
+    name = "path"
+    follows_time = False
+
+    def __init__(self, order: int, *, oriented: bool) -> None:
+        self.layout = PathPointLayout(order, oriented)
+        self.coordinates = (*_TRANSLATIONAL, *(_ROTATIONAL if oriented else ()))
+
+    def geometry(self, point: ca.SX) -> PathGeometry:
+        """Return the parts of a path point as the maps need them."""
+        layout = self.layout
+        quaternion = ca.vertsplit(point[layout.quaternion], 4) if layout.oriented else []
+        return PathGeometry(
+            eta=point[layout.eta],
+            normal=point[layout.normal],
+            position=ca.vertsplit(point[layout.position], 3),
+            quaternion=quaternion,
+        )
+
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+        """Return :func:`path_coordinates`."""
+        return path_coordinates(y, R_e, self.geometry(point))
+
+    def force(
+        self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
+    ) -> ca.SX:
+        """Return (3.41) for the translational coordinates, (3.44) and (3.45) for the angles.
+
+        Their power ``tau . yhat'`` is ``f . y_t' + mu . (omega - omega_d)``: the power of the
+        wrench, the rotation being that relative to the path's orientation. With
+        ``with_turning`` :func:`turning_force` is added to the tangential one; the power is then
+        ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``.
+        """
+        force, torque, layout = wrench[:3], wrench[3:], self.layout
+        translational = translational_force(force, point, layout)
+        if not layout.oriented:
+            return translational
+        if with_turning:
+            translational[0] += turning_force(torque, point, layout)
+        rotational = rotational_force(torque, point, layout, reference[3:6])
+        return ca.vertcat(translational, rotational)
+
+    def axes(self, point: np.ndarray) -> np.ndarray:
+        """Return ``[e_par, e_perp, e_cross]`` as columns, shape (3, 3)."""
+        return manifold_axes(point[self.layout.position][3:6], point[self.layout.normal])

@@ -5,21 +5,21 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
+from diagrams.builder import build_station
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import PathFollowingScenario
-from diagrams.scenario.delta import DeltaFollowingScenario
-from diagrams.stations import build_station, load_settings
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.typed import load_typed
 
 FILE = SCENARIO_DIRECTORY / "pfc_delta.yaml"
 PERIOD = 0.04
 
 
 def load(*changes):
-    return load_settings(load_scenario_data(FILE, list(changes)), str(FILE))
+    return load_typed(PathFollowingScenario, load_scenario_data(FILE, list(changes)), str(FILE))
 
 
 def build(*changes):
@@ -37,18 +37,13 @@ def sources(diagram):
     }
 
 
-def test_the_robot_decides_the_schema():
-    assert isinstance(load(), DeltaFollowingScenario)
-    settings = load_settings({"robot": {"model": "comau_racer_1_4"}}, "mine.yaml")
-    assert type(settings) is PathFollowingScenario
-
-
-def test_friction_is_between_hold_and_plant():
+def test_friction_is_beside_the_drives():
     behind = sources(build().diagram)
-    assert behind["plant", "actuation"] == ("joint_friction", "net_torque")
-    assert behind["joint_friction", "drive_torque"] == ("hold", "y")
-    assert behind["joint_friction", "velocity"] == ("slide_velocity", "y0")
-    assert behind["slide_velocity", "u0"] == ("plant", "state")
+    assert behind["plant", "actuation"] == ("hold", "y")
+    assert behind["plant", "resistance"] == ("joint_friction", "resistance")
+    assert behind["joint_friction", "velocity"] == ("motor_velocity", "y0")
+    # the true velocity, whatever the encoders say
+    assert behind["motor_velocity", "u0"] == ("joint_encoders", "y0")
 
 
 def test_without_friction_the_held_force_drives_the_plant():
@@ -85,14 +80,14 @@ def test_a_push_deflects_as_the_gains_say():
     _, log = station.log.read(simulator.get_context())
     np.testing.assert_allclose(log["wrench_ext"][-1], [*force, 0, 0, 0], atol=1e-12)
     q = station.initial_state[:3]
-    J, masses = station.chain.jacobian_at(q), station.chain.parameters.masses
+    J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
     acceleration = J @ np.linalg.solve(D, J.T @ force)
     theta = np.array([station.initial_theta])
     tangent = station.path.position.derivatives(theta, 1)[0, 1]
     tangent /= np.linalg.norm(tangent)
     along = tangent * (tangent @ acceleration)
-    moved = station.chain.tool_position(log["joint_state"][-1, :3]) - station.chain.tool_position(q)
+    moved = station.robot.tool_position(log["joint_state"][-1, :3]) - station.robot.tool_position(q)
     expected = along / 3675.0 + (acceleration - along) / 7500.0
     np.testing.assert_allclose(moved, expected, atol=0.02 * np.linalg.norm(expected))
 
@@ -101,12 +96,12 @@ def test_starts_at_rest_beside_the_path():
     station = build()
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
-    plant = station.plant.GetMyContextFromRoot(root)
-    q, v = np.split(station.plant.GetOutputPort("state").Eval(plant), 2)
-    y_t = station.plant.GetOutputPort("tool_position").Eval(plant)
+    plant = station.part.plant.GetMyContextFromRoot(root)
+    q, v = np.split(station.part.plant.GetOutputPort("state").Eval(plant), 2)
+    y_t = station.part.plant.GetOutputPort("tool_position").Eval(plant)
     np.testing.assert_array_equal(v, 0.0)
     # rods of 0.5 m reach from the slides to the plate: the constraint (2.30), by itself
-    geometry = station.chain.parameters.geometry
+    geometry = station.robot.parameters.geometry
     slides = geometry.offsets - q[:, None] * geometry.rails
     np.testing.assert_allclose(np.linalg.norm(y_t - slides, axis=1), 0.5, atol=1e-12)
     # the nearest point of the path, on a fine grid
@@ -127,13 +122,13 @@ def test_the_first_force_is_weight_and_proportional_part():
     controller = station.controller
     tau = controller.GetOutputPort("drive_torque").Eval(controller.GetMyContextFromRoot(root))
     q = station.initial_state[:3]
-    y_t = station.chain.tool_position(q)
+    y_t = station.robot.tool_position(q)
     theta = np.array([station.initial_theta])
     offset = y_t - station.path.position.derivatives(theta, 0)[0, 0]
-    J, masses = station.chain.jacobian_at(q), station.chain.parameters.masses
+    J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
     gravity = np.array([0.0, 0.0, 9.81])
-    rails = station.chain.parameters.geometry.rails  # a slide moves along -c_i
+    rails = station.robot.parameters.geometry.rails  # a slide moves along -c_i
     weight = masses.effective_slide * rails @ gravity - masses.effective_plate * J.T @ gravity
     expected = D @ np.linalg.solve(J, -7500.0 * offset) + weight
     np.testing.assert_allclose(tau, expected, rtol=1e-6)
@@ -146,12 +141,9 @@ def test_the_first_force_is_weight_and_proportional_part():
         ("start.rotation_deg=[1, 0, 0]", ["start.rotation_deg", "only translates"]),
         ("path.orientation.keyframes=[{theta: 0}]", ["keyframes", "only translates"]),
         ("hold_back={force: -5}", ["hold_back.force", "-5"]),
-        ("friction={f_c: [1, 1, 1]}", ["friction", "drive_friction"]),
-        (
-            "compliance.transversal="
-            "{mass: {value: 1}, damping: {value: 10}, stiffness: {value: 500}}",
-            ["compliance", "only with a notch"],
-        ),
+        ("robot.rotor_coupling=comau_racer_1_4", ["robot.rotor_coupling", "none for a DELTA"]),
+        ("robot.joint_damping=[1, 1, 1]", ["robot.joint_damping", "none for a DELTA"]),
+        ("friction={f_c: [1, 1]}", ["friction.f_c", "3 joints"]),
         ("controller.law=velocity_servo", ["controller.law", "velocity_servo", "rigid"]),
         ("controller.law=elastic", ["controller.law", "elastic", "rigid"]),
         ("simulation.integrator=implicit_euler", ["simulation.integrator", "runge_kutta3"]),
@@ -176,15 +168,15 @@ def test_refused(change, parts):
 def test_replay_draws_robot_and_path_upside_down():
     station = build()
     evaluator, q = station.path.evaluator(2), station.initial_state[:3]
-    y_t = station.chain.tool_position(q)
+    y_t = station.robot.tool_position(q)
     pose = np.concatenate([y_t, np.eye(3).ravel()])
     point = evaluator(y_t.tolist(), station.initial_theta)
     motion = RecordedMotion(
         PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    layout = station.law.linearization.layout
-    diagram = build_delta_replay(station.chain, station.path, layout, motion, meshcat, PERIOD)
+    layout = station.task.place.layout
+    diagram = build_delta_replay(station.robot, station.path, layout, motion, meshcat, PERIOD)
     page = record(diagram, meshcat, motion.times[-1], PERIOD)
     assert "</html>" in page
     for name in ("delta_robot/slide_1", "delta_robot/rod_6", "path_following/path"):

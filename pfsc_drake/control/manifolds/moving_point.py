@@ -3,7 +3,8 @@
 import casadi as ca
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.path_coordinates import PathGeometry, orientation_error
+from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, orientation_error
+from pfsc_drake.control.manifolds.path_force import rotational_force
 from pfsc_drake.jets import Jet
 
 
@@ -33,3 +34,27 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     if not path.quaternion:
         return position
     return [*position, *orientation_error(R_e, jets.compose(path.quaternion, theta_d))]
+
+
+class MovingPoint(PathManifold):
+    """The point that moves along a path with time, as a manifold.
+
+    Its coordinates are the errors of :func:`trajectory_errors` in world axes; the first takes
+    the place, and the gains, of the tangential one.
+    """
+
+    name = "trajectory"
+    follows_time = True
+
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+        """Return :func:`trajectory_errors`."""
+        return trajectory_errors(y, R_e, self.geometry(point), lead)
+
+    def force(
+        self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
+    ) -> ca.SX:
+        """Return the force in world axes and, with orientation, (3.44), (3.45)."""
+        if not self.layout.oriented:
+            return wrench[:3]
+        rotational = rotational_force(wrench[3:], point, self.layout, reference[3:6])
+        return ca.vertcat(wrench[:3], rotational)

@@ -3,8 +3,8 @@
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.control.manifolds.path_coordinates import PathGeometry
-from pfsc_drake.control.manifolds.trajectory_errors import trajectory_errors
+from pfsc_drake.control.manifolds.moving_point import trajectory_errors
+from pfsc_drake.control.manifolds.path import PathGeometry
 from pfsc_drake.geometry import FourierCurve, Path
 from pfsc_drake.jets import Jet
 

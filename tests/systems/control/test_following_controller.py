@@ -10,12 +10,13 @@ from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law import PathLaw, SafeState
-from pfsc_drake.control.law.linearization import linearize_path
+from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.path_following_controller import PathFollowingController
+from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
@@ -28,7 +29,7 @@ class Bench:
 
     def __init__(self, arm, path, law):
         self.law = law
-        self.system = PathFollowingController(law, PERIOD)
+        self.system = FollowingController(law, PERIOD)
         self.context = self.system.CreateDefaultContext()
         sigma = path.position.derivatives(THETA, 0)[0]
         q = arm.reach(sigma + np.array([0.004, -0.006, 0.005]))
@@ -41,7 +42,7 @@ class Bench:
         self.fix()
 
     def fix(self, **inputs):
-        names = {"joint_state": "state", "path_point": "point", "reference": "reference"}
+        names = {"joint_state": "state", "manifold_point": "point", "reference": "reference"}
         for port, name in names.items():
             value = inputs.get(name, getattr(self, name))
             self.system.GetInputPort(port).FixValue(self.context, value)
@@ -125,7 +126,7 @@ def test_a_fault_without_measurement_holds_the_last_good_position(bench, arm):
 def test_a_later_fault_does_not_replace_the_first(bench):
     bench.start()
     point = bench.point.copy()
-    point[bench.law.linearization.layout.alpha] = 0.95
+    point[bench.law.linearization.manifold.layout.alpha] = 0.95
     bench.fix(point=point)
     bench.tick(2)
     bench.fix(state=bench.with_nan())
@@ -158,16 +159,18 @@ def test_the_last_ticks_drive_is_extrapolated(path):
     Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_elastic_3r")))
     plant.Finalize()
     chain, _ = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
-    linearization = linearize_path(chain, "elastic", oriented=False)
+    linearization = linearize(
+        chain, "elastic", PathManifold(RELATIVE_DEGREE["elastic"], oriented=False)
+    )
     gains = Stabilization([gains_from_poles([-20.0] * 4)] * 3, 4, ["eta", "xi_1", "xi_2"])
     inverse, safe = DecouplingInverse(1e-4), SafeState(np.full(3, 30.0))
-    law = PathLaw(chain, linearization, gains, inverse, np.full(3, 1e9), 0.9, safe)
-    system = PathFollowingController(law, PERIOD)
+    law = FollowingLaw(chain, linearization, gains, inverse, np.full(3, 1e9), 0.9, safe)
+    system = FollowingController(law, PERIOD)
     context = system.CreateDefaultContext()
     q = np.array([0.2, 1.4, -0.4])
     states = [np.concatenate([q, [v, -v, v], q + 1e-3, np.zeros(3)]) for v in (0.1, 0.15)]
     point, reference = path.evaluator(4).evaluate_at(THETA), np.zeros(15)
-    system.GetInputPort("path_point").FixValue(context, point)
+    system.GetInputPort("manifold_point").FixValue(context, point)
     system.GetInputPort("reference").FixValue(context, reference)
     simulator = Simulator(system, context)
     last_held = None
@@ -185,7 +188,7 @@ def test_every_output_depends_on_every_input_at_once(bench):
     system = bench.system
     for output in ("law", "drive_torque", "manifold_state", "virtual_input", "status"):
         port = int(system.GetOutputPort(output).get_index())
-        for name in ("joint_state", "path_point", "reference"):
+        for name in ("joint_state", "manifold_point", "reference"):
             assert system.HasDirectFeedthrough(int(system.GetInputPort(name).get_index()), port)
 
 
@@ -203,13 +206,13 @@ def closed_loop(arm, path, law, theta):
     measured = builder.AddSystem(MatrixGain(rows))
     kinematics = builder.AddSystem(ToolKinematics(chain))
     projector = builder.AddSystem(PathProjector(path, r, PERIOD))
-    controller = builder.AddSystem(PathFollowingController(law, PERIOD))
+    controller = builder.AddSystem(FollowingController(law, PERIOD))
     source = builder.AddSystem(ConstantVectorSource(reference))
     builder.Connect(plant.get_state_output_port(), measured.get_input_port())
     builder.Connect(measured.get_output_port(), kinematics.GetInputPort("joint_state"))
     builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))
     builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
-    builder.Connect(projector.get_output_port(), controller.GetInputPort("path_point"))
+    builder.Connect(projector.get_output_port(), controller.GetInputPort("manifold_point"))
     builder.Connect(source.get_output_port(), controller.GetInputPort("reference"))
     # the plant's state does not depend on the torque at once, so nothing is algebraic
     builder.Connect(controller.GetOutputPort("drive_torque"), plant.get_actuation_input_port())

@@ -1,0 +1,169 @@
+"""One builder of stations: a robot, a task and surroundings, each chosen independently."""
+
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from diagrams.drawing.delta_replay import build_delta_replay
+from diagrams.drawing.replay import RecordedMotion, build_replay
+from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.robots.arm import Arm, add_arm
+from diagrams.robots.delta import DeltaPart, add_delta, is_delta, load_delta_robot
+from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.encoders import add_joint_state, states_to_log
+from diagrams.robots.force_sensor import add_sensor, sensor_warnings
+from diagrams.robots.part import RobotPart
+from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.checks import require_whole_fraction
+from diagrams.signal_log import add_log
+from diagrams.station import Station
+from diagrams.surroundings.forces import add_surroundings
+from diagrams.surroundings.notch import NotchedWorkpiece
+from diagrams.tasks.external_torque import needs_sensor
+from diagrams.tasks.following import Following, add_law, add_place
+from diagrams.tasks.law import make_law
+from diagrams.tasks.law_warnings import law_warnings
+from diagrams.tasks.path_following import make_task
+from diagrams.tasks.task import StartPoint, Task
+from diagrams.workpiece import Workpiece, upwards
+
+
+def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
+    """Build the station of a scenario.
+
+    Args:
+        scenario: The scenario.
+        folder: Where the scenario's relative file names start.
+
+    Returns:
+        The station; everything in the scenario that can be wrong has been checked.
+
+    Raises:
+        InputError: If the scenario cannot be built.
+    """
+    builder, task = DiagramBuilder(), make_task(scenario, folder)
+    workpiece = _workpiece(scenario, task)
+    part = _add_robot(builder, scenario, folder, workpiece)
+    law = make_law(scenario.controller, part.robot, task.manifold)
+    start, initial_state = _start(scenario, task, part, workpiece)
+    on_motors = scenario.controller.law == "rigid" and not part.robot.is_rigid
+    following = Following(scenario, part.robot, task, law, on_motors)
+
+    true_state = part.joint_state(builder)
+    joint_state = add_joint_state(builder, true_state, part.robot, scenario)
+    place = add_place(builder, following, joint_state)
+    around = place.signals | {"joint_state": true_state}
+    forces = add_surroundings(builder, part, task, scenario, around)
+    if needs_sensor(scenario):
+        states = {"joint_state": joint_state, "true_joint_state": true_state}
+        forces |= add_sensor(builder, part, scenario, states | forces)
+    controller, made = add_law(builder, following, place, forces)
+    signals = place.signals | forces | made
+    drive = {"drive": controller.GetOutputPort(controller.drive_port)}
+    signals |= add_drives(builder, part, scenario, signals | drive, initial_state)
+    signals |= add_friction(builder, part, true_state, scenario, folder)
+    signals |= states_to_log(scenario, true_state, joint_state)
+    log = add_log(builder, signals, scenario.controller.sampling_time)
+    diagram = builder.Build()
+    diagram.set_name(scenario.name or "station")
+    link_state = part.coordinates.link_rows @ initial_state
+    return Station(
+        diagram,
+        part,
+        task,
+        law,
+        place.projector,
+        controller,
+        log,
+        initial_state,
+        start.theta,
+        on_motors,
+        part.start_warnings(
+            scenario.start, link_state[: part.robot.dimension], start.R_e is not None
+        )
+        + law_warnings(scenario, part.robot, link_state)
+        + sensor_warnings(scenario),
+        workpiece,
+    )
+
+
+def _workpiece(scenario: PathFollowingScenario, task: Task) -> Workpiece | None:
+    if scenario.notch is None:
+        return None
+    step = scenario.notch.time_step
+    require_whole_fraction("notch.time_step", step, scenario.controller.sampling_time)
+    return NotchedWorkpiece(task.path, scenario.notch)
+
+
+def _add_robot(
+    builder: DiagramBuilder,
+    scenario: PathFollowingScenario,
+    folder: FilePath,
+    workpiece: Workpiece | None,
+) -> RobotPart:
+    if is_delta(scenario.robot.model):
+        return add_delta(builder, scenario, folder, workpiece)
+    return add_arm(builder, scenario.robot, folder, workpiece)
+
+
+def _start(
+    scenario: PathFollowingScenario, task: Task, part: RobotPart, workpiece: Workpiece | None
+) -> tuple[StartPoint, np.ndarray]:
+    """Return where the tool starts, and the state of the plant there, at rest.
+
+    Raises:
+        InputError: If the start or the way from there is known to be out of reach.
+    """
+    shift = np.zeros(3)
+    if workpiece is not None:
+        shift = workpiece.start_shift(upwards(part.gravity, "notch"))
+    start = task.start(shift)
+    q_J = part.posture(start.y_t, start.R_e, scenario.start)
+    for position, where in task.way():
+        part.check_reach(position, where)
+    return start, part.state_at_rest(q_J)
+
+
+def draw_station(
+    settings: PathFollowingScenario, folder: FilePath, station: Station
+) -> RobotDrawing | None:
+    """Read what a station's robot looks like, or return None if that is known without files.
+
+    Args:
+        settings: The scenario that is to be run.
+        folder: Where its relative file names start.
+        station: Its station.
+    """
+    if not isinstance(station.part, Arm):
+        return None
+    return draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+
+
+def build_station_replay(
+    settings: PathFollowingScenario,
+    folder: FilePath,
+    station: Station,
+    drawing: RobotDrawing | None,
+    motion: RecordedMotion,
+    meshcat: Meshcat,
+) -> Diagram:
+    """Return a diagram that draws a station's recorded motion while its time advances.
+
+    Args:
+        settings: The scenario that was run.
+        folder: Where its relative file names start.
+        station: Its station.
+        drawing: What its robot looks like, from :func:`draw_station`.
+        motion: What to draw.
+        meshcat: Where to draw.
+    """
+    period, layout = settings.simulation.frame_period, station.task.place.layout
+    if isinstance(station.part, DeltaPart):
+        robot = load_delta_robot(settings.robot, folder)
+        return build_delta_replay(
+            robot, station.path, layout, motion, meshcat, period, settings.notch
+        )
+    assert drawing is not None  # draw_station knows every other robot
+    return build_replay(drawing, station.path, layout, motion, meshcat, period)

@@ -1,0 +1,311 @@
+"""The DELTA robot in a diagram, whichever model moves it."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody, SpatialInertia, WeldJoint
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain
+
+from diagrams.robots.contact import add_scene, connect_scene
+from diagrams.robots.part import Drives, RobotPart, SensorMount
+from diagrams.robots.plant_wiring import (
+    add_external_wrench,
+    add_tool_reaction,
+    connect_actuation,
+    connect_push,
+    connect_resistance,
+    joint_state_of,
+)
+from diagrams.scenario import PathFollowingScenario, RobotParameters, StartParameters
+from diagrams.scenario.checks import require
+from diagrams.workpiece import Workpiece, upwards
+from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.multibody import (
+    DeltaModel,
+    add_delta_plant,
+    set_delta_positions,
+    slide_state_rows,
+)
+from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
+from pfsc_drake.systems.physics.contact_wrench import ContactWrench
+from pfsc_drake.systems.physics.delta_plant import DeltaPlant
+from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
+
+TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
+
+
+@dataclass(frozen=True)
+class DeltaPart(RobotPart):
+    """A DELTA robot in a diagram; drives and slides are one, ``joint_state = [q, v, q, v]``.
+
+    Everything is in the axes of the inertial frame (z_0 down).
+
+    Attributes:
+        robot: The robot as the laws know it.
+    """
+
+    robot: DeltaRobot
+
+    @property
+    def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
+        """Slides and drives are one."""
+        size = 2 * self.robot.dimension
+        return PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(self.robot.dimension))
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        return self.robot.gravity
+
+    def _drives(self, step: float | None) -> Drives:
+        parameters = self.robot.parameters
+        friction, mass = parameters.friction, parameters.masses.effective_slide
+        inertia = np.full(self.robot.dimension, mass)
+        return Drives(inertia, (friction.coulomb, friction.viscous), step)
+
+    def posture(
+        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
+    ) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        return self.robot.joint_coordinates(y_t, "start")
+
+    def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
+        """See :class:`RobotPart`."""
+        return np.concatenate([q_J, np.zeros(self.robot.dimension)])
+
+    def check_reach(self, position: np.ndarray, where: str) -> None:
+        """See :class:`RobotPart`."""
+        self.robot.joint_coordinates(position, where)
+
+
+@dataclass(frozen=True)
+class FreeDelta(DeltaPart):
+    """A DELTA robot that touches nothing: (2.72).
+
+    Attributes:
+        analytic: The plant.
+    """
+
+    analytic: DeltaPlant
+
+    @property
+    def plant(self) -> DeltaPlant:
+        """See :class:`RobotPart`."""
+        return self.analytic
+
+    @property
+    def drives(self) -> Drives:
+        """See :class:`RobotPart`."""
+        return self._drives(None)
+
+    def joint_state(self, builder: DiagramBuilder) -> OutputPort:
+        """See :class:`RobotPart`."""
+        return joint_state_of(builder, self.analytic.GetOutputPort("state"), self.coordinates)
+
+    def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
+        """See :class:`RobotPart`."""
+        builder.Connect(torque, self.analytic.GetInputPort("actuation"))
+
+    def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
+        """See :class:`RobotPart`."""
+        builder.Connect(resistance, self.analytic.GetInputPort("resistance"))
+
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """Let a wrench act at the end-effector's centre E; its torque has no effect."""
+        force = builder.AddNamedSystem("external_force", MatrixGain(np.eye(3, 6)))
+        builder.Connect(wrench, force.get_input_port())
+        builder.Connect(force.get_output_port(), self.analytic.GetInputPort("external_force"))
+
+    def sensor_mount(
+        self,
+        builder: DiagramBuilder,
+        joint: str,
+        joint_state: OutputPort,
+        wrench: OutputPort | None,
+    ) -> SensorMount:
+        """Return the sensor between end-effector and load, which is a point mass in E."""
+        _require_joint(joint)
+        mass, gravity = self.robot.parameters.masses.load, self.robot.gravity
+        load = ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
+        acceleration = self.analytic.GetOutputPort("acceleration")
+        reaction = add_tool_reaction(builder, self.robot, load, joint_state, acceleration, wrench)
+        return SensorMount(load, reaction)
+
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """See :class:`RobotPart`."""
+        self.analytic.set_state(context, *np.split(state, 2))
+
+
+@dataclass(frozen=True)
+class TouchingDelta(DeltaPart):
+    """A DELTA robot that may touch a workpiece: (2.71), bodies tied by constraints.
+
+    The plant samples its inputs and its reaction forces: drive forces act, and contact forces
+    are felt, one of its time steps later.
+
+    Attributes:
+        multibody: The plant, discrete.
+        model: The robot in it.
+        tool: Frame in E, behind the sensor.
+        contact: Wrench of the workpiece on the tool.
+    """
+
+    multibody: MultibodyPlant
+    model: DeltaModel
+    tool: Frame
+    contact: ContactWrench
+
+    @property
+    def plant(self) -> MultibodyPlant:
+        """See :class:`RobotPart`."""
+        return self.multibody
+
+    @property
+    def drives(self) -> Drives:
+        """See :class:`RobotPart`."""
+        return self._drives(self.multibody.time_step())
+
+    def joint_state(self, builder: DiagramBuilder) -> OutputPort:
+        """See :class:`RobotPart`."""
+        rows = slide_state_rows(self.multibody, self.model)
+        slides = builder.AddNamedSystem("slides", MatrixGain(rows))
+        builder.Connect(self.multibody.get_state_output_port(), slides.get_input_port())
+        return joint_state_of(builder, slides.get_output_port(), self.coordinates)
+
+    def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
+        """See :class:`RobotPart`."""
+        actuators = np.array([int(actuator) for actuator in self.model.actuators])
+        connect_actuation(builder, self.multibody, actuators, torque)
+
+    def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
+        """See :class:`RobotPart`."""
+        rows = slide_state_rows(self.multibody, self.model)[self.robot.dimension :]
+        connect_resistance(builder, self.multibody, rows, resistance)
+
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """See :class:`RobotPart`."""
+        push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
+        connect_push(builder, self.multibody, push)
+
+    def sensor_mount(
+        self,
+        builder: DiagramBuilder,
+        joint: str,
+        joint_state: OutputPort,
+        wrench: OutputPort | None,
+    ) -> SensorMount:
+        """See :class:`RobotPart`."""
+        _require_joint(joint)
+        plant = self.multibody
+        mount = plant.GetJointByName(joint)
+        load = tool_load_from_plant(plant, mount, self.tool)
+        return SensorMount(
+            load, plant.get_reaction_forces_output_port(), reaction_index(plant, mount)
+        )
+
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """See :class:`RobotPart`."""
+        set_delta_positions(self.multibody, context, self.model, *np.split(state, 2))
+
+
+def _require_joint(joint: str) -> None:
+    """Refuse another joint for the sensor than that between end-effector and load."""
+    require(joint == SENSOR_JOINT, "sensor.joint", joint, f"{SENSOR_JOINT} on a DELTA robot")
+
+
+def is_delta(model: str) -> bool:
+    """Return whether a robot model is a DELTA robot: a shipped one, or a file of parameters."""
+    return model in SHIPPED_ROBOTS or FilePath(model).suffix in (".yaml", ".yml")
+
+
+def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobot:
+    """Return the DELTA robot of a scenario.
+
+    Args:
+        parameters: Which robot.
+        folder: Where relative file names start.
+
+    Raises:
+        InputError: If its parameters cannot be read.
+    """
+    model = parameters.model
+    return DeltaRobot(load_delta_parameters(folder / model if FilePath(model).suffix else model))
+
+
+def add_delta(
+    builder: DiagramBuilder,
+    scenario: PathFollowingScenario,
+    folder: FilePath,
+    workpiece: Workpiece | None,
+) -> DeltaPart:
+    """Add a DELTA robot.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        folder: Where relative file names start.
+        workpiece: What its tool may touch, if anything.
+
+    Raises:
+        InputError: If the scenario asks for something that a DELTA robot does not have.
+    """
+    _check(scenario)
+    robot = load_delta_robot(scenario.robot, folder)
+    if workpiece is None:
+        return FreeDelta(robot, builder.AddNamedSystem("plant", DeltaPlant(robot)))
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(workpiece.time_step))
+    scene_graph = add_scene(builder, plant)
+    model = add_delta_plant(plant, robot.parameters, with_load=False)
+    tool = _weld_gripper(plant, model.end_effector, robot, workpiece)
+    geometries = workpiece.add(plant, tool)
+    plant.Finalize()
+    contact = connect_scene(builder, plant, scene_graph, geometries)
+    return TouchingDelta(robot, plant, model, tool, contact)
+
+
+def _check(scenario: PathFollowingScenario) -> None:
+    """Refuse what is said of robots that turn their tool or bend."""
+    start, robot, law = scenario.start, scenario.robot, scenario.controller.law
+    drives = "the drives of a DELTA robot are stiff and take forces"
+    require(law == "rigid", "controller.law", law, f"rigid, {drives}")
+    one = "none; one pose of the slides belongs to each position"
+    require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
+    for key, none in asdict(RobotParameters()).items():
+        value = asdict(robot)[key]
+        given = key not in ("model", "tool_frame") and value != none
+        require(not given, f"robot.{key}", value, "none for a DELTA robot")
+    turned = "none; a DELTA robot only translates"
+    require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
+    keyframes = scenario.path.orientation.keyframes
+    require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
+
+
+def _weld_gripper(
+    plant: MultibodyPlant, end_effector: RigidBody, robot: DeltaRobot, workpiece: Workpiece
+) -> Frame:
+    """Weld the load to the end-effector, with a joint for the sensor between.
+
+    The load is a gripper that reaches down to what touches the workpiece. The frame that is
+    returned is in E; the end-effector only translates, so that the inertia about the centre
+    of mass has no effect.
+    """
+    up = upwards(robot.gravity, "robot")
+    middle = -0.5 * workpiece.reach * up
+    mass = robot.parameters.masses.load
+    inertia = SpatialInertia.SolidSphereWithMass(mass, workpiece.radius).Shift(-middle)
+    tool = plant.AddRigidBody(TOOL, end_effector.model_instance(), inertia)
+    plant.AddJoint(
+        WeldJoint(SENSOR_JOINT, end_effector.body_frame(), tool.body_frame(), RigidTransform())
+    )
+    return plant.AddFrame(FixedOffsetFrame(TOOL_POINT, tool.body_frame(), RigidTransform()))

@@ -1,0 +1,172 @@
+"""A robot in a diagram, whatever its kinematics and whichever model moves it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
+
+from diagrams.scenario import StartParameters
+from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.systems.physics.contact_wrench import ContactWrench
+
+
+@dataclass(frozen=True)
+class Drives:
+    """What friction acts on.
+
+    Attributes:
+        inertia: Least inertia behind each drive, shape (N,) [kg m^2 or kg]; zero where a drive
+            has none of its own.
+        own_friction: Coulomb and viscous friction that the robot's parameters tell, each (N,),
+            or None if they do not.
+        step: Step by which the plant's state advances [s], if it is discrete.
+    """
+
+    inertia: np.ndarray
+    own_friction: tuple[np.ndarray, np.ndarray] | None = None
+    step: float | None = None
+
+
+@dataclass(frozen=True)
+class SensorMount:
+    """Where a force/torque sensor sits.
+
+    Attributes:
+        load: Everything behind the sensor.
+        reaction: Reaction ``[torque, force]`` on the tool, shape (6,), or abstract, all
+            reactions of a plant.
+        index: Of the sensor's joint in the plant's reactions, or None.
+    """
+
+    load: ToolLoad
+    reaction: OutputPort
+    index: int | None = None
+
+
+class RobotPart(ABC):
+    """A robot in a diagram: where its signals come from and where they go.
+
+    Attributes:
+        robot: The robot as the laws know it, N joints.
+        coordinates: Where its coordinates stand in the state ``[q, v]`` of its model.
+        contact: What the surroundings do to its tool, if it can touch them.
+    """
+
+    robot: RobotModel
+    coordinates: PlantCoordinates
+    contact: ContactWrench | None = None
+
+    @property
+    @abstractmethod
+    def plant(self) -> LeafSystem:
+        """The system in the diagram that moves."""
+
+    @property
+    @abstractmethod
+    def gravity(self) -> np.ndarray:
+        """Gravitational acceleration in the world [m/s^2], shape (3,)."""
+
+    @property
+    @abstractmethod
+    def drives(self) -> Drives:
+        """What friction acts on."""
+
+    @abstractmethod
+    def joint_state(self, builder: DiagramBuilder) -> OutputPort:
+        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
+
+    @abstractmethod
+    def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
+        """Let drive torques ``tau_d`` act, shape (N,)."""
+
+    @abstractmethod
+    def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
+        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
+
+    @abstractmethod
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """Let a wrench act at the tool point, world axes, shape (6,).
+
+        Args:
+            builder: Builder of the diagram.
+            wrench: The wrench [N, Nm].
+            joint_state: The true one.
+        """
+
+    @abstractmethod
+    def sensor_mount(
+        self,
+        builder: DiagramBuilder,
+        joint: str,
+        joint_state: OutputPort,
+        wrench: OutputPort | None,
+    ) -> SensorMount:
+        """Return where a force/torque sensor sits.
+
+        Args:
+            builder: Builder of the diagram.
+            joint: Fixed joint of the model with the sensor in it.
+            joint_state: The true one.
+            wrench: On the tool point, world axes, shape (6,), if anything acts there.
+
+        Raises:
+            InputError: If the model has no such joint, or no tool behind it.
+        """
+
+    @abstractmethod
+    def posture(
+        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
+    ) -> np.ndarray:
+        """Return joint coordinates that put the tool where it starts, shape (N,).
+
+        Args:
+            y_t: Tool point [m], shape (3,).
+            R_e: Orientation of the tool, shape (3, 3), or None if it does not matter.
+            start: What the scenario says of it.
+
+        Raises:
+            InputError: If it is out of reach.
+        """
+
+    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+        """Return what there is to say about the robot and its start, one sentence each.
+
+        Args:
+            start: What the scenario says of the start.
+            q_J: Joint coordinates found, shape (N,).
+            oriented: Whether the tool's orientation mattered.
+        """
+        return []
+
+    @abstractmethod
+    def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
+        """Return the state of the model at rest, elastic joints carrying the links' weight.
+
+        Args:
+            q_J: Joint coordinates, shape (N,).
+        """
+
+    def check_reach(self, position: np.ndarray, where: str) -> None:  # noqa: B027
+        """Refuse a position on the way that the robot is known not to reach.
+
+        Args:
+            position: Of the tool point [m], shape (3,).
+            where: For the message.
+
+        Raises:
+            InputError: If so. Robots that have to be tried say nothing.
+        """
+
+    @abstractmethod
+    def place(self, context: Context, state: np.ndarray) -> None:
+        """Put the plant into a state of its model, ``[q, v]``.
+
+        Args:
+            context: Context of the plant.
+            state: Shape (num_states,), see :class:`PlantCoordinates`.
+        """

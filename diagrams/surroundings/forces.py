@@ -1,0 +1,99 @@
+"""Everything that acts on the tool."""
+
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder, ZeroOrderHold
+
+from diagrams.robots.part import RobotPart
+from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.checks import require
+from diagrams.surroundings.hand import add_hand
+from diagrams.tasks.task import Task
+from pfsc_drake.physics.force_profile import ForceProfile
+from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
+from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+
+
+def add_surroundings(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    task: Task,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add the scenario's forces on the tool, and return their signals for the log.
+
+    Args:
+        builder: Builder of the diagram.
+        part: The robot.
+        task: What it is to do.
+        scenario: The scenario.
+        ports: ``joint_state``, the true one, ``tool_pose``, ``manifold_point``.
+
+    Returns:
+        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there.
+
+    Raises:
+        InputError: If a force does not suit the robot.
+    """
+    sources = _scripted(builder, part, task, scenario, ports)
+    sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
+    wrenches = []
+    if part.contact is not None:
+        builder.Connect(ports["tool_pose"], part.contact.GetInputPort("tool_pose"))
+        wrenches.append(part.contact.GetOutputPort("wrench"))
+    if sources:
+        total = _sum(builder, "wrench", sources)
+        # held over a tick, so that it is computed once and not in every stage of the integrator
+        hold = builder.AddNamedSystem(
+            "wrench_hold", ZeroOrderHold(scenario.controller.sampling_time, 6)
+        )
+        builder.Connect(total, hold.get_input_port())
+        part.connect_wrench(builder, hold.get_output_port(), ports["joint_state"])
+        wrenches.append(hold.get_output_port())
+    return {"wrench_ext": _sum(builder, "all_wrenches", wrenches)} if wrenches else {}
+
+
+def _scripted(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    task: Task,
+    scenario: PathFollowingScenario,
+    ports: dict[str, OutputPort],
+) -> list[OutputPort]:
+    """Add the forces that are written down beforehand."""
+    period, sources = scenario.controller.sampling_time, []
+    if scenario.forces:
+        profile = ForceProfile(scenario.forces)
+        operator = builder.AddNamedSystem("operator", ScriptedForce(profile, task.manifold, period))
+        if profile.needs_manifold:
+            builder.Connect(ports["manifold_point"], operator.GetInputPort("manifold_point"))
+        sources.append(operator.GetOutputPort("wrench"))
+    pulse = scenario.hold_back
+    if pulse.force != 0.0:
+        manifold = task.place
+        allowed = "0 without a path with orientation and six axes"
+        require(manifold.layout.oriented, "hold_back.force", pulse.force, allowed)
+        shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
+        brake = builder.AddNamedSystem(
+            "hold_back", DecoupledForce(part.robot, manifold, shape, period)
+        )
+        for name in ("joint_state", "manifold_point"):
+            builder.Connect(ports[name], brake.GetInputPort(name))
+        sources.append(brake.GetOutputPort("wrench"))
+    return sources
+
+
+def _sum(builder: DiagramBuilder, name: str, sources: list[OutputPort]) -> OutputPort:
+    """Return the sum of one wrench or more, by a system of a name if there are several.
+
+    Args:
+        builder: Builder of the diagram.
+        name: Of the system.
+        sources: The wrenches, each (6,).
+    """
+    if len(sources) == 1:
+        return sources[0]
+    total = builder.AddNamedSystem(name, Adder(len(sources), 6))
+    for i, source in enumerate(sources):
+        builder.Connect(source, total.get_input_port(i))
+    return total.get_output_port()

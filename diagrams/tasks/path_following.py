@@ -1,0 +1,158 @@
+"""Following a path, and for comparison tracking a point that moves along it with time."""
+
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario.checks import require
+from diagrams.tasks.path import make_path
+from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.moving_point import MovingPoint
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint
+
+# m, between the points of the way along the path
+_SPACING = 2e-3
+
+
+class PathTask(Task):
+    """Path following: the tool converges to a path at whatever pace.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+
+    Raises:
+        InputError: If the path or the motion along it cannot be made.
+    """
+
+    def __init__(self, scenario: PathFollowingScenario, folder: FilePath) -> None:
+        reference = scenario.reference
+        self._scenario, law = scenario, scenario.controller.law
+        self.path = make_path(scenario.path, law, folder)
+        self.relative_degree = RELATIVE_DEGREE[law]
+        oriented = self.path.orientation is not None
+        self.place = PathManifold(self.relative_degree, oriented=oriented)
+        self.manifold: PathManifold = self.place
+        self._check_points(reference.points)
+        self.motion = rest_to_rest(
+            reference.points,
+            velocity=reference.velocity,
+            acceleration=reference.acceleration,
+            dwell=reference.dwell,
+        )
+
+    def _check_points(self, points: list[float]) -> None:
+        """Refuse arc lengths off the ends of an open path."""
+        rounding = 1e-9 * self.path.length
+        for eta in points:
+            if not self.path.closed and not -rounding <= eta <= self.path.length + rounding:
+                raise InputError(
+                    f"reference.points: {eta:g} m; the path is open and "
+                    f"{self.path.length:.6g} m long"
+                )
+
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort,
+        period: float,
+    ) -> PlaceFinder:
+        """See :class:`Task`."""
+        projector = builder.AddNamedSystem(
+            "path_projector", PathProjector(self.path, self.relative_degree, period)
+        )
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+
+    def start(self, shift: np.ndarray) -> StartPoint:
+        """See :class:`Task`."""
+        start, eta = self._scenario.start, self._scenario.reference.points[0]
+        max_alpha = self._scenario.controller.max_alpha
+        theta = self.path.arc_length.parameter(eta)
+        layout = self.place.layout
+        on_path = self.path.evaluator(layout.order).evaluate_at(theta)
+        axes = self.place.axes(on_path)
+        beside = start.offset[0] * axes[:, 1], start.offset[1] * axes[:, 2]
+        y_t = on_path[layout.position][:3] + beside[0] + beside[1] + shift
+        projection = self.path.projector.project(y_t.tolist(), theta)
+        if not (projection.converged and projection.alpha < max_alpha):
+            raise InputError(
+                f"start.offset: {start.offset} m at eta = {eta:g} m, "
+                f"{np.round(y_t, 6).tolist()} m, is outside the feasible neighbourhood of the path"
+                f", alpha = {projection.alpha:.3g}; alpha must be below {max_alpha:g}"
+            )
+        R_e = None
+        if self.path.orientation is not None:
+            deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
+            R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
+        return StartPoint(y_t, projection.theta, R_e)
+
+    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+        """See :class:`Task`."""
+        points = self._scenario.reference.points
+        begin, end = min(points), max(points)
+        for eta in np.linspace(begin, end, 2 + int((end - begin) / _SPACING)):
+            theta = np.array([self.path.arc_length.parameter(eta)])
+            yield self.path.position.derivatives(theta, 0)[0, 0], f"path at eta = {eta:.4g} m"
+
+    def target(self) -> PathTarget:
+        """See :class:`Task`."""
+        return PathTarget(self.path)
+
+    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+        """See :class:`Task`."""
+        inside = self.path.closed or 0.0 <= coordinates[0] <= self.path.length
+        allowed = f"eta from 0 to {self.path.length:.6g} m"
+        require(inside, key, coordinates.tolist(), allowed)
+
+
+class TrajectoryTask(PathTask):
+    """Classical tracking of a point that moves along the path with time (Sec. 3.8.4)."""
+
+    def __init__(self, scenario: PathFollowingScenario, folder: FilePath) -> None:
+        super().__init__(scenario, folder)
+        oriented = self.path.orientation is not None
+        self.manifold = MovingPoint(self.relative_degree, oriented=oriented)
+
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort,
+        period: float,
+    ) -> PlaceFinder:
+        """See :class:`Task`; the law acts on the point that time prescribes."""
+        projector = super().add_place(builder, tool_pose, reference, period).projector
+        leader = builder.AddNamedSystem(
+            "trajectory_point",
+            TrajectoryPoint(self.path, self.relative_degree, len(self.manifold.coordinates)),
+        )
+        builder.Connect(reference, leader.GetInputPort("reference"))
+        return PlaceFinder(projector, leader.GetOutputPort("manifold_point"))
+
+
+TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}
+
+
+def make_task(scenario: PathFollowingScenario, folder: FilePath) -> Task:
+    """Return what a scenario's tool is to do.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+
+    Raises:
+        InputError: If the path or the motion along it cannot be made.
+    """
+    return TASKS[scenario.controller.manifold](scenario, folder)

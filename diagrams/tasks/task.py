@@ -1,0 +1,106 @@
+"""What a robot's tool is to do, whichever robot it is."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from pfsc_drake.control.manifolds.manifold import Manifold
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.geometry import Path, PiecewisePolynomialCurve
+from pfsc_drake.physics.hand_model import Place
+from pfsc_drake.systems.control.path_projector import PathProjector
+
+
+@dataclass(frozen=True)
+class StartPoint:
+    """Where the tool starts, beside the manifold.
+
+    Attributes:
+        y_t: Tool point [m], shape (3,).
+        theta: Parameter of the nearest point of the manifold.
+        R_e: Orientation of the tool, shape (3, 3), or None where it does not matter.
+    """
+
+    y_t: np.ndarray
+    theta: float
+    R_e: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class PlaceFinder:
+    """What finds the place on a manifold.
+
+    Attributes:
+        projector: Projects the tool onto it, and remembers where it was.
+        manifold_point: The point that the law acts on, laid out by the task's manifold.
+    """
+
+    projector: PathProjector
+    manifold_point: OutputPort
+
+
+class Task(ABC):
+    """What a tool is to follow, and how it moves along.
+
+    Attributes:
+        path: The path.
+        place: Manifold in whose coordinates the tool's true place is told.
+        manifold: Manifold that the law makes linear.
+        motion: First coordinate of the reference over time, of dimension 1.
+    """
+
+    path: Path
+    place: PathManifold
+    manifold: Manifold
+    motion: PiecewisePolynomialCurve
+
+    @abstractmethod
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort,
+        period: float,
+    ) -> PlaceFinder:
+        """Add what finds the place on the manifold.
+
+        Args:
+            builder: Builder of the diagram.
+            tool_pose: ``[y_t, R_e]`` as measured, shape (12,).
+            reference: Derivatives of the virtual output's reference by rows.
+            period: Sampling time [s].
+        """
+
+    @abstractmethod
+    def start(self, shift: np.ndarray) -> StartPoint:
+        """Return where the tool starts.
+
+        Args:
+            shift: Beyond what the scenario says [m], shape (3,).
+
+        Raises:
+            InputError: If it is outside the feasible neighbourhood.
+        """
+
+    @abstractmethod
+    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+        """Yield positions along the way of the tool [m], each (3,), with what to call them."""
+
+    @abstractmethod
+    def target(self) -> Place:
+        """Return where given coordinates of the manifold are in the world."""
+
+    @abstractmethod
+    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+        """Refuse coordinates off the manifold.
+
+        Args:
+            coordinates: Translational ones [m], shape (3,).
+            key: Of the scenario, for the message.
+
+        Raises:
+            InputError: If they are.
+        """

@@ -1,0 +1,42 @@
+"""Manifolds as laws see them: coordinates by kind, and the force of a moving point."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pfsc_drake.control.manifolds.manifold import Kind, indices, manifold_force_function
+from pfsc_drake.control.manifolds.moving_point import MovingPoint
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.jets import Jet
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+def test_coordinates_by_kind(oriented):
+    coordinates = PathManifold(3, oriented=oriented).coordinates
+    assert [c.name for c in coordinates[:3]] == ["eta", "xi_1", "xi_2"]
+    assert indices(coordinates, Kind.TANGENTIAL) == slice(0, 1)
+    assert indices(coordinates, Kind.TRANSVERSAL) == slice(1, 3)
+    rotational = indices(coordinates, Kind.ROTATIONAL)
+    assert coordinates[rotational] == coordinates[3:]
+    assert all(c.kind.unit == "rad" for c in coordinates[3:])
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+def test_force_of_a_moving_point_is_its_power(oriented):
+    """At rest, the power of a wrench is that of the force along the errors' rates."""
+    rng, manifold = np.random.default_rng(3), MovingPoint(1, oriented=oriented)
+    point = rng.uniform(-1.0, 1.0, manifold.layout.size)
+    twist, wrench = rng.uniform(-1, 1, 6), rng.uniform(-1, 1, 6)
+    y_t, R_e = rng.uniform(-1, 1, 3), Rotation.random(random_state=3).as_matrix()
+    spin = np.cross(np.eye(3), twist[3:])
+    y = Jet([ca.SX(y_t), ca.SX(twist[:3])])
+    errors = manifold.virtual_output(
+        y, Jet([ca.SX(R_e), ca.SX(spin @ R_e)]), ca.SX(point), Jet([ca.SX(0.1), ca.SX(0.0)])
+    )
+    values = np.array(
+        [[float(ca.evalf(e.coefficients[k])) for k in (0, 1)] for e in errors], dtype=float
+    )
+    force = manifold_force_function(manifold)(wrench, point, values[:, 0])
+    power = wrench @ twist if oriented else wrench[:3] @ twist[:3]
+    assert float(np.array(force).ravel() @ values[:, 1]) == pytest.approx(power, abs=1e-12)

@@ -1,0 +1,169 @@
+"""Robots, tasks and surroundings that no shipped scenario combines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from diagrams.builder import build_station
+from diagrams.scenario import (
+    Circle,
+    ComplianceParameters,
+    ForcePulse,
+    HandParameters,
+    HandWaypoint,
+    Keyframe,
+    Line,
+    PathFollowingScenario,
+)
+from diagrams.scenario.notch import BallParameters, NotchParameters
+from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.errors import InputError
+from pfsc_drake.systems.physics.delta_plant import DeltaPlant
+
+STIFFNESS = 500.0
+
+
+def soft():
+    """Return a compliance that is overdamped, but settles within a few hundred milliseconds."""
+    spring = CoordinateImpedance(Profile(1.0), Profile(40.0), Profile(STIFFNESS))
+    return ComplianceParameters(transversal=spring)
+
+
+def run(settings: PathFollowingScenario, duration: float, folder=SCENARIO_DIRECTORY):
+    """Return the station and its log."""
+    station = build_station(settings, folder)
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(duration)
+    assert station.fault(simulator.get_context()) is None
+    times, log = station.log.read(simulator.get_context())
+    return station, times, log
+
+
+@pytest.fixture
+def delta(load_scenario):
+    """The DELTA robot without friction, resting on its path."""
+    settings = load_scenario("pfc_delta")
+    settings.drive_friction = False
+    settings.start.offset = [0.0, 0.0]
+    settings.reference.dwell = 3.0
+    settings.sensor.noise = np.full(6, 1e-3)
+    settings.sensor.taring_time = 0.02
+    return settings
+
+
+def test_a_delta_robot_that_touches_nothing_yields_to_its_sensor(delta):
+    """Without contact the plant is the analytic one, and the load's reaction is computed."""
+    delta.compliance, force = soft(), 3.0
+    delta.forces = [ForcePulse(0.1, 2.0, np.array([0.0, force, 0.0]), frame="manifold")]
+    station, _, log = run(delta, 0.9)
+    assert isinstance(station.part.plant, DeltaPlant)
+    xi = log["law"][-1, station.law.layout.manifold_state][1]
+    assert xi == pytest.approx(force / STIFFNESS, rel=0.02)
+    np.testing.assert_allclose(
+        log["wrench_measured"][-1, :3], log["wrench_ext"][-1, :3], rtol=0, atol=0.05
+    )
+
+
+def test_the_sensor_of_a_delta_robot_takes_off_the_load_while_it_moves(delta):
+    """What is left of a moving load of 0.7 kg is what the drives' steps leave."""
+    delta.compliance, delta.reference.dwell = soft(), 0.1
+    _, times, log = run(delta, 0.5)
+    moving = np.abs(log["wrench_measured"][times > 0.15, :3])
+    assert np.abs(np.diff(log["joint_state"][:, 3:6], axis=0)).max() > 1e-4
+    assert moving.max() < 0.1
+
+
+def test_a_hand_leads_a_delta_robot(delta):
+    delta.compliance = soft()
+    delta.compliance.tangential = CoordinateImpedance(Profile(1.0), Profile(30.0), Profile(0.0))
+    there = [HandWaypoint(0.1, np.array([0.022, 0, 0])), HandWaypoint(0.8, np.array([0.09, 0, 0]))]
+    delta.hand = HandParameters(there, "manifold", stiffness=300.0)
+    station, _, log = run(delta, 1.0)
+    eta = log["law"][-1, station.law.layout.manifold_state][0]
+    assert eta == pytest.approx(0.09, abs=0.012)
+    assert 1.0 < np.linalg.norm(log["wrench_ext"][:, :3], axis=1).max() < 30.0
+
+
+def test_friction_of_a_delta_robot_may_be_given(delta):
+    delta.drive_friction = None
+    own = build_station(delta, Path("experiments/scenarios"))
+    assert "friction_torque" in own.log.rows
+    delta.friction.f_c, delta.friction.f_v = [1.0, 2.0, 3.0], [0.0, 0.0, 0.0]
+    delta.forces = [ForcePulse(0.0, 2.0, np.array([30.0, 10.0, 0.0]))]
+    _, _, log = run(delta, 0.1)
+    assert np.all(np.abs(log["friction_torque"]).max(axis=0) <= [1.0, 2.0, 3.0])
+
+
+def test_an_arm_has_no_friction_of_its_own(load_scenario):
+    settings = load_scenario("pfc_compliant_6r")
+    settings.drive_friction = True
+    with pytest.raises(InputError, match=r"drive_friction = True; allowed: null; .*'friction'"):
+        build_station(settings, SCENARIO_DIRECTORY)
+
+
+@pytest.fixture
+def arm_in_a_notch(load_scenario):
+    """A six-axis arm with a ball at its tool point, on a level line."""
+    settings = load_scenario("pfc_compliant_6r")
+    settings.path.shape = Line([0.8, -0.15, 0.9], [0.8, 0.15, 0.9])
+    settings.path.orientation.convention = "zyz"
+    settings.path.orientation.keyframes = [Keyframe(0.0, [0.0, 150.0, 180.0])]
+    settings.start.posture_deg = [0.0, 90.0, -30.0, 0.0, 60.0, 0.0]
+    settings.reference.points, settings.reference.dwell = [0.0, 0.3], 0.05
+    settings.sensor.taring_time, settings.forces = 0.02, []
+    settings.notch = NotchParameters(BallParameters(distance=0.0), [0.0, 0.0, 0.0])
+    settings.compliance = soft()
+    return settings
+
+
+def test_an_arm_runs_in_a_notch(arm_in_a_notch):
+    """Displaced by 4 mm, with 2 mm free: the tool yields, and the sensor feels the contact."""
+    arm_in_a_notch.notch.displacement = [0.004, 0.0, 0.0]
+    station, times, log = run(arm_in_a_notch, 0.6)
+    pose = log["tool_pose"][:, :3]
+    places = station.further_lengths(pose)["notch_position"].values
+    np.testing.assert_allclose(places[0], 0.0, atol=1e-6)
+    later = times > 0.3
+    assert np.linalg.norm(places, axis=1).max() < 0.0035
+    force = np.linalg.norm(log["wrench_ext"][later, :3], axis=1)
+    # on its way back to the taught path the ball leans on the wall
+    assert force.max() > 0.5
+    difference = log["wrench_measured"][later, :3] - log["wrench_ext"][later, :3]
+    assert np.abs(difference).mean() < 0.3
+
+
+def test_the_ball_of_an_arm_is_at_its_tool_point(arm_in_a_notch):
+    arm_in_a_notch.notch.ball.distance = 0.1
+    with pytest.raises(InputError, match=r"notch\.ball\.distance = 0\.1; allowed: 0"):
+        build_station(arm_in_a_notch, SCENARIO_DIRECTORY)
+
+
+def test_the_coupled_plant_has_no_contact(arm_in_a_notch):
+    arm_in_a_notch.robot.model = "comau_racer_1_4_elastic"
+    arm_in_a_notch.robot.rotor_coupling = "comau_racer_1_4"
+    with pytest.raises(InputError, match=r"robot\.rotor_coupling .*touches a workpiece"):
+        build_station(arm_in_a_notch, SCENARIO_DIRECTORY)
+
+
+def test_trajectory_tracking_for_a_delta_robot(delta):
+    """The other task: the point moves on with time, whatever the tool does."""
+    delta.controller.manifold, delta.reference.dwell = "trajectory", 0.05
+    _, times, log = run(delta, 0.5)
+    errors = log["law"][times > 0.3][:, slice(3, 6)]
+    assert np.abs(errors).max() < 1e-4
+    assert log["reference"][-1, 0] > 0.03
+
+
+def test_a_circle_for_a_three_axis_arm_with_a_hand(load_scenario):
+    """Position only: the hand's frame and the path's coordinates without orientation."""
+    settings = load_scenario("pfc_elastic_3r")
+    settings.controller.law, settings.robot.model = "rigid", "comau_racer_1_4_3r"
+    settings.path.shape = Circle([0.9, 0.0, 1.0], 0.1, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    settings.reference.points, settings.start.posture_deg = [0.0, 0.1], []
+    settings.hand = HandParameters([HandWaypoint(0.0, np.array([0.05, 0, 0]))], "manifold")
+    _, _, log = run(settings, 0.1)
+    assert np.abs(log["wrench_ext"]).max() > 1.0
