@@ -191,6 +191,14 @@ def test_materials_of_one_name_keep_their_colours(draw):
     assert not drawing.warnings
 
 
+def test_materials_that_a_robot_repeats(draw):
+    grey = '<material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>'
+    drawing = draw(urdf(visual(PLATE, '<material name="grey"/>'), top=grey * 3))
+    (part,) = looks(drawing, "link_1")
+    assert part.color.r() == 0.5
+    assert not drawing.warnings
+
+
 def test_collision_geometry_hinders_nothing(draw):
     collision = f"<collision>{mesh('package://my_arm/meshes/hull.stl')}</collision>"
     drawing = draw(urdf(visual(PLATE) + collision, visual(PLATE)))
