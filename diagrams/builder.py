@@ -86,7 +86,12 @@ def build_station(
         initial_state,
         start.theta,
         on_motors,
-        task.warnings + law_warnings(scenario, part.robot, link_state) + sensor_warnings(scenario),
+        task.warnings
+        + part.start_warnings(
+            scenario.start, link_state[: part.robot.dimension], start.R_e is not None
+        )
+        + law_warnings(scenario, part.robot, link_state)
+        + sensor_warnings(scenario),
         workpiece,
     )
 

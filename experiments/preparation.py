@@ -121,6 +121,8 @@ def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
         settings.friction.file = str((folder / settings.friction.file).resolve())
     if Path(settings.robot.rotor_coupling).suffix:
         settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
+    for name, package in settings.robot.packages.items():
+        settings.robot.packages[name] = str((folder / package).resolve())
     shape, model = settings.path.shape, settings.robot.model
     if isinstance(shape, Waypoints):
         shape.file = str((folder / shape.file).resolve())

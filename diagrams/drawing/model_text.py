@@ -85,12 +85,14 @@ def _part_materials(document: Document) -> None:
     for texture in list(document.getElementsByTagName("texture")):
         _remove(texture)
     known: dict[str, str] = {}
-    for number, material in enumerate(document.getElementsByTagName("material")):
+    for number, material in enumerate(list(document.getElementsByTagName("material"))):
         name, colors = material.getAttribute("name"), material.getElementsByTagName("color")
         if not name or not colors:
             continue
         content = colors[0].getAttribute("rgba")
-        if known.setdefault(name, content) != content:
+        if name in known and material.parentNode is document.documentElement:
+            _remove(material)  # Drake takes each name once there, even with equal contents
+        elif known.setdefault(name, content) != content:
             material.setAttribute("name", f"{name}#{number}")
 
 

@@ -21,6 +21,7 @@ from diagrams.drawing.stick_figure import stick_figure
 from diagrams.robots.model import locate_model
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.packages import packages_for
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart
 
 # where the parser reads text, by the model's suffix; other kinds are read as they are
@@ -91,9 +92,9 @@ def _visual_parts(
     shown, scene_graph = MultibodyPlant(time_step=0.0), SceneGraph()
     shown.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(shown)
-    packages = parser.package_map()
-    file = locate_model(parameters, folder, packages)
-    _add_packages(file, packages)
+    file = locate_model(parameters, folder)
+    packages = packages_for(file, file.read_bytes(), parameters.options(folder).packages)
+    parser.package_map().AddMap(packages)
     kind, missing = _TEXTS.get(file.suffix.lower()), list[NotDrawn]()
     if kind is None:
         parser.AddModels(str(file))
@@ -133,18 +134,6 @@ def _part(inspector: SceneGraphInspector, geometry: GeometryId, body: RigidBody)
     color = properties.GetPropertyOrDefault("phong", "diffuse", _NO_COLOR)
     name = f"{inspector.GetName(geometry).split('::')[-1]}_{geometry.get_value()}"
     return BodyPart(body, name, form, inspector.GetPoseInFrame(geometry), color)
-
-
-def _add_packages(file: FilePath, packages: PackageMap) -> None:
-    """Make the packages known that the model lies in, and those of ROS."""
-    found = PackageMap.MakeEmpty()
-    found.PopulateFromRosPackagePath()
-    for folder in file.resolve().parents:
-        if (folder / "package.xml").is_file():
-            found.AddPackageXml(folder / "package.xml")
-    for name in found.GetPackageNames():
-        if not packages.Contains(name):
-            packages.Add(name, found.GetPath(name))
 
 
 def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:

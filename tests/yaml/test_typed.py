@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pfsc_drake import InputError
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import REQUIRED, load_file, load_typed
+from pfsc_drake.yaml.typed import ONE_OR_MANY, REQUIRED, load_file, load_typed
 
 
 @dataclass
@@ -323,3 +323,34 @@ def test_import_stays_light():
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+@dataclass
+class Several:
+    """One number or several."""
+
+    values: list[float] = field(default_factory=list, metadata=ONE_OR_MANY)
+
+
+@dataclass
+class Holder:
+    """Lists."""
+
+    several: Several = field(default_factory=Several)
+    plain: list[float] = field(default_factory=list)
+
+
+@pytest.mark.parametrize(
+    ("written", "values"), [(3, [3.0]), (2.5, [2.5]), ("1e3", [1e3]), ([1, 2], [1.0, 2.0])]
+)
+def test_one_value_where_there_may_be_many(written, values):
+    data = {"several": {"values": written}}
+    assert load_typed(Holder, data, "here").several.values == values
+    assert data == {"several": {"values": written}}
+
+
+def test_one_value_that_is_none_and_lists_that_must_be_lists():
+    with pytest.raises(InputError, match=r"here: .*several\.values\[0\].* 'abc'"):
+        load_typed(Holder, {"several": {"values": "abc"}}, "here")
+    with pytest.raises(InputError, match=r"here: .*'plain' is 3"):
+        load_typed(Holder, {"plain": 3}, "here")

@@ -166,7 +166,7 @@ def _refuse_branches(plant: MultibodyPlant, chain: list[Joint]) -> None:
         if {joint.parent_body().index(), joint.child_body().index()} & on_chain:
             raise InputError(
                 f"joint '{joint.name()}': branches off the chain of the tool; "
-                "fix it or remove it from the model"
+                "list it in fixed_joints or remove it from the model"
             )
 
 

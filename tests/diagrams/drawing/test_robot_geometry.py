@@ -69,7 +69,7 @@ def draw(tmp_path):
             target.write_bytes(content if isinstance(content, bytes) else content.encode())
         parameters = RobotParameters(f"my_arm/urdf/{name}", "link_2")
         # the plant that is simulated takes the model whatever its geometry is
-        plant = read_robot(parameters, tmp_path)
+        plant, _ = read_robot(parameters, tmp_path)
         assert not plant.geometry_source_is_registered()
         return draw_robot(plant, tool_frame(plant, parameters), parameters, tmp_path)
 
@@ -188,6 +188,14 @@ def test_materials_of_one_name_keep_their_colours(draw):
     assert drawn == {(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)}
     (referring,) = looks(drawing, "link_2")
     assert referring.color.r() == 1.0  # the first of that name
+    assert not drawing.warnings
+
+
+def test_materials_that_a_robot_repeats(draw):
+    grey = '<material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>'
+    drawing = draw(urdf(visual(PLATE, '<material name="grey"/>'), top=grey * 3))
+    (part,) = looks(drawing, "link_1")
+    assert part.color.r() == 0.5
     assert not drawing.warnings
 
 
