@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import ForcePulse, GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import load_parameters
@@ -35,11 +35,11 @@ def build(settings):
     return build_station(settings, Path())
 
 
-def run(settings, duration):
+def run(settings, duration, max_step=TICK):
     station = build(settings)
     simulator = Simulator(station.diagram)
     configuration = SimulatorConfig(
-        integration_scheme="runge_kutta3", max_step_size=TICK, use_error_control=False
+        integration_scheme="runge_kutta3", max_step_size=max_step, use_error_control=False
     )
     ApplySimulatorConfig(configuration, simulator)
     station.set_start(simulator.get_mutable_context())
@@ -91,6 +91,21 @@ def test_servos_hold_the_weight_at_the_start(settings, load_arm):
     np.testing.assert_allclose(signals["drive_torque"][0], weight, atol=1e-6)
 
 
+def test_servos_keep_the_scaled_limits(settings, load_arm):
+    """Weaker drives than the model's: servos that start off the path use them up, no more."""
+    settings.controller.law = "velocity_servo"
+    settings.start.offset = [0.02, 0.0]
+    full, _, signals = run(settings, 0.02)
+    wanted = np.abs(signals["drive_torque"]).max(axis=0) / full.robot.gather("effort_limit")
+    weight = np.abs(load_arm("comau_racer_1_4_3r").weight(full.initial_state[:3]))
+    scale = 0.5 * wanted.max()
+    assert np.all(weight < scale * full.robot.gather("effort_limit"))
+    settings.controller.effort_scale = scale
+    station, _, signals = run(settings, 0.02)
+    used = np.abs(signals["drive_torque"]) / station.robot.gather("effort_limit")
+    assert used.max() == pytest.approx(scale, rel=1e-12)
+
+
 def test_a_bus_delays_by_its_time(settings):
     """A velocity law that starts off the path: the first wanted velocity arrives 3 ticks late."""
     settings.controller.law = "velocity_servo"
@@ -130,6 +145,21 @@ def test_friction_acts_against_the_motion(settings):
     expected = np.array([40.0, 100.0, 20.0]) * np.sign(velocity)
     expected += np.array([15.0, 90.0, 40.0]) * velocity
     np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
+
+
+@pytest.mark.parametrize(("step", "softness"), [(TICK / 4, 1 / 16), (4 * TICK, 1.0)])
+def test_stuck_joints_give_way_as_little_as_the_integration_allows(settings, step, softness):
+    """Bristles bend with the square of the step, which is never longer than the hold."""
+    settings.friction.f_c = [100.0, 100.0, 100.0]
+    settings.reference.dwell = 1.0
+    settings.forces = [ForcePulse(0.0, 1.0, np.array([0.0, 30.0, 0.0]), ramp=0.02)]
+    bends = []
+    for max_step in (TICK, step):
+        settings.simulation.max_step = max_step
+        _, _, signals = run(settings, 0.1, max_step)
+        bends.append(signals["joint_state"][-1, 0] - signals["joint_state"][0, 0])
+    assert np.abs(signals["friction_torque"][-1, 0]) > 10.0
+    assert bends[1] == pytest.approx(softness * bends[0], rel=0.05)
 
 
 def test_friction_reaches_the_joints(settings):
@@ -199,3 +229,25 @@ def test_encoders_differentiate(settings):
     _, _, signals = run(settings, 0.2)
     q_J, v_J, _, _ = np.hsplit(signals["joint_state_measured"], 4)
     np.testing.assert_allclose(v_J[1:], np.diff(q_J, axis=0) / TICK, atol=1e-9)
+
+
+def test_encoders_of_a_fast_servo_differentiate_over_its_own_period(settings):
+    """Else it would act on a velocity that is up to three of its periods old."""
+    settings.controller.law = "velocity_servo"
+    period = settings.servo.period = TICK / 4
+    settings.encoders.link_increments = settings.encoders.motor_increments = [1e8]
+    settings.encoders.difference_quotient = True
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    encoders = station.diagram.GetSubsystemByName("encoder_increments")
+    measured = []
+    for tick in range(400):
+        simulator.AdvanceTo(tick * period)
+        inner = encoders.GetMyContextFromRoot(root)
+        measured.append(encoders.GetOutputPort("joint_state").Eval(inner)[6:])
+    q_M, v_M = np.hsplit(np.array(measured), 2)
+    assert np.abs(v_M[-1]).max() > 1e-2
+    np.testing.assert_allclose(v_M[1:], np.diff(q_M, axis=0) / period, atol=1e-9)
