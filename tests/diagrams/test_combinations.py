@@ -20,6 +20,7 @@ from diagrams.scenario import (
 from diagrams.scenario.notch import BallParameters, NotchParameters
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import solve_pose
 from pfsc_drake.systems.physics.delta_plant import DeltaPlant
@@ -76,6 +77,26 @@ def test_the_sensor_of_a_delta_robot_takes_off_the_load_while_it_moves(delta):
     moving = np.abs(log["wrench_measured"][times > 0.15, :3])
     assert np.abs(np.diff(log["joint_state"][:, 3:6], axis=0)).max() > 1e-4
     assert moving.max() < 0.1
+
+
+def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_borne(delta):
+    """The sensor bears what it bears; the load's share can no longer be taken off."""
+    delta.compliance = soft()
+    delta.simulation.sensor_failure.time = 0.0505
+    delta.simulation.sensor_failure.component = 1
+    station = build_station(delta, SCENARIO_DIRECTORY)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.AdvanceTo(0.06)
+    times, log = station.log.read(root)
+    lost = times > 0.0505
+    np.testing.assert_array_equal(log["sensor_fault"][:, 0] == SensorFault.NOT_FINITE, lost)
+    assert not log["wrench_measured"][lost].any()
+    sensor = station.diagram.GetSubsystemByName("force_torque_sensor")
+    load = sensor.GetOutputPort("load").Eval(sensor.GetMyContextFromRoot(root))
+    weight = station.robot.parameters.masses.load * 9.81
+    assert np.linalg.norm(load[:3]) == pytest.approx(weight, rel=0.05)
 
 
 def test_a_hand_leads_a_delta_robot(delta):

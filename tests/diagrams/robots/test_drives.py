@@ -134,8 +134,12 @@ def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
     assert deviation(station, signals).max() < 1e-3
 
 
-def test_friction_acts_against_the_motion(settings):
-    """Law and drives as without friction, but the drives carry it: tau_d = g + friction."""
+@pytest.mark.parametrize("increments", [[], [2000.0]])
+def test_friction_acts_against_the_motion(settings, increments):
+    """The true one, whatever the encoders make of it."""
+    settings.encoders.motor_increments = increments
+    settings.encoders.difference_quotient = bool(increments)
+    settings.encoders.filter_time = 0.02 if increments else 0.0
     settings.friction.f_c, settings.friction.f_v = [40.0, 100.0, 20.0], [15.0, 90.0, 40.0]
     _, _, signals = run(settings, 0.3)
     velocity = signals["joint_state"][:, 9:]
