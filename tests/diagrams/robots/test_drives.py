@@ -91,6 +91,22 @@ def test_servos_hold_the_weight_at_the_start(settings, load_arm):
     np.testing.assert_allclose(signals["drive_torque"][0], weight, atol=1e-6)
 
 
+def test_servos_without_integral_part_answer_at_once(settings, load_arm):
+    """``g + K_w (v_ref - v)`` with ``K_w = J (1 - exp(-omega T)) / T``, J at the start."""
+    settings.controller.law = "velocity_servo"
+    settings.servo.integral_rate = 0.0
+    settings.start.offset = [0.005, 0.0]
+    station, _, signals = run(settings, 0.02)
+    arm = load_arm("comau_racer_1_4_3r")
+    arm.plant.SetPositions(arm.context, station.initial_state[:3])
+    J = np.diag(arm.plant.CalcMassMatrix(arm.context))
+    gain = J * (1.0 - np.exp(-settings.servo.bandwidth * TICK)) / TICK
+    lag = signals["law"][:, station.law.layout.drive] - signals["joint_state"][:, 9:]
+    weight = np.array([arm.weight(q) for q in signals["joint_state"][:, :3]])
+    assert np.abs(gain * lag).max() > 10.0
+    np.testing.assert_allclose(signals["drive_torque"], weight + gain * lag, rtol=0, atol=1e-6)
+
+
 def test_servos_keep_the_scaled_limits(settings, load_arm):
     """Weaker drives than the model's: servos that start off the path use them up, no more."""
     settings.controller.law = "velocity_servo"
@@ -124,6 +140,25 @@ def test_a_bus_delays_by_its_time(settings):
     sent = signals["law"][:, station.law.layout.drive]
     assert np.abs(np.diff(sent[-20:], axis=0)).max() > 1e-5
     np.testing.assert_array_equal(delivered[3:], sent[: len(delivered) - 3])
+
+
+def test_a_bus_samples_at_the_ticks_of_the_law_whatever_the_servo_does(settings):
+    """Else the law would be evaluated between its ticks, with a measurement it never got."""
+    settings.controller.law = "velocity_servo"
+    settings.servo.bus_delay, settings.servo.period = 2 * TICK, TICK / 4
+    settings.start.offset = [0.005, 0.0]
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    bus = station.diagram.GetSubsystemByName("bus_delay")
+    delivered = []
+    for quarter in range(40):
+        simulator.AdvanceTo((quarter + 0.5) * TICK / 4)
+        delivered.append(bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(root)))
+    sent = station.log.read(root)[1]["law"][:, station.law.layout.drive]
+    np.testing.assert_array_equal(delivered[8:], np.repeat(sent, 4, axis=0)[:32])
 
 
 def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
@@ -181,6 +216,22 @@ def test_friction_reaches_the_joints(settings):
     force = station.part.plant.get_applied_generalized_force_input_port()
     applied = force.Eval(station.part.plant.GetMyContextFromRoot(root))
     np.testing.assert_allclose(applied, [-3.0, 4.0, -3.0], atol=1e-12)
+
+
+def test_friction_is_that_of_the_motors(settings):
+    """The links of elastic joints swing, the friction is in the drives."""
+    settings.robot.model = "comau_racer_1_4_elastic_3r"
+    settings.friction.f_v = [15.0, 90.0, 40.0]
+    _, _, signals = run(settings, 0.2)
+    _, v_J, _, v_M = np.hsplit(signals["joint_state"], 4)
+    assert np.abs(v_M - v_J).max() > 1e-3
+    np.testing.assert_allclose(signals["friction_torque"], v_M * [15.0, 90.0, 40.0], atol=1e-9)
+
+
+def test_friction_goes_with_error_control_by_any_scheme(settings):
+    settings.friction.f_v = [15.0, 90.0, 40.0]
+    settings.simulation.integrator, settings.simulation.accuracy = "implicit_euler", 1e-4
+    assert "joint_friction" in names(build(settings))
 
 
 def test_friction_of_the_robot_itself(settings):
@@ -247,11 +298,15 @@ def test_encoders_of_a_fast_servo_differentiate_over_its_own_period(settings):
     station.set_start(root)
     simulator.Initialize()
     encoders = station.diagram.GetSubsystemByName("encoder_increments")
-    measured = []
+    plant, measured, torques = station.part.plant, [], []
     for tick in range(400):
         simulator.AdvanceTo(tick * period)
+        actuation = plant.get_actuation_input_port()
+        torques.append(actuation.Eval(plant.GetMyContextFromRoot(root)))
         inner = encoders.GetMyContextFromRoot(root)
         measured.append(encoders.GetOutputPort("joint_state").Eval(inner)[6:])
     q_M, v_M = np.hsplit(np.array(measured), 2)
     assert np.abs(v_M[-1]).max() > 1e-2
     np.testing.assert_allclose(v_M[1:], np.diff(q_M, axis=0) / period, atol=1e-9)
+    # and its torques act over one of its periods
+    assert np.abs(np.diff(torques[300:], axis=0)).max(axis=1).min() > 0.0
