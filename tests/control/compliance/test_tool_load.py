@@ -73,7 +73,9 @@ def test_everything_that_is_fixed_behind_the_sensor_is_tool():
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(resolve_model("comau_racer_1_4")))
     finger_inertia = SpatialInertia.SolidBoxWithMass(0.8, 0.1, 0.04, 0.2)
-    finger = plant.AddRigidBody("finger", plant.GetFrameByName("tool_point").model_instance(), finger_inertia)
+    finger = plant.AddRigidBody(
+        "finger", plant.GetFrameByName("tool_point").model_instance(), finger_inertia
+    )
     tool, joint = plant.GetFrameByName("tool_point"), plant.GetJointByName("weld_tool")
     X_TF = RigidTransform(RollPitchYaw(0.3, -0.2, 0.5), [0.05, -0.03, 0.1])
     plant.WeldFrames(tool, finger.body_frame(), X_TF)

@@ -1,5 +1,6 @@
 """Servos, bus, friction and encoders of a path following station."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.models.files import models_directory, resolve_model
 from pfsc_drake.robot.models.parameters import load_parameters
 
 KNOWN = load_parameters("comau_racer_1_4").friction
@@ -232,6 +233,19 @@ def test_friction_goes_with_error_control_by_any_scheme(settings):
     settings.friction.f_v = [15.0, 90.0, 40.0]
     settings.simulation.integrator, settings.simulation.accuracy = "implicit_euler", 1e-4
     assert "joint_friction" in names(build(settings))
+
+
+def test_friction_needs_rotors(settings, tmp_path):
+    """A drive without inertia of its own could not stick at any step."""
+    text = resolve_model("comau_racer_1_4_3r").read_text(encoding="utf-8")
+    bare, count = re.subn(r"<drake:rotor_inertia>[^<]*<", "<drake:rotor_inertia>0<", text)
+    assert count == 3
+    (tmp_path / "bare.sdf").write_text(bare, encoding="utf-8")
+    settings.robot.model = "bare.sdf"
+    build_station(settings, tmp_path)
+    settings.friction.f_c = [1.0, 1.0, 1.0]
+    with pytest.raises(InputError, match="friction: needs a robot with rotor inertia"):
+        build_station(settings, tmp_path)
 
 
 def test_friction_of_the_robot_itself(settings):

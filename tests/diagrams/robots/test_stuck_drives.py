@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, Keyframe, Line
 from diagrams.scenario.notch import BallParameters, NotchParameters
