@@ -1,5 +1,7 @@
 """Workpiece and ball: shapes, places, and the station that holds them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
@@ -59,6 +61,14 @@ def test_surface_is_round_about_the_displaced_axis(settings, station):
     assert nearest.min() > notch.ball.radius
 
 
+def test_a_notch_without_upright_walls_has_no_empty_triangles(settings, station):
+    """As deep as it is round, the rim begins where the arc ends."""
+    shallow = dataclasses.replace(settings.notch, depth=settings.notch.radius)
+    vertices, triangles = notch_surface(station.path, shallow, UP)
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-8
+
+
 def test_surface_is_open_upwards(settings, station):
     vertices, triangles = notch_surface(station.path, settings.notch, UP)
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
@@ -80,6 +90,14 @@ def test_places_in_the_notch(settings, station):
     places = place_in_notch(path, notch, np.array([seat, seat + 1e-3 * left]), theta, UP)
     below = notch.clearance * above @ UP  # the axis is above, not normal to the path
     np.testing.assert_allclose(places, [[0.0, -below], [1e-3, -below]], atol=1e-5)
+    # from the start on, whose parameter the station knows
+    taught, slope = path.position.derivatives(np.array([station.initial_theta]), 1)[0]
+    left = np.cross(UP, slope) / np.linalg.norm(np.cross(UP, slope))
+    here = taught + notch.displacement + notch.clearance * UP + 1e-3 * left
+    further = station.further_lengths(here[None])["notch_position"]
+    named = dict(zip(further.labels, further.values[0], strict=True))
+    assert named["left"] == pytest.approx(1e-3, abs=2e-5)
+    assert named["above"] == pytest.approx(0.0, abs=2e-5)
 
 
 def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station):
@@ -91,6 +109,18 @@ def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station
     contact = station.diagram.GetSubsystemByName("contact_wrench")
     wrench = contact.GetOutputPort("wrench").Eval(contact.GetMyContextFromRoot(root))
     assert not wrench.any()
+
+
+def test_the_balls_shell_is_of_its_material(settings, station):
+    scene = station.diagram.GetSubsystemByName("scene_graph").model_inspector()
+    tool = station.part.plant.GetBodyByName("tool")
+    (ball,) = station.part.plant.GetCollisionGeometriesForBody(tool)
+    properties, parameters = scene.GetProximityProperties(ball), settings.notch.ball
+    for group, name, value in (
+        ("material", "hunt_crossley_dissipation", parameters.dissipation),
+        ("hydroelastic", "hydroelastic_modulus", parameters.modulus),
+    ):
+        assert properties.GetProperty(group, name) == value > 0.0
 
 
 def test_sensor_carries_the_load_of_the_robot():
