@@ -64,14 +64,18 @@ class PathTask(Task):
 
     def _check_points(self, points: list[float]) -> None:
         """Refuse arc lengths off the ends of an open path."""
-        rounding = 1e-9 * self.path.length
         for eta in points:
-            if not self.path.closed and not -rounding <= eta <= self.path.length + rounding:
+            if not self._is_on_path(eta):
                 closed = closing_gap(self.path) is not None
                 raise InputError(
                     f"reference.points: {eta:g} m; the path is open and "
                     f"{self.path.length:.6g} m long{_LOOKS_CLOSED if closed else ''}"
                 )
+
+    def _is_on_path(self, eta: float) -> bool:
+        """Return whether an arc length is on the path, up to its very ends but for rounding."""
+        rounding = 1e-9 * self.path.length
+        return self.path.closed or -rounding <= eta <= self.path.length + rounding
 
     def add_place(
         self,
@@ -124,9 +128,8 @@ class PathTask(Task):
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
         """See :class:`Task`."""
-        inside = self.path.closed or 0.0 <= coordinates[0] <= self.path.length
         allowed = f"eta from 0 to {self.path.length:.6g} m"
-        require(inside, key, coordinates.tolist(), allowed)
+        require(self._is_on_path(coordinates[0]), key, coordinates.tolist(), allowed)
 
 
 class TrajectoryTask(PathTask):

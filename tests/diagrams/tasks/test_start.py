@@ -136,6 +136,17 @@ def test_start_without_posture(on_line, start):
     assert np.all((lower <= arm.angles("motor")) & (arm.angles("motor") <= upper))
 
 
+@pytest.mark.parametrize("name", [THREE, SIX])
+def test_without_posture_the_arm_starts_near_the_middle_of_its_ranges(load_scenario, start, name):
+    """From near an end of them neither of these starts would be found."""
+    settings = load_scenario(name)
+    settings.start.posture_deg = []
+    _, _, arm, _ = start(settings)
+    lower, upper = arm.chain.gather("position_limits").T
+    away = np.abs(arm.angles("motor") - (lower + upper) / 2.0)
+    assert np.all(away < 0.9 * (upper - lower) / 2.0)
+
+
 @pytest.mark.parametrize("laps", [-1, 1, 2])
 def test_start_laps_later(load_scenario, start, laps):
     """A closed path counts its laps; the place is the same."""
