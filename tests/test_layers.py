@@ -30,6 +30,7 @@ STRANGERS = [
     ("diagrams.scenario", "diagrams.tasks"),
     ("diagrams.scenario", "diagrams.surroundings"),
     ("pfsc_drake.systems.control", "pfsc_drake.systems.physics"),
+    ("pfsc_drake.systems.control", "pfsc_drake.systems.plants"),
     ("pfsc_drake.systems.control", "pfsc_drake.physics"),
     ("pfsc_drake.robot.serial", "pfsc_drake.robot.delta"),
     ("pfsc_drake.geometry.curves", "pfsc_drake.geometry.paths"),
@@ -44,7 +45,11 @@ UNKNOWN = {
     "diagrams": ["matplotlib", "h5py", "typer", "rich"],
 }
 # what the law knows is any manifold, not a particular one
-LAW_KNOWS_NO = ["pfsc_drake.control.manifolds.path", "pfsc_drake.control.manifolds.moving_point"]
+LAW_KNOWS_NO = [
+    "pfsc_drake.control.manifolds.path",
+    "pfsc_drake.control.manifolds.moving_point",
+    "pfsc_drake.geometry.paths",
+]
 
 
 def modules():

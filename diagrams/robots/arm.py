@@ -33,9 +33,9 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
-from pfsc_drake.systems.physics.contact_wrench import ContactWrench
 from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
-from pfsc_drake.systems.physics.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.contact_wrench import ContactWrench
+from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 
 
 @dataclass(frozen=True)

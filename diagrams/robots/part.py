@@ -10,7 +10,7 @@ from diagrams.scenario import StartParameters
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
-from pfsc_drake.systems.physics.contact_wrench import ContactWrench
+from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 
 
 @dataclass(frozen=True)

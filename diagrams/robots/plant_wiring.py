@@ -9,8 +9,8 @@ from pydrake.systems.primitives import MatrixGain
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
-from pfsc_drake.systems.physics.external_wrench import ExternalWrench
-from pfsc_drake.systems.physics.tool_reaction import ToolReaction
+from pfsc_drake.systems.plants.external_wrench import ExternalWrench
+from pfsc_drake.systems.plants.tool_reaction import ToolReaction
 
 
 def connect_actuation(

@@ -13,11 +13,12 @@ from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
-from pfsc_drake.geometry.paths.point import PathPointLayout, PathStatus
+from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
 from pfsc_drake.geometry.paths.shape_report import ShapeReport, shape_report
 from pfsc_drake.geometry.paths.waypoint_file import WaypointTable, read_waypoints
 from pfsc_drake.geometry.paths.waypoints import Tolerance, path_from_waypoints
+from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
     check_rotation_matrix,
     matrix_to_quaternion,
@@ -41,10 +42,10 @@ __all__ = [
     "Path",
     "PathEvaluator",
     "PathPointLayout",
-    "PathStatus",
     "PathWaypoints",
     "PiecewisePolynomialCurve",
     "Projection",
+    "ProjectionStatus",
     "Projector",
     "ShapeReport",
     "Tolerance",

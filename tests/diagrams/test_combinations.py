@@ -23,7 +23,7 @@ from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import solve_pose
-from pfsc_drake.systems.physics.delta_plant import DeltaPlant
+from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 STIFFNESS = 500.0
 

@@ -12,11 +12,11 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathStatus
+from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 
 # attributes of an enumeration are looked up slowly
-_NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(PathStatus.NOT_CONVERGED)
+_NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(ProjectionStatus.NOT_CONVERGED)
 
 
 class LawLayout:

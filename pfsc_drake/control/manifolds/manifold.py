@@ -60,7 +60,7 @@ class PointLayout(Protocol):
 
     @property
     def status(self) -> slice:
-        """A :class:`~pfsc_drake.geometry.PathStatus`, [1]."""
+        """A :class:`~pfsc_drake.geometry.ProjectionStatus`, [1]."""
 
 
 class Manifold(Protocol):

@@ -11,12 +11,13 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
-from pfsc_drake.geometry.paths.point import PathPointLayout, PathStatus
+from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projector
 from pfsc_drake.geometry.paths.table import tabulate
+from pfsc_drake.geometry.projection_status import ProjectionStatus
 
-_BEYOND_END = float(PathStatus.BEYOND_END)
-_NOT_CONVERGED = float(PathStatus.NOT_CONVERGED)
+_BEYOND_END = float(ProjectionStatus.BEYOND_END)
+_NOT_CONVERGED = float(ProjectionStatus.NOT_CONVERGED)
 
 # All relative to the length of the domain: the longest step from one tick to the next, ...
 _NEAR = 1.0 / 128.0

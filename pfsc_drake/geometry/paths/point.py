@@ -1,19 +1,10 @@
 """Layout of what a path tells the controller at each tick."""
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 from pfsc_drake.errors import InputError
 
 _MAX_ORDER = 5
-
-
-class PathStatus(IntEnum):
-    """Value of the field `status`."""
-
-    OK = 0
-    BEYOND_END = 1
-    NOT_CONVERGED = 2
 
 
 @dataclass(frozen=True)
@@ -25,7 +16,7 @@ class PathPointLayout:
     | `theta`      | 1               | parameter of the closest point (3.6), unwrapped      |
     | `eta`        | 1               | arc length (3.12), m                                 |
     | `alpha`      | 1               | (3.9); below one in the feasible neighbourhood       |
-    | `status`     | 1               | a `PathStatus`                                       |
+    | `status`     | 1               | a `ProjectionStatus`                                       |
     | `normal`     | 3               | e_perp, (3.4)                                        |
     | `position`   | 3 (order + 2)   | derivatives 0..order + 1 of sigma_t, row-major, m    |
     | `quaternion` | 4 (order + 1)   | derivatives 0..order of q; empty if not oriented     |

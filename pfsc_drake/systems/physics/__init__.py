@@ -1,1 +1,1 @@
-"""Systems of the world: plants, drives, friction, sensors, hands, forces."""
+"""Systems of the world around a plant: drives, friction, sensors, hands, forces."""

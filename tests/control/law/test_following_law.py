@@ -8,7 +8,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathStatus
+from pfsc_drake.geometry import ProjectionStatus
 
 THETA = 0.6
 
@@ -97,8 +97,8 @@ def test_nothing_else_that_is_not_finite_passes(tick, name):
 
 def test_the_projections_faults(tick):
     layout = tick.law.linearization.manifold.layout
-    not_converged = tick.changed("point", layout.status.start, PathStatus.NOT_CONVERGED)
-    beyond = tick.changed("point", layout.status.start, PathStatus.BEYOND_END)
+    not_converged = tick.changed("point", layout.status.start, ProjectionStatus.NOT_CONVERGED)
+    beyond = tick.changed("point", layout.status.start, ProjectionStatus.BEYOND_END)
     assert tick.fault(**not_converged) == Fault.PROJECTION_FAILED
     assert tick.fault(**beyond) == Fault.NONE
     for alpha, fault in ((0.899, Fault.NONE), (0.9, Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD)):

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.manifolds.manifold import manifold_force_function
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.geometry import FourierCurve, Path, PathStatus, PiecewisePolynomialCurve
+from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, ProjectionStatus
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
 
 OFFSET = np.array([0.02, -0.03, 0.025])
@@ -138,7 +138,7 @@ def test_beyond_the_end_of_an_open_path():
     e_par = slope / np.linalg.norm(slope)
     y_t = sigma + 0.1 * e_par + 0.05 * np.cross([0.0, 0.0, 1.0], e_par)
     point, layout = evaluator(y_t.tolist(), 0.5), evaluator.layout
-    assert point[layout.status] == [PathStatus.BEYOND_END]
+    assert point[layout.status] == [ProjectionStatus.BEYOND_END]
     wrench = np.array([*(7.0 * e_par), 3.0, -2.0, 5.0])
     for with_turning in (False, True):
         tau = manifold_force(wrench, point, layout, np.zeros(3), with_turning=with_turning)

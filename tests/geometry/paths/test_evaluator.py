@@ -13,9 +13,9 @@ from pfsc_drake.geometry import (
     OrientationCurve,
     Path,
     PathEvaluator,
-    PathStatus,
     PiecewisePolynomialCurve,
     Projection,
+    ProjectionStatus,
     Projector,
     WaypointTable,
     interpolate,
@@ -54,7 +54,7 @@ def test_fields(path: Path, order: int) -> None:
         out = evaluator(point.tolist(), theta + 0.01)
         assert out.shape == (layout.size,)
         assert out[layout.theta] == pytest.approx(theta, abs=1e-11)
-        assert out[layout.status] == PathStatus.OK
+        assert out[layout.status] == ProjectionStatus.OK
         alpha = (point - sigma) @ second / (first @ first)
         assert out[layout.alpha] == pytest.approx(alpha, abs=1e-9)
         eta = sum(
@@ -101,9 +101,9 @@ def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
         expected = path.projector.project(point, guess)
         out = evaluator(point, guess)
         assert out[3] == (
-            PathStatus.BEYOND_END
+            ProjectionStatus.BEYOND_END
             if expected.at_end
-            else (PathStatus.OK if expected.converged else PathStatus.NOT_CONVERGED)
+            else (ProjectionStatus.OK if expected.converged else ProjectionStatus.NOT_CONVERGED)
         )
         assert out[0] == pytest.approx(expected.theta, abs=3e-12 * curve.period)
         if expected.at_end:
@@ -178,7 +178,7 @@ def test_centre_of_a_circle_has_no_foot() -> None:
             out = evaluator([0.0, 0.0, height], theta)
             assert out[2] == pytest.approx(1.0, abs=1e-12)
             assert np.isfinite(out).all()
-    assert evaluator([0.0, 0.0, 0.5], 0.4)[3] == PathStatus.NOT_CONVERGED
+    assert evaluator([0.0, 0.0, 0.5], 0.4)[3] == ProjectionStatus.NOT_CONVERGED
 
 
 def test_made_once_for_every_order() -> None:
@@ -208,7 +208,7 @@ def test_beyond_an_open_end(end: int) -> None:
     e_perp, _ = OPEN.frame.normals(theta)
     point = sigma + sign * 0.03 * e_par + 0.01 * e_perp
     out = evaluator(point.tolist(), theta - sign * 0.02)
-    assert out[layout.status] == PathStatus.BEYOND_END
+    assert out[layout.status] == ProjectionStatus.BEYOND_END
     assert out[layout.theta] == theta
     assert out[layout.alpha] == 0.0
     assert out[layout.eta] == pytest.approx(end * OPEN.length + sign * 0.03, abs=1e-11)
@@ -248,7 +248,7 @@ def test_input_that_is_not_finite() -> None:
         ([0.0, 0, 0], math.nan),
     ):
         out = evaluator(point, guess)
-        assert out[3] == PathStatus.NOT_CONVERGED
+        assert out[3] == ProjectionStatus.NOT_CONVERGED
         assert np.isnan(np.delete(out, 3)).all()
 
 

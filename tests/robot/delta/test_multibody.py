@@ -21,7 +21,7 @@ from pfsc_drake.robot.delta.multibody import (
     slide_state_rows,
 )
 from pfsc_drake.robot.delta.parameters import load_delta_parameters
-from pfsc_drake.systems.physics.delta_plant import DeltaPlant
+from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 PARAMETERS = load_delta_parameters()
 ROBOT = DeltaRobot(PARAMETERS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from pfsc_drake.geometry import FourierCurve, Path, PathStatus, PiecewisePolynomialCurve
+from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, ProjectionStatus
 from pfsc_drake.systems.control.path_projector import PathProjector
 
 PERIOD = 1e-3
@@ -47,7 +47,7 @@ def test_the_start_is_found_on_the_whole_path(path):
         bench.start()
         assert bench.memory == pytest.approx([theta], abs=1e-9)
         assert bench.point("theta") == pytest.approx([theta], abs=1e-9)
-        assert bench.point("status") == [PathStatus.OK]
+        assert bench.point("status") == [ProjectionStatus.OK]
 
 
 def test_the_output_is_the_paths_own(path):
@@ -129,9 +129,9 @@ def test_beyond_the_end_of_an_open_path():
     bench = Bench(Path(line))
     bench.move_to([0.4, 0.01, 1.0])
     bench.start()
-    assert bench.point("status") == [PathStatus.OK]
+    assert bench.point("status") == [ProjectionStatus.OK]
     bench.move_to([0.7, 0.01, 1.0])
-    assert bench.point("status") == [PathStatus.BEYOND_END]
+    assert bench.point("status") == [ProjectionStatus.BEYOND_END]
     assert bench.point("theta") == pytest.approx([0.5], abs=1e-12)
     assert bench.point("eta") == pytest.approx([0.7], abs=1e-12)
 
@@ -143,8 +143,8 @@ def test_a_tool_that_is_nowhere_is_reported_and_forgotten(path):
     bench.move_to(good)
     bench.start()
     bench.move_to([np.nan, 0.0, 1.0])
-    assert bench.point("status") == [PathStatus.NOT_CONVERGED]
+    assert bench.point("status") == [ProjectionStatus.NOT_CONVERGED]
     bench.tick()
     bench.move_to(good)
-    assert bench.point("status") == [PathStatus.OK]
+    assert bench.point("status") == [ProjectionStatus.OK]
     assert bench.point("theta") == pytest.approx([1.0], abs=1e-9)

@@ -16,13 +16,13 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
-from pfsc_drake.systems.physics.external_wrench import ExternalWrench
 from pfsc_drake.systems.physics.force_torque_sensor import (
     ForceTorqueParameters,
     ForceTorqueSensor,
     reaction_index,
 )
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 
 PERIOD = 1e-3
 MODELS = ["comau_racer_1_4", "comau_racer_1_4_elastic"]

@@ -13,8 +13,8 @@ from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.physics.external_wrench import ExternalWrench
 from pfsc_drake.systems.physics.operator_hand import OperatorHand
+from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 
 PERIOD = 1e-3
 UPRIGHT = np.eye(3).ravel()

@@ -6,7 +6,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import load_delta_parameters
-from pfsc_drake.systems.physics.delta_plant import DeltaPlant
+from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 M_Q, M_Y, GRAVITY = 1.1, 1.85, 9.81
 SINK = 0.325 / np.hypot(0.416, 0.325)

@@ -11,7 +11,7 @@ from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount, full_energy_function, mounts_from_dh
-from pfsc_drake.systems.physics.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 
 # Tab. 2.3, see test_rotor_coupling.py
 AXES = [[0, 1, 0], [0, 0, -1], [0, -1, 0], [0, 0, 1], [0, 1, 0], [0, 1, 0]]

@@ -1,0 +1,1 @@
+"""Plants that Drake does not have, and what acts on them."""
