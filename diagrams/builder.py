@@ -167,10 +167,11 @@ def build_station_replay(
         meshcat: Where to draw.
     """
     period, layout = settings.simulation.frame_period, station.task.place.layout
+    look = None
+    if station.workpiece is not None:
+        look = station.workpiece.look(upwards(station.part.gravity, "notch"))
     if isinstance(station.part, DeltaPart):
         robot = load_delta_robot(settings.robot, folder)
-        return build_delta_replay(
-            robot, station.path, layout, motion, meshcat, period, settings.notch
-        )
+        return build_delta_replay(robot, station.path, layout, motion, meshcat, period, look)
     assert drawing is not None  # draw_station knows every other robot
-    return build_replay(drawing, station.path, layout, motion, meshcat, period)
+    return build_replay(drawing, station.path, layout, motion, meshcat, period, look)

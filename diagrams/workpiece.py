@@ -10,6 +10,8 @@ from pydrake.multibody.tree import Frame
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path
+from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
 
 @dataclass
@@ -25,6 +27,19 @@ class FurtherLength:
     values: np.ndarray
     labels: list[str]
     limit: float
+
+
+@dataclass(frozen=True)
+class WorkpieceLook:
+    """How a workpiece is drawn, and what of the tool touches it.
+
+    Attributes:
+        surface: Surface of the workpiece, axes of the world.
+        tool_parts: What of the tool touches it.
+    """
+
+    surface: Surface
+    tool_parts: list[ToolPart]
 
 
 class Workpiece(ABC):
@@ -78,6 +93,14 @@ class Workpiece(ABC):
             path: The path that the tool follows.
             y_t: Motion of the tool point [m], shape (samples, 3).
             initial_theta: Path parameter near the first sample.
+            up: See :meth:`start_shift`.
+        """
+
+    @abstractmethod
+    def look(self, up: np.ndarray) -> WorkpieceLook:
+        """Return how it is drawn.
+
+        Args:
             up: See :meth:`start_shift`.
         """
 

@@ -1,25 +1,19 @@
 """A logged run of a DELTA robot in Meshcat, base on top as it hangs."""
 
 import numpy as np
-from pydrake.geometry import Cylinder, Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
+from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.replay import RecordedMotion, add_source
-from diagrams.scenario.notch import NotchParameters
-from diagrams.surroundings.notch import notch_surface
+from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
+from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.delta.shapes import ACCENT, METAL, PLATE
 from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer, turn_scene_over
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
-_HOLDER_RADIUS = 0.008  # m
-_UP = np.array([0.0, 0.0, -1.0])  # z_0 points down
-_NOTCH_VIEW = np.array([0.5, -0.4, 0.35])  # m, from the notch to the camera
-_WORKPIECE = Rgba(0.75, 0.72, 0.66, 0.75)
 
 
 def build_delta_replay(
@@ -29,7 +23,7 @@ def build_delta_replay(
     motion: RecordedMotion,
     meshcat: Meshcat,
     period: float,
-    notch: NotchParameters | None = None,
+    workpiece: WorkpieceLook | None = None,
 ) -> Diagram:
     """Return a diagram that draws a recorded motion while its time advances.
 
@@ -40,15 +34,16 @@ def build_delta_replay(
         motion: What to draw; its positions are those of the slides.
         meshcat: Where to draw.
         period: Time between frames [s].
-        notch: Ball and workpiece, if there are any.
+        workpiece: What its tool touches, if anything.
     """
     _arrange_scene(path, meshcat)
-    if notch is not None:
-        _draw_notch(path, notch, meshcat)
     builder = DiagramBuilder()
     slides = add_source(builder, "positions", motion.times, motion.positions)
     tool_pose = add_source(builder, "tool_pose", motion.times, motion.tool_pose)
     path_point = add_source(builder, "path_point", motion.times, motion.path_point)
+    if workpiece is not None:
+        add_workpiece_drawing(builder, workpiece, tool_pose, meshcat, period)
+        look_down_at(meshcat, np.array([0.0, 0.0, _CLEARANCE]))
     body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
     builder.Connect(slides, body.GetInputPort("slide_positions"))
     drawing = builder.AddNamedSystem(
@@ -57,23 +52,6 @@ def build_delta_replay(
     builder.Connect(tool_pose, drawing.GetInputPort("tool_pose"))
     builder.Connect(path_point, drawing.GetInputPort("path_point"))
     return builder.Build()
-
-
-def _draw_notch(path: Path, notch: NotchParameters, meshcat: Meshcat) -> None:
-    """Draw ball and workpiece, and look down at them."""
-    vertices, triangles = notch_surface(path, notch, _UP)
-    meshcat.SetTriangleMesh("workpiece", vertices.T, triangles.T, _WORKPIECE)
-    ball = notch.ball
-    holder = 0.5 * (ball.distance - ball.radius)
-    for name, shape, below, color in (
-        ("ball", Sphere(ball.radius), ball.distance, ACCENT),
-        ("holder", Cylinder(_HOLDER_RADIUS, 2.0 * holder), holder, METAL),
-    ):
-        part = f"delta_robot/{PLATE}/{name}"
-        meshcat.SetObject(part, shape, color)
-        meshcat.SetTransform(part, RigidTransform(-below * _UP))
-    target = np.array([0.0, 0.0, _CLEARANCE])
-    meshcat.SetCameraPose(target + _NOTCH_VIEW, target)
 
 
 def _arrange_scene(path: Path, meshcat: Meshcat) -> None:

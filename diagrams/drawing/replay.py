@@ -5,15 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Meshcat
+from pydrake.math import RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.drawing.robot_geometry import RobotDrawing
+from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
+from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
+
+# towards the camera if the path is in front of the robot, and its distance beside what is seen
+_VIEW = np.array([0.53, -0.79, 0.31])
+_DISTANCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -40,6 +49,7 @@ def build_replay(
     motion: RecordedMotion,
     meshcat: Meshcat,
     period: float,
+    workpiece: WorkpieceLook | None = None,
 ) -> Diagram:
     """Return a diagram that draws a recorded motion while its time advances.
 
@@ -50,8 +60,9 @@ def build_replay(
         motion: What to draw.
         meshcat: Where to draw.
         period: Time between frames [s].
+        workpiece: What its tool touches, if anything.
     """
-    _aim_camera(path, meshcat)
+    _aim_camera(robot, path, motion, meshcat)
     builder = DiagramBuilder()
     signals: Mapping[str, np.ndarray] = {
         "positions": motion.positions,
@@ -68,16 +79,37 @@ def build_replay(
     )
     builder.Connect(sources["tool_pose"], drawing.GetInputPort("tool_pose"))
     builder.Connect(sources["path_point"], drawing.GetInputPort("path_point"))
+    if workpiece is not None:
+        add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
+        look_down_at(meshcat, _path_points(path).mean(axis=0))
     return builder.Build()
 
 
-def _aim_camera(path: Path, meshcat: Meshcat) -> None:
-    """Look at robot and path from the side that the path is on."""
-    points = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, :]
-    middle = points.mean(axis=0)
-    reach = float(np.linalg.norm(points, axis=1).max())
-    target = middle * np.array([0.5, 0.5, 0.7])
-    meshcat.SetCameraPose(target + reach * np.array([0.6, -0.9, 0.35]), target)
+def _aim_camera(robot: RobotDrawing, path: Path, motion: RecordedMotion, meshcat: Meshcat) -> None:
+    """Look at robot and path, wherever they are, with the path to the right of the robot."""
+    base, bodies = _body_origins(robot.plant, motion.positions[0])
+    points = _path_points(path)
+    seen = np.vstack([points, bodies])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    target, size = (low + high) / 2.0, float(np.linalg.norm(high - low))
+    away = points.mean(axis=0) - base
+    azimuth = np.arctan2(away[1], away[0]) if np.linalg.norm(away[:2]) > 0.1 * size else 0.0
+    view = RotationMatrix.MakeZRotation(azimuth) @ _VIEW
+    meshcat.SetCameraPose(target + _DISTANCE * size * view, target)
+
+
+def _body_origins(plant: MultibodyPlant, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the origin of the first body [m], shape (3,), and those of all, shape (bodies, 3)."""
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
+    origins = np.array([body.EvalPoseInWorld(context).translation() for body in bodies])
+    return origins[0], origins
+
+
+def _path_points(path: Path) -> np.ndarray:
+    """Points of the path [m], shape (k, 3)."""
+    return path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, :]
 
 
 def add_source(

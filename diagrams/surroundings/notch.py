@@ -6,24 +6,29 @@ from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
     AddRigidHydroelasticProperties,
+    Cylinder,
     GeometryId,
     InMemoryMesh,
     Mesh,
     ProximityProperties,
     Sphere,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame
 
 from diagrams.scenario.notch import NotchParameters
 from diagrams.surroundings.notch_motion import place_in_notch
-from diagrams.workpiece import FurtherLength, Workpiece, upwards
+from diagrams.workpiece import FurtherLength, Workpiece, WorkpieceLook, upwards
 from pfsc_drake.geometry import Path
 from pfsc_drake.geometry.sweep import swept_surface
+from pfsc_drake.robot.delta.shapes import ACCENT, METAL
+from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
 _SPACING = 4e-3  # m, between cross-sections
 _ARC_POINTS = 13
+_HOLDER_RADIUS = 0.008  # m
 
 
 class NotchedWorkpiece(Workpiece):
@@ -99,6 +104,17 @@ class NotchedWorkpiece(Workpiece):
         place = place_in_notch(path, self.parameters, y_t, initial_theta, up)
         limit = self.parameters.clearance
         return {"notch_position": FurtherLength(place, ["left", "above"], limit)}
+
+    def look(self, up: np.ndarray) -> WorkpieceLook:
+        """Return workpiece and ball, and the ball's holder if it is away from the tool point."""
+        ball = self.parameters.ball
+        parts = [ToolPart("ball", Sphere(ball.radius), ACCENT, RigidTransform(-ball.distance * up))]
+        length = ball.distance - ball.radius
+        if length > 0.0:
+            along = RotationMatrix.MakeFromOneVector(up, 2)
+            X_TH = RigidTransform(along, -0.5 * length * up)
+            parts.append(ToolPart("holder", Cylinder(_HOLDER_RADIUS, length), METAL, X_TH))
+        return WorkpieceLook(Surface(*notch_surface(self._path, self.parameters, up)), parts)
 
 
 def notch_surface(
