@@ -62,7 +62,8 @@ def build_replay(
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
     """
-    _aim_camera(robot, path, motion, meshcat)
+    bodies = _body_origins(robot.plant, motion.positions[0])
+    meshcat.SetCameraPose(*camera_and_target(_path_points(path), bodies))
     builder = DiagramBuilder()
     signals: Mapping[str, np.ndarray] = {
         "positions": motion.positions,
@@ -85,26 +86,30 @@ def build_replay(
     return builder.Build()
 
 
-def _aim_camera(robot: RobotDrawing, path: Path, motion: RecordedMotion, meshcat: Meshcat) -> None:
-    """Look at robot and path, wherever they are, with the path to the right of the robot."""
-    base, bodies = _body_origins(robot.plant, motion.positions[0])
-    points = _path_points(path)
+def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a camera stands and where it looks to see all [m], shape (3,) each.
+
+    It looks from the side of the path, which is then to the right of the robot.
+
+    Args:
+        points: Of the path [m], shape (k, 3).
+        bodies: Origins of the robot's bodies [m], shape (bodies, 3), the base first.
+    """
     seen = np.vstack([points, bodies])
     low, high = seen.min(axis=0), seen.max(axis=0)
     target, size = (low + high) / 2.0, float(np.linalg.norm(high - low))
-    away = points.mean(axis=0) - base
+    away = points.mean(axis=0) - bodies[0]
     azimuth = np.arctan2(away[1], away[0]) if np.linalg.norm(away[:2]) > 0.1 * size else 0.0
     view = RotationMatrix.MakeZRotation(azimuth) @ _VIEW
-    meshcat.SetCameraPose(target + _DISTANCE * size * view, target)
+    return target + _DISTANCE * size * view, target
 
 
-def _body_origins(plant: MultibodyPlant, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the origin of the first body [m], shape (3,), and those of all, shape (bodies, 3)."""
+def _body_origins(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
+    """Origins of all bodies but the world [m], shape (bodies, 3)."""
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, q)
     bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
-    origins = np.array([body.EvalPoseInWorld(context).translation() for body in bodies])
-    return origins[0], origins
+    return np.array([body.EvalPoseInWorld(context).translation() for body in bodies])
 
 
 def _path_points(path: Path) -> np.ndarray:

@@ -147,8 +147,8 @@ def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:
             package, _, rest = address.removeprefix(scheme).partition("/")
             if not packages.Contains(package):
                 raise InputError(
-                    f"the package '{package}' is not known; allowed: one whose package.xml is "
-                    "above the model, or that ROS_PACKAGE_PATH leads to"
+                    f"the package '{package}' is not known, no package.xml above the model "
+                    f"names it: write robot.packages: {{{package}: FOLDER}}"
                 )
             return FilePath(packages.GetPath(package)) / rest
     return file.parent / address.removeprefix("file://")

@@ -88,7 +88,10 @@ class Arm(RobotPart):
     def _tool_load(self, name: str) -> tuple[Joint, ToolLoad]:
         """Return the sensor's joint and what is behind it."""
         if not self.model.HasJointNamed(name):
-            raise InputError(f"sensor.joint: the model has no joint '{name}'")
+            joints = [self.model.get_joint(i).name() for i in self.model.GetJointIndices()]
+            raise InputError(
+                f"sensor.joint: the model has no joint '{name}'; allowed: {', '.join(joints)}"
+            )
         joint = self.model.GetJointByName(name)
         return joint, tool_load_from_plant(self.model, joint, self.tool)
 

@@ -119,7 +119,12 @@ def add_friction(
     if coefficients is None:
         return {}
     if not np.all(drives.inertia > 0.0):
-        raise InputError("friction: needs a robot with rotor inertia in every drive")
+        names = zip(part.robot.names, drives.inertia, strict=True)
+        without = ", ".join(name for name, inertia in names if not inertia > 0.0)
+        raise InputError(
+            f"friction: needs a robot with rotor inertia in every drive, not so {without}: "
+            "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
+        )
     bristles = _bristles(scenario, *coefficients, drives)
     friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
     velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))

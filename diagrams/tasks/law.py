@@ -9,10 +9,16 @@ from diagrams.scenario import (
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
 from pfsc_drake.control.law.linearization import (
+    RELATIVE_DEGREE,
     ActuationOptions,
     linearize,
 )
-from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
+from pfsc_drake.control.law.stabilization import (
+    CoordinateGains,
+    Stabilization,
+    check_gains,
+    gains_from_poles,
+)
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -37,7 +43,13 @@ def make_law(
     linearization = linearize(robot, law, manifold, options)
     if law not in parameters.gains:
         given = ", ".join(parameters.gains) or "none"
-        raise InputError(f"controller.gains: no gains for the law '{law}'; given are {given}")
+        poles = [-20.0] * RELATIVE_DEGREE[law]
+        kinds = dict.fromkeys(coordinate.kind.value for coordinate in manifold.coordinates)
+        example = ", ".join(f"{kind}: {{poles: {poles}}}" for kind in kinds)
+        raise InputError(
+            f"controller.gains: no gains for the law '{law}'; given are {given}; "
+            f"write {law}: {{{example}}} with poles (1/s) of your choice"
+        )
     by_kind = parameters.gains[law]
     # coordinates of a kind share their gains
     names = [coordinate.kind.value for coordinate in manifold.coordinates]
@@ -59,11 +71,15 @@ def make_law(
 def _gains(
     parameters: GainParameters, relative_degree: int, law: str, name: str
 ) -> CoordinateGains:
+    key = f"controller.gains.{law}.{name}"
     if parameters.poles:
-        return gains_from_poles(parameters.poles)
-    if len(parameters.coefficients) == relative_degree:
-        return CoordinateGains(tuple(parameters.coefficients), parameters.integral)
-    raise InputError(
-        f"controller.gains.{law}.{name}: {len(parameters.coefficients)} coefficients and no poles; "
-        f"the law needs {relative_degree} of either"
-    )
+        gains = gains_from_poles(parameters.poles)
+    elif len(parameters.coefficients) == relative_degree:
+        gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
+    else:
+        raise InputError(
+            f"{key}: {len(parameters.coefficients)} coefficients and no poles; "
+            f"the law needs {relative_degree} of either"
+        )
+    check_gains(gains, relative_degree, key)
+    return gains

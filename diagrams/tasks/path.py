@@ -14,6 +14,7 @@ from diagrams.scenario import (
     PathParameters,
     Waypoints,
 )
+from diagrams.tasks.path_warnings import far_waypoints
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
 )
@@ -62,20 +63,33 @@ def make_path(
 
 
 def require_orientation(path: Path, num_joints: int) -> None:
-    """Refuse a path without orientation for a robot whose joints need one.
+    """Refuse a path that asks for more or less than a robot's joints can do.
 
     Args:
         path: The path.
         num_joints: Of the robot.
 
     Raises:
-        InputError: If six joints have no orientation to follow.
+        InputError: If six joints have no orientation to follow, or there are too many or too
+            few joints.
     """
+    num_outputs = 3 if path.orientation is None else 6
     if num_joints == 6 and path.orientation is None:
         raise InputError(
             f"path: {num_joints} joints for 3 outputs (position only); give the orientation too: "
             "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
             "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+        )
+    outputs = "position only" if num_outputs == 3 else "position and orientation"
+    if num_joints > num_outputs:
+        raise InputError(
+            f"path: {num_joints} joints for {num_outputs} outputs ({outputs}); "
+            f"hold {num_joints - num_outputs} of them: robot.fixed_joints: {{NAME: VALUE}}"
+        )
+    if num_joints < num_outputs:
+        raise InputError(
+            f"path: {num_joints} joints for {num_outputs} outputs ({outputs}); 3 joints follow a "
+            "path without orientation, 6 one with"
         )
 
 
@@ -96,15 +110,25 @@ def _through_waypoints(
     tolerance = None
     if shape.tolerance > 0.0:
         tolerance = Tolerance(shape.tolerance, math.radians(shape.tolerance_deg))
-    path = path_from_waypoints(
-        table,
-        smoothness=shape.smoothness or smoothness,
-        closed=shape.closed,
-        parametrization=cast(Literal["chord", "centripetal"], shape.parametrization),
-        tolerance=tolerance,
-        corner_distance=shape.corner_distance or None,
-        progress=progress,
-    )
+    smoothness_made = shape.smoothness or smoothness
+    try:
+        path = path_from_waypoints(
+            table,
+            smoothness=smoothness_made,
+            closed=shape.closed,
+            parametrization=cast(Literal["chord", "centripetal"], shape.parametrization),
+            tolerance=tolerance,
+            corner_distance=shape.corner_distance or None,
+            progress=progress,
+        )
+    except InputError as error:
+        hint = far_waypoints(table.positions)
+        if hint is None and 2 < len(table.positions) < smoothness_made + 2:
+            hint = (
+                f"add waypoints to {shape.file}, or write path.shape.corner_distance (m) for "
+                "straight lines with rounded corners"
+            )
+        raise InputError("; ".join(filter(None, [str(error), hint]))) from None
     if not keyframes:
         return path
     orientation = _orientation(parameters.orientation, path.position, smoothness)

@@ -29,7 +29,7 @@ def path_warnings(path: Path, shape: ShapeReport) -> list[str]:
     """
     found = [_fast_turn(path, shape)]
     if path.waypoints is not None:
-        found += [_large(path.waypoints), _nearly_closed(path, path.waypoints)]
+        found += [far_waypoints(path.waypoints.positions), _nearly_closed(path, path.waypoints)]
         if path.waypoints.manner == "interpolated":
             found += [_noise(path, shape) or _swing(shape) or _narrow_bend(path, shape)]
     return [sentence for sentence in found if sentence]
@@ -51,8 +51,13 @@ def closing_gap(path: Path) -> float | None:
     return gap if near and len(points) > 3 else None
 
 
-def _large(waypoints: PathWaypoints) -> str | None:
-    farthest = float(np.abs(waypoints.positions).max())
+def far_waypoints(positions: np.ndarray) -> str | None:
+    """Return what to say of waypoints that look like millimetres, or None.
+
+    Args:
+        positions: Of the waypoints [m], shape (n, 3).
+    """
+    farthest = float(np.abs(positions).max())
     if farthest <= _LARGE:
         return None
     return f"waypoints lie up to {farthest:.4g} m from the origin; their unit is m, not mm"

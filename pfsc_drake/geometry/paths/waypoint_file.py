@@ -168,10 +168,12 @@ def _check_header(name: str, line: int, header: list[str]) -> None:
     ]
     for label in header:
         if label not in known:
-            commas = "" if not re.search("[;\t]", label) else "; separate columns by commas"
+            hint = "; separate columns by commas" if re.search("[;\t]", label) else ""
+            if _NUMBER.fullmatch(label):
+                hint = "; the first line names the columns"
             raise InputError(
                 f"{name}, line {line}: column '{_quote(label)}' is unknown; allowed:"
-                f" {', '.join(known)}{commas}"
+                f" {', '.join(known)}{hint}"
             )
         if header.count(label) > 1:
             raise InputError(f"{name}, line {line}: column '{label}' twice; once is allowed")

@@ -24,6 +24,9 @@ from pfsc_drake.robot.models.joint_edits import (
     take_joint,
 )
 
+# of a model that are worth naming
+_MOST_NAMES = 6
+
 
 def fix_joints(plant: MultibodyPlant, values: Mapping[str, float]) -> None:
     """Weld joints where they stand.
@@ -104,7 +107,10 @@ def _base_frame(plant: MultibodyPlant, base: str, default: RigidBody) -> Frame:
     except InputError as error:
         raise InputError(f"base: {error}") from None
     if frame is None:
-        raise InputError(f"base: '{base}'; allowed: a link or frame of the model")
+        names = [body.name() for body in bodies_of(plant)[1 : 1 + _MOST_NAMES]]
+        raise InputError(
+            f"base: '{base}'; allowed: a link or frame of the model, as {', '.join(names)}"
+        )
     return frame
 
 

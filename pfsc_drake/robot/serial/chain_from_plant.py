@@ -92,7 +92,7 @@ def chain_from_plant(
             f"tool frame '{tool_frame.name()}': no moving joint between it and the world; "
             "a chain needs at least one revolute or prismatic joint"
         )
-    _refuse_branches(plant, joints)
+    _refuse_branches(plant, joints, tool_frame.name())
     springs = _joint_springs(plant, context)
     links: list[ChainLink] = []
     motors: list[Joint] = []
@@ -156,7 +156,7 @@ def _all_joints(plant: MultibodyPlant) -> Iterable[Joint]:
     return (plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices())
 
 
-def _refuse_branches(plant: MultibodyPlant, chain: list[Joint]) -> None:
+def _refuse_branches(plant: MultibodyPlant, chain: list[Joint], tool: str) -> None:
     """Raise if something else moves on the chain's links; its dynamics would be missing."""
     own = {joint.index() for joint in chain}
     on_chain = {b.index() for joint in chain for b in plant.GetBodiesWeldedTo(joint.child_body())}
@@ -165,8 +165,8 @@ def _refuse_branches(plant: MultibodyPlant, chain: list[Joint]) -> None:
             continue
         if {joint.parent_body().index(), joint.child_body().index()} & on_chain:
             raise InputError(
-                f"joint '{joint.name()}': branches off the chain of the tool; "
-                "list it in fixed_joints or remove it from the model"
+                f"joint '{joint.name()}': branches off the chain of the tool '{tool}'; "
+                "list it in fixed_joints, name a tool frame behind it, or remove it from the model"
             )
 
 

@@ -9,7 +9,7 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.drawing.replay import RecordedMotion, build_replay, record
+from diagrams.drawing.replay import RecordedMotion, build_replay, camera_and_target, record
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.scenario import Line, PathParameters, RobotParameters
 from diagrams.tasks.path import make_path
@@ -87,3 +87,29 @@ def test_recording_is_one_page_with_the_animation(build, motion, meshcat):
         assert name.encode() in animation
     path_line = [chunk for chunk in chunks if b"path_following/path" in chunk]
     assert path_line
+
+
+@pytest.mark.parametrize("hanging", [False, True])
+@pytest.mark.parametrize("azimuth", [0.0, 2.5])
+def test_camera_sees_robot_and_path(hanging, azimuth):
+    """Wherever the robot stands and reaches; Meshcat's camera sees 75 deg from top to bottom."""
+    turn = np.array(
+        [
+            [np.cos(azimuth), -np.sin(azimuth), 0.0],
+            [np.sin(azimuth), np.cos(azimuth), 0.0],
+            [0.0, 0.0, -1.0 if hanging else 1.0],
+        ]
+    )
+    base = np.array([1.0, -2.0, 3.0 if hanging else 0.0])
+    bodies = base + np.array([[0, 0, 0], [0, 0, 0.4], [0.1, 0, 1.1], [0.9, 0, 1.0]]) @ turn.T
+    points = base + np.array([[0.8, y, 0.5] for y in (-0.4, 0.0, 0.4)]) @ turn.T
+    camera, target = camera_and_target(points, bodies)
+    axis = (target - camera) / np.linalg.norm(target - camera)
+    rays = np.vstack([bodies, points]) - camera
+    angles = np.degrees(np.arccos(rays @ axis / np.linalg.norm(rays, axis=1)))
+    assert angles.max() < 37.5
+    assert angles.max() > 15.0  # not from afar either
+    # the path is before the robot, to its right
+    right = np.cross(axis, [0.0, 0.0, 1.0])
+    assert np.mean(points @ right) > base @ right
+    assert np.linalg.norm(points.mean(axis=0) - camera) < np.linalg.norm(base - camera)

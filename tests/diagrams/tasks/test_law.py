@@ -70,15 +70,25 @@ def test_limits_are_those_of_the_model_scaled(load_arm):
         (ControllerParameters("rigid"), ("controller.gains", "'rigid'", "none")),
         (
             ControllerParameters("rigid", {"elastic": LawGains()}),
-            ("controller.gains", "'rigid'", "given are elastic"),
+            (
+                "controller.gains",
+                "'rigid'",
+                "given are elastic; write rigid: {eta: {poles: [-20.0, -20.0]}, xi: {poles: ",
+            ),
         ),
         (controller("rigid", by_poles(-1, -1), GainParameters()), ("gains.rigid.xi", "needs 2")),
         (
             controller("rigid", GainParameters(coefficients=[1.0]), by_poles(-1, -1)),
             ("controller.gains.rigid.eta", "1 coefficients", "needs 2"),
         ),
-        (controller("rigid", by_poles(-1, -1), by_poles(-1)), ("xi", "1 gains", "needs 2")),
-        (controller("rigid", by_poles(-1, 0), by_poles(-1, -1)), ("eta", "not Hurwitz")),
+        (
+            controller("rigid", by_poles(-1, -1), by_poles(-1)),
+            ("controller.gains.rigid.xi", "1 gains", "needs 2"),
+        ),
+        (
+            controller("rigid", by_poles(-1, 0), by_poles(-1, -1)),
+            ("controller.gains.rigid.eta", "not Hurwitz"),
+        ),
         (
             controller(
                 "rigid",

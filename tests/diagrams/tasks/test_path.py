@@ -15,7 +15,7 @@ from diagrams.scenario import (
     PathParameters,
     Waypoints,
 )
-from diagrams.tasks.path import make_path
+from diagrams.tasks.path import make_path, require_orientation
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
@@ -273,3 +273,34 @@ def test_axes_of_a_circle_that_span_no_plane(tilt):
 def test_axes_of_a_circle_may_have_any_length():
     path = make(Circle(axis_u=[0.0, 1e300, 0.0], axis_v=[0.0, 1e-300, 1e-300]))
     assert path.length == pytest.approx(0.3 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("num_joints", "oriented", "said"),
+    [
+        (7, True, r"path: 7 joints for 6 outputs.*hold 1 of them: robot\.fixed_joints"),
+        (4, False, r"path: 4 joints for 3 outputs.*hold 1 of them: robot\.fixed_joints"),
+        (3, True, r"path: 3 joints for 6 outputs \(position and orientation\)"),
+        (6, False, r"give the orientation too"),
+    ],
+)
+def test_joints_must_suit_the_path(num_joints, oriented, said):
+    path = make(Line(), [Keyframe()] if oriented else [])
+    with pytest.raises(InputError, match=said):
+        require_orientation(path, num_joints)
+    require_orientation(path, 6 if oriented else 3)
+
+
+def test_too_few_points_may_be_corners(tmp_path):
+    file = write_csv(tmp_path, "xyz", POSITIONS[:4])
+    with pytest.raises(InputError, match=rf"{file}, or write path\.shape\.corner_distance"):
+        make(Waypoints(file), law="rigid", folder=tmp_path)
+    make(Waypoints(file, corner_distance=0.01), law="rigid", folder=tmp_path)
+
+
+def test_noise_in_millimetres_is_one_of_the_unit(tmp_path):
+    rng = np.random.default_rng(0)
+    line = np.linspace([300.0, 0.0, 0.0], [500.0, 0.0, 0.0], 300)
+    file = write_csv(tmp_path, "xyz", line + rng.normal(0.0, 0.2, line.shape))
+    with pytest.raises(InputError, match=r"tolerance = 0\.001 m.*their unit is m, not mm"):
+        make(Waypoints(file, tolerance=1e-3), law="rigid", folder=tmp_path)

@@ -57,7 +57,7 @@ def write(folder, looks):
 @pytest.mark.parametrize(
     ("look", "said"),
     [
-        ('<mesh filename="package://gone/part.stl"/>', "the package 'gone' is not known"),
+        ('<mesh filename="package://gone/part.stl"/>', "write robot.packages: {gone: FOLDER}"),
         ('<mesh filename="part.dae"/>', "part.dae: holds no mesh that could be drawn"),
         (None, None),
     ],

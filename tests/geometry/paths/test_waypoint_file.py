@@ -76,6 +76,7 @@ MATRIX = ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
         (f"x,y,z,{MATRIX}\n0,0,0,1,0,0,0,1,0,0,0,-1\n", r"determinant -1"),
         ("x,y,z\n1,2,1e300\n", r"line 2, column z: '1e300'"),
         ("x,y,z\n1,2,-1e5\n", r"line 2, column z: -100000 m; at most 10000 m"),
+        ("0.5,0.1,0.2\n", "column '0.5' is unknown; .* the first line names the columns"),
         ("x;y;z\n1;2;3\n", "column 'x;y;z' is unknown; .* separate columns by commas"),
         (
             "x,y,z,zyx_1,zyx_2,zyx_3\n0,0,0,0,0,180\n",
