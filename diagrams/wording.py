@@ -7,18 +7,17 @@ import numpy as np
 from pfsc_drake.robot.robot_model import RobotModel
 
 
-def coordinate_text(robot: RobotModel, joint: int, value: float) -> str:
+def coordinate_text(value: float, *, revolute: bool) -> str:
     """Return a joint coordinate with its unit, ``0.2 deg`` or ``0.012 m``.
 
     Args:
-        robot: The robot.
-        joint: Index of the joint.
-        value: Its coordinate [rad or m].
+        value: The coordinate [rad or m].
+        revolute: Whether the joint turns.
     """
-    if robot.gather("is_revolute")[joint]:
-        degrees = np.rad2deg(value)
-        return f"{degrees:.1f} deg" if abs(degrees) >= 0.1 else f"{degrees:.2g} deg"
-    return f"{value:.4g} m"
+    if not revolute:
+        return f"{value:.4g} m"
+    degrees = np.rad2deg(value)
+    return f"{degrees:.1f} deg" if abs(degrees) >= 0.1 else f"{degrees:.2g} deg"
 
 
 def posture_text(robot: RobotModel, q: np.ndarray, joints: Iterable[int] | None = None) -> str:
@@ -27,10 +26,10 @@ def posture_text(robot: RobotModel, q: np.ndarray, joints: Iterable[int] | None 
     Args:
         robot: The robot.
         q: Joint coordinates [rad or m], shape (N,).
-        joints: Which ones; by default all.
+        joints: Indices of the joints to tell; by default all.
     """
-    chosen = range(robot.dimension) if joints is None else joints
-    return ", ".join(f"q_{i + 1} = {coordinate_text(robot, i, q[i])}" for i in chosen)
+    chosen, revolute = joints or range(robot.dimension), robot.gather("is_revolute")
+    return ", ".join(f"q_{i + 1} = {coordinate_text(q[i], revolute=revolute[i])}" for i in chosen)
 
 
 def listed(words: Iterable[str]) -> str:

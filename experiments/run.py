@@ -16,10 +16,12 @@ from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
+from diagrams.wording import posture_text
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import write_figures
 from experiments.pages.report import write_report
 from experiments.progress import ProgressListener
+from experiments.results.joint_limits import JointLimits
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import metric_names, path_following_metrics
 from experiments.results.provenance import standard_attributes
@@ -94,6 +96,7 @@ def run_scenario(
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
         log.attributes = standard_attributes(scenario.name)
+        log.attributes["start_posture"] = posture_text(station.robot, station.start_posture)
         if result.fault is not None:
             log.attributes["fault"] = result.fault
         log.write(out / "log.h5")
@@ -101,6 +104,9 @@ def run_scenario(
         progress(end, "measuring the tick")
         tick = measure_tick(station, result.root, log) * 1e6
     metrics = _metrics(log, settings)
+    limits = JointLimits.of(station.robot)
+    metrics.update(limits.metrics(log))
+    warnings = [*station.warnings, *limits.warnings(log)]
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")
@@ -119,7 +125,7 @@ def run_scenario(
         out,
         title=scenario.name,
         description=settings.description,
-        warnings=station.warnings,
+        warnings=warnings,
         scenario_yaml_text=(out / "scenario.yaml").read_text(encoding="utf-8"),
         metrics=metrics,
         figures=pictures,
@@ -129,7 +135,7 @@ def run_scenario(
         diagram_svg=block_diagram_svg(station.diagram) if figures else None,
     )
     progress(end, "done")
-    return RunOutcome(result.fault, report, metrics, station.warnings)
+    return RunOutcome(result.fault, report, metrics, warnings)
 
 
 def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
@@ -137,6 +143,7 @@ def _check_targets(settings: PathFollowingScenario, station: Station) -> None:
     signals = optional_signals(station)
     known = [
         *metric_names(station.robot.dimension, signals),
+        *JointLimits.of(station.robot).metric_names(),
         "real_time_factor",
         "controller_tick_us",
         "controller_tick_us_p99",
