@@ -79,7 +79,7 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
         initial_state,
         start.theta,
         on_motors,
-        law_warnings(scenario, part.robot, link_state) + sensor_warnings(scenario),
+        law_warnings(scenario, part.robot, law, link_state) + sensor_warnings(scenario),
         workpiece,
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagrams.wording import coordinate_text
 from experiments.results.metrics import Metrics
@@ -32,7 +33,7 @@ class JointLimits:
     """
 
     names: list[str]
-    revolute: FloatArray
+    revolute: NDArray[np.bool_]
     position: FloatArray
     velocity: FloatArray
 
@@ -124,9 +125,9 @@ class JointLimits:
                 f"t = {log.time[fastest]:.3f} s; the simulation lets it pass"
             )
 
-    def _turns(self, kind: object) -> FloatArray:
+    def _turns(self, kind: object) -> NDArray[np.bool_]:
         """Return which joints turn, or which do not, shape (N,)."""
-        return np.asarray(self.revolute, dtype=bool) == kind
+        return np.asarray(self.revolute == kind)
 
     def _share(self, log: RunLog) -> FloatArray:
         """Return the ratios of the speeds to their limits, shape (samples, N)."""
