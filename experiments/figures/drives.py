@@ -75,15 +75,18 @@ def draw_velocities(log: RunLog) -> Drawing:
             _draw_limit(panel, signal, axis)
         panel.set(ylabel=f"velocity in {signal.unit}", title=titles[name])
     place_legend(panels[0])
+    limited = any(_nears_limit(signals["v_J"], axis) for axis in range(signals["v_J"].dim))
+    limits = "; dashed lines are limits within reach" if limited else ""
     if not both:
         title = f"{mover.capitalize()} velocities"
-        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}.", canvas)
+        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}{limits}.", canvas)
     difference = log["v_M"].values - log["v_J"].values
     draw_components(panels[2], log.time, difference, _axis_labels(difference.shape[1]))
     title = r"Difference $\dot q_M - \dot q_J$"
     panels[2].set(ylabel=f"velocity in {log['v_M'].unit}", title=title)
-    caption = "They differ through the elastic transmissions, where the load on them changes."
-    return Drawing("velocities", f"{mover.capitalize()} and motor velocities", caption, canvas)
+    caption = "They differ through the elastic transmissions, where the load on them changes"
+    title = f"{mover.capitalize()} and motor velocities"
+    return Drawing("velocities", title, f"{caption}{limits}.", canvas)
 
 
 def draw_efforts(log: RunLog) -> Drawing:
