@@ -16,6 +16,7 @@ NAMES = [
     "orientation",
     "angles",
     "forces",
+    "positions",
     "velocities",
     "drive_torques",
     "friction",

@@ -50,7 +50,9 @@ def fault(tmp_path, capfd, mine):
 @pytest.mark.parametrize("component", [0, 5, 6, 11])
 def test_nan_on_the_way(fault, component):
     failure = f"simulation.sensor_failure={{time: 0.0305, component: {component}}}"
-    log, metrics = fault("not a finite number", failure)
+    name = f"{['q_J', 'v_J', 'q_M', 'v_M'][component // 3]}_{component % 3 + 1}"
+    place = f"{name} at eta = 0.96 m, t = 0.031 s"
+    log, metrics = fault(f"a measured value is not a finite number: {place}", failure)
     healthy = log["t"] < 0.0305
     assert set(log["fault"][healthy]) == {"none"}
     assert set(log["fault"][~healthy]) == {"input_not_finite"}
@@ -66,16 +68,17 @@ def test_nan_on_the_way(fault, component):
 
 @pytest.mark.parametrize("name", [THREE, SIX])
 def test_nan_from_the_beginning(fault, name):
-    log, metrics = fault("not a finite number", "simulation.sensor_failure.time=0", name=name)
+    place = "q_J_1 at t = 0.000 s"
+    log, metrics = fault(place, "simulation.sensor_failure.time=0", name=name)
     assert set(log["fault"]) == {"input_not_finite"}
     assert np.isfinite(log["tau_d"]).all()
     assert metrics["max_path_deviation"]["value"] is None
 
 
 def test_singularity_on_the_way(fault):
-    """A line leads beyond what the stretched arm reaches."""
-    log, _ = fault(
-        "singular",
+    """A line leads beyond what the stretched arm reaches, and axis 3 beyond its limit of 80 deg."""
+    log, metrics = fault(
+        "elbow singular at eta = ",
         "path.shape=!Line {start: [1.1, 0, 1], end: [2, 0, 1]}",
         "reference={points: [0, 0.8], velocity: 1, acceleration: 8, dwell: 0}",
         "start.offset=[0, 0]",
@@ -88,6 +91,10 @@ def test_singularity_on_the_way(fault):
     exact = np.cumsum(log["saturated_drives"][:, 0]) == 0
     assert np.abs(log["xi"][exact]).max() < 1e-3
     assert 0.2 < log["eta"][last_good, 0] < 0.8
+    beyond = log["q_J"][:, 2].max() - np.deg2rad(80.0)
+    assert beyond > 0.1
+    assert metrics["joint_limit_margin"]["value"] == pytest.approx(-beyond)
+    assert metrics["joint_velocity_share"]["value"] > 1.0
 
 
 def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
