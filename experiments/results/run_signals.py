@@ -269,7 +269,7 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     """Add the torques that a velocity servo gives, and what friction takes."""
     effort = _joint_units(station)[2]
     if "drive_torque" in raw:
-        limits = station.robot.gather("effort_limit")
+        limits = station.diagram.GetSubsystemByName("velocity_servo").limits
         labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
         names = [fault.name.lower() for fault in Fault]

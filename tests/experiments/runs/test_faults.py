@@ -13,6 +13,14 @@ THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 BARE = ("--no-figures", "--no-recording")
 
 
+SERVOS = (
+    "robot.model=comau_racer_1_4_3r",
+    "controller.law=velocity_servo",
+    "controller.gains.velocity_servo={eta: {poles: [-100]}, xi: {poles: [-100]}}",
+    "targets.velocity_servo.joint_limit_margin={bound: '> 0'}",
+)
+
+
 @pytest.fixture
 def fault(tmp_path, capfd, mine):
     """Run into a fault and return log, its attributes and metrics."""
@@ -75,7 +83,7 @@ def test_nan_from_the_beginning(fault, name):
     assert metrics["max_path_deviation"]["value"] is None
 
 
-def test_singularity_on_the_way(fault):
+def test_singularity_on_the_way(fault, tmp_path):
     """A line leads beyond what the stretched arm reaches, and axis 3 beyond its limit of 80 deg."""
     log, metrics = fault(
         "elbow singular at eta = ",
@@ -95,6 +103,8 @@ def test_singularity_on_the_way(fault):
     assert beyond > 0.1
     assert metrics["joint_limit_margin"]["value"] == pytest.approx(-beyond)
     assert metrics["joint_velocity_share"]["value"] > 1.0
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "joint 3 &#x27;motor_3&#x27; passes its limit of 80.0 deg at t = " in report
 
 
 def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
@@ -135,3 +145,28 @@ def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     np.testing.assert_array_equal(saturated > 0, at_limit)
     assert metrics["saturated_samples"]["value"] == at_limit.sum()
     assert np.linalg.norm(xi[-1]) < 1e-4  # nevertheless on the path in the end
+
+
+@pytest.mark.parametrize("limited", ["speed", "torque"])
+def test_saturation_of_servos(run_scenario, tmp_path, limited):
+    """Beside the path by 50 mm the law asks slow servos for 5 m/s; or weak ones do not obey."""
+    too_much = {
+        "speed": ("start.offset=[0.05, 0]", "servo.bandwidth=15"),
+        "torque": ("start.offset=[0.005, 0]", "controller.effort_scale=0.1"),
+    }
+    changes = (*SERVOS, *too_much[limited])
+    options = [argument for change in changes for argument in ("--set", change)]
+    result = run_scenario(tmp_path / "out", "pfc_elastic_3r", "--duration", "0.2", *options)
+    assert result.status == 0
+    too_fast = result["saturated_drives"][:, 0] > 0
+    too_strong = np.any(np.abs(result["tau_d"]) == result.marks["tau_d"]["limits"], axis=1)
+    assert np.count_nonzero(too_fast & ~too_strong if limited == "speed" else too_strong) > 3
+    assert too_fast.any() == (limited == "speed")
+    saturated = np.count_nonzero(too_fast | too_strong)
+    assert result.metrics["saturated_samples"]["value"] == saturated < 100
+    margin = result.metrics["joint_limit_margin"]
+    lower, upper = result.marks["q_J"]["limits"].T
+    assert margin["value"] == np.minimum(result["q_J"] - lower, upper - result["q_J"]).min()
+    assert margin["target"] == "> 0"
+    share = np.abs(result["v_J"]) / result.marks["v_J"]["limits"]
+    assert result.metrics["joint_velocity_share"]["value"] == share.max()
