@@ -8,7 +8,8 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
-from diagrams.robots.arm import add_arm
+from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
+from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.delta import DeltaPart, add_delta, is_delta, load_delta_robot
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
@@ -24,17 +25,22 @@ from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
+from diagrams.tasks.path import require_orientation
 from diagrams.tasks.path_following import make_task
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
+from pfsc_drake.geometry.paths.smoothing import Progress
 
 
-def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
+def build_station(
+    scenario: PathFollowingScenario, folder: FilePath, progress: Progress | None = None
+) -> Station:
     """Build the station of a scenario.
 
     Args:
         scenario: The scenario.
         folder: Where the scenario's relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -42,12 +48,13 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder, task = DiagramBuilder(), make_task(scenario, folder)
+    builder, task = DiagramBuilder(), make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
+    require_orientation(task.path, part.robot.dimension)
     law = make_law(scenario.controller, part.robot, task.manifold)
     start, initial_state = _start(scenario, task, part, workpiece)
-    on_motors = scenario.controller.law == "rigid" and part.robot.is_elastic
+    on_motors = scenario.controller.law == "rigid" and not part.robot.is_rigid
     following = Following(scenario, part.robot, task, law, on_motors)
 
     true_state = part.joint_state(builder)
@@ -79,7 +86,12 @@ def build_station(scenario: PathFollowingScenario, folder: FilePath) -> Station:
         initial_state,
         start.theta,
         on_motors,
-        law_warnings(scenario, part.robot, law, link_state) + sensor_warnings(scenario),
+        task.warnings
+        + part.start_warnings(
+            scenario.start, link_state[: part.robot.dimension], start.R_e is not None
+        )
+        + law_warnings(scenario, part.robot, law, link_state)
+        + sensor_warnings(scenario),
         workpiece,
     )
 
@@ -121,10 +133,26 @@ def _start(
     return start, part.state_at_rest(q_J)
 
 
+def draw_station(
+    settings: PathFollowingScenario, folder: FilePath, station: Station
+) -> RobotDrawing | None:
+    """Read what a station's robot looks like, or return None if that is known without files.
+
+    Args:
+        settings: The scenario that is to be run.
+        folder: Where its relative file names start.
+        station: Its station.
+    """
+    if not isinstance(station.part, Arm):
+        return None
+    return draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+
+
 def build_station_replay(
     settings: PathFollowingScenario,
     folder: FilePath,
     station: Station,
+    drawing: RobotDrawing | None,
     motion: RecordedMotion,
     meshcat: Meshcat,
 ) -> Diagram:
@@ -134,6 +162,7 @@ def build_station_replay(
         settings: The scenario that was run.
         folder: Where its relative file names start.
         station: Its station.
+        drawing: What its robot looks like, from :func:`draw_station`.
         motion: What to draw.
         meshcat: Where to draw.
     """
@@ -143,4 +172,5 @@ def build_station_replay(
         return build_delta_replay(
             robot, station.path, layout, motion, meshcat, period, settings.notch
         )
-    return build_replay(settings.robot, folder, station.path, layout, motion, meshcat, period)
+    assert drawing is not None  # draw_station knows every other robot
+    return build_replay(drawing, station.path, layout, motion, meshcat, period)

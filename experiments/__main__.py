@@ -2,7 +2,13 @@
 
 import sys
 
-from experiments.cli import main
+from experiments.interruption import leave_when_interrupted
+from experiments.terminal import prepare_streams, silence_libraries
 
 if __name__ == "__main__":
+    leave_when_interrupted()
+    prepare_streams()
+    silence_libraries()
+    from experiments.cli import main
+
     sys.exit(main())

@@ -1,14 +1,16 @@
 """The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``study`` the laws.
 
-Exit status: 0 the run completed; 2 the input is wrong (one line on stderr); 3 a fault stopped the
-run, everything logged so far is kept; 130 interrupted.
+Exit status: 0 the run completed; 2 the input is wrong, nothing was run (one line on stderr); 3 a
+fault stopped the run, everything logged so far is kept; 4 results could not be written, one line
+says which and where they are instead; 130 interrupted, everything logged so far is kept.
 """
 
 import dataclasses
 import json
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,17 +19,21 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.catalog.scenario_catalog import list_scenarios
+from experiments.catalog.scenario_catalog import expand_home, list_scenarios
+from experiments.interruption import INTERRUPTED, raised_interruption
 from experiments.progress import ProgressDisplay
-from pfsc_drake.errors import InputError
+from experiments.terminal import one_line, print_error
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
-    from experiments.catalog.scenario_file import ScenarioFile
+    from experiments.pages.report import Report
     from experiments.results.metrics import Metrics
+    from experiments.run import RunOutcome
 
 WRONG_INPUT = 2
 FAULT = 3
-INTERRUPTED = 130
+NOT_WRITTEN = 4
 
 app = typer.Typer(
     add_completion=False,
@@ -60,14 +66,19 @@ def run_command(
         str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the results. [default: out/SCENARIO]")
+        Path | None,
+        typer.Option(
+            help="Folder for the results: a new one or that of an earlier run, whose results are "
+            "replaced; a user's own files never are. Default: out/SCENARIO"
+        ),
     ] = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Simulated time in s, instead of the scenario's.")
+        str | None,
+        typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
     ] = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
     recording: Annotated[
@@ -76,19 +87,25 @@ def run_command(
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
     from experiments.catalog.scenario_file import read_scenario
+    from experiments.run import run_scenario
 
-    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
-        raise InputError(f"--duration {duration:g}: allowed: a positive number of seconds")
-    loaded = read_scenario(scenario, overrides or [])
-    out = out if out is not None else Path("out") / loaded.name
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out}: is a file; allowed: a folder")
-    try:
-        status = _run(loaded, out, duration, figures, recording)
-    except KeyboardInterrupt:
-        _print_error("interrupted")
-        status = INTERRUPTED
-    raise typer.Exit(status)
+    seconds = None if duration is None else _read_duration(duration)
+    with _interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / loaded.name
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        with ProgressDisplay(console, loaded.name, seconds) as progress:
+            outcome = run_scenario(
+                loaded,
+                out=folder,
+                duration=seconds,
+                figures=figures,
+                recording=recording,
+                progress=progress,
+            )
+        _print_outcome(console, outcome)
+        raise typer.Exit(_judge(outcome, folder, progress.simulated_time))
 
 
 @app.command("compare")
@@ -99,8 +116,9 @@ def compare_command(
     """Put several runs on one page."""
     from experiments.pages.compare import write_comparison
 
-    page = write_comparison(runs, out)
-    Console().print(f"Open the comparison: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
+    with _interruptible():
+        report = write_comparison([expand_home(run) for run in runs], expand_home(out))
+        raise typer.Exit(_show("comparison", report))
 
 
 @app.command("study")
@@ -110,10 +128,13 @@ def study_command(
     """Which law when: all laws on joints of rising stiffness (about a minute)."""
     from experiments.studies.stiffness import write_study
 
-    logging.getLogger("drake").setLevel(logging.ERROR)
-    console = Console()
-    page = write_study(out, lambda line: console.print(line, highlight=False, markup=False))
-    console.print(f"Open the study: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
+    with _interruptible():
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        report = write_study(
+            expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
+        )
+        raise typer.Exit(_show("study", report))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -135,44 +156,68 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _fail(str(error))
     except usage_error as error:
-        reason = _one_line(error.format_message()).rstrip(".")
+        reason = one_line(error.format_message()).rstrip(".")
         return _fail(f"{reason}; see python -m experiments --help")
     return status if isinstance(status, int) else 0
 
 
-def _run(
-    scenario: "ScenarioFile",
-    out: Path,
-    duration: float | None,
-    figures: bool,
-    recording: bool,
-) -> int:
-    """Runs a scenario with progress and prints what came out; returns the exit status."""
-    from experiments.run import run_scenario
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Ends the command with one line at Ctrl-C; up to here the process has just ended."""
+    try:
+        with raised_interruption():
+            yield
+    except KeyboardInterrupt:
+        print_error("interrupted", after_echo=True)
+        raise typer.Exit(INTERRUPTED) from None
 
-    logging.getLogger("drake").setLevel(logging.ERROR)
-    console = Console()
-    with ProgressDisplay(console, scenario.name, duration) as progress:
-        outcome = run_scenario(
-            scenario,
-            out=out,
-            duration=duration,
-            figures=figures,
-            recording=recording,
-            progress=progress,
-        )
+
+def _read_duration(text: str) -> float:
+    """The value of ``--duration`` in s."""
+    seconds = float(text) if is_number(text) else math.nan
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
+    return seconds
+
+
+def _print_outcome(console: Console, outcome: "RunOutcome") -> None:
+    """What came out of a run, as far as it is no reason for concern."""
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
-    # Soft wrap: a path broken into two lines cannot be clicked.
-    console.print(f"\nOpen the report: [bold cyan]{escape(str(outcome.report))}[/]", soft_wrap=True)
-    if outcome.fault is None:
+    _print_page(console, "\nOpen the report", outcome.report)
+
+
+def _judge(outcome: "RunOutcome", out: Path, time: float) -> int:
+    """Says in one line what went wrong in a run, if anything did; returns the exit status."""
+    status, ends = 0, []
+    if outcome.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
+    if outcome.fault is not None:
+        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+    if outcome.problem is not None:
+        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
+    elif ends:
+        ends = [f"{ends[0]}, everything logged so far is kept in {out}"]
+    if ends:
+        print_error("; ".join(ends), after_echo=outcome.interrupted)
+    return status
+
+
+def _show(what: str, report: "Report") -> int:
+    """Says where a page is, or that it could not be written; returns the exit status."""
+    _print_page(Console(), f"Open the {what}", report.path)
+    if report.problem is None:
         return 0
-    _print_error(
-        f"fault: {_one_line(outcome.fault)}; stopped at t = {progress.simulated_time:.3f} s,"
-        f" everything logged so far is kept in {out}"
-    )
-    return FAULT
+    print_error(f"error: {report.problem}")
+    return NOT_WRITTEN
+
+
+def _print_page(console: Console, invitation: str, page: Path | None) -> None:
+    """Where a page is, if there is one."""
+    if page is not None:
+        # Soft wrap: a path broken into two lines cannot be clicked.
+        console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
 
 
 def _metrics_table(metrics: "Metrics") -> Table:
@@ -196,15 +241,5 @@ def _metrics_table(metrics: "Metrics") -> Table:
 
 def _fail(message: str) -> int:
     """Reports wrong input."""
-    _print_error(f"error: {_one_line(message)}")
+    print_error(f"error: {message}")
     return WRONG_INPUT
-
-
-def _print_error(line: str) -> None:
-    """One line on stderr, whatever the terminal's width."""
-    typer.echo(line, err=True)
-
-
-def _one_line(message: str) -> str:
-    """A message without line breaks."""
-    return " ".join(message.split())

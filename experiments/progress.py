@@ -57,7 +57,7 @@ class ProgressDisplay:
     def __enter__(self) -> Self:
         if self._console.is_terminal:
             self._bar = Progress(
-                SpinnerColumn(),
+                SpinnerColumn("dots" if self._console.encoding.startswith("utf") else "line"),
                 TextColumn("[bold]{task.description}"),
                 BarColumn(bar_width=None),
                 TextColumn("{task.fields[status]}"),

@@ -1,6 +1,7 @@
 """Running a path following station."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -34,24 +35,26 @@ def simulate(
     parameters: SimulationParameters,
     duration: float,
     progress: ProgressListener,
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> SimulationResult:
-    """Simulate until the end or until a controller is in its safe state.
+    """Simulate until the end, until a controller is in its safe state, or an interruption.
 
     Args:
         station: What to simulate.
-        parameters: How.
+        parameters: How; ``integrator`` names a scheme.
         duration: Simulated time [s].
         progress: Told how far the run is.
+        interrupted: Whether to stop as soon as the step that is being made is complete.
     """
     simulator = Simulator(station.diagram)
-    ApplySimulatorConfig(_configuration(parameters), simulator)
+    configure(simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
     period = station.controller.period
     last_tick, stride = int(duration / period + 1e-6), max(1, round(_CHUNK / period))
     wall, tick, fault = 0.0, 0, None
-    while root.get_time() < duration and fault is None:
+    while root.get_time() < duration and fault is None and not interrupted():
         tick += stride
         # ticks are products as in Drake's own schedule, so that rounding loses no last sample
         goal = tick * period if tick < last_tick else max(duration, last_tick * period)
@@ -66,11 +69,20 @@ def simulate(
     return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault)
 
 
-def _configuration(parameters: SimulationParameters) -> SimulatorConfig:
-    error_control = parameters.accuracy > 0.0
-    return SimulatorConfig(
-        integration_scheme=parameters.integrator,
-        max_step_size=parameters.max_step,
+def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: float = 0.0) -> None:
+    """Let a simulator integrate.
+
+    Args:
+        simulator: The simulator, not yet initialized.
+        scheme: Drake's name of the scheme.
+        max_step: Its fixed, or with error control its largest step [s].
+        accuracy: Accuracy of error control; 0 for fixed steps.
+    """
+    error_control = accuracy > 0.0
+    configuration = SimulatorConfig(
+        integration_scheme=scheme,
+        max_step_size=max_step,
         use_error_control=error_control,
-        accuracy=parameters.accuracy if error_control else 1e-6,
+        accuracy=accuracy if error_control else 1e-6,
     )
+    ApplySimulatorConfig(configuration, simulator)

@@ -1,9 +1,23 @@
 """The one error raised for input that cannot be used."""
 
+MAX_MESSAGE = 1000  # characters
+
 
 class InputError(ValueError):
     """Input from outside is wrong; raised where it enters, before anything moves.
 
     The message is one line that names the thing (file, key, parameter), its
-    value and what is allowed.
+    value and what is allowed. One of more than MAX_MESSAGE characters is
+    shortened in its middle, where the value stands.
     """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(shortened(message, MAX_MESSAGE))
+
+
+def shortened(text: str, length: int = 60) -> str:
+    """Returns a text, without its middle if it is longer than ``length`` characters."""
+    if len(text) <= length:
+        return text
+    tail = (length - 3) // 3
+    return f"{text[: length - 3 - tail]}...{text[len(text) - tail :]}"

@@ -2,20 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
-from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.robots.model import add_visible_robot
-from diagrams.scenario import RobotParameters
+from diagrams.drawing.robot_geometry import RobotDrawing
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
+from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 
 
 @dataclass(frozen=True)
@@ -36,8 +34,7 @@ class RecordedMotion:
 
 
 def build_replay(
-    robot: RobotParameters,
-    folder: FilePath,
+    robot: RobotDrawing,
     path: Path,
     layout: PathPointLayout,
     motion: RecordedMotion,
@@ -47,8 +44,7 @@ def build_replay(
     """Return a diagram that draws a recorded motion while its time advances.
 
     Args:
-        robot: Which robot.
-        folder: Where relative file names start.
+        robot: How the robot is drawn.
         path: The path.
         layout: Layout of the path points.
         motion: What to draw.
@@ -57,21 +53,16 @@ def build_replay(
     """
     _aim_camera(path, meshcat)
     builder = DiagramBuilder()
-    plant, scene_graph = add_visible_robot(builder, robot, folder)
     signals: Mapping[str, np.ndarray] = {
         "positions": motion.positions,
         "tool_pose": motion.tool_pose,
         "path_point": motion.path_point,
     }
     sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
-    to_pose = builder.AddNamedSystem("to_pose", MultibodyPositionToGeometryPose(plant))
-    builder.Connect(sources["positions"], to_pose.get_input_port())
-    builder.Connect(
-        to_pose.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id())
+    body = builder.AddNamedSystem(
+        "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     )
-    MeshcatVisualizer.AddToBuilder(
-        builder, scene_graph, meshcat, MeshcatVisualizerParams(publish_period=period)
-    )
+    builder.Connect(sources["positions"], body.GetInputPort("positions"))
     drawing = builder.AddNamedSystem(
         "path_visualizer", PathVisualizer(path, layout, meshcat, period)
     )

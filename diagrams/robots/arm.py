@@ -1,6 +1,6 @@
 """A serial arm in a diagram, whichever model moves it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -20,6 +20,7 @@ from diagrams.robots.plant_wiring import (
     connect_resistance,
     joint_state_of,
 )
+from diagrams.robots.start_posture import posture_near, posture_warnings
 from diagrams.scenario import RobotParameters, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece
@@ -46,12 +47,14 @@ class Arm(RobotPart):
         robot: The arm as the laws know it, N joints.
         coordinates: Where its coordinates stand in the state of ``model``.
         tool: Frame whose origin follows the manifold.
+        warnings: What there is to say about the model, one sentence each.
     """
 
     model: MultibodyPlant
     robot: SerialChain
     coordinates: PlantCoordinates
     tool: Frame
+    warnings: list[str] = field(default_factory=list, kw_only=True)
 
     @property
     def gravity(self) -> np.ndarray:
@@ -67,8 +70,12 @@ class Arm(RobotPart):
         self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
     ) -> np.ndarray:
         """See :class:`RobotPart`."""
-        near = _posture_near(start.posture_deg, self.robot)
+        near = posture_near(start.posture_deg, self.robot)
         return solve_pose(self.robot, y_t, R_e, near, "start")
+
+    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+        """See :class:`RobotPart`."""
+        return self.warnings + posture_warnings(start.posture_deg, self.robot, q_J, oriented)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""
@@ -207,14 +214,15 @@ def add_arm(
         workpiece: What its tool may touch, if anything.
 
     Raises:
-        InputError: If the model cannot be read, is no chain of driven joints, or its rotors are
+        InputError: If the model cannot be read, is no chain of joints, or its rotors are
             not known.
     """
     if parameters.rotor_coupling:
         return _add_coupled_arm(builder, parameters, folder, workpiece)
     if workpiece is None:
-        model = builder.AddNamedSystem("plant", read_robot(parameters, folder))
-        return MultibodyArm(model, *_chain(model, parameters))
+        model, warnings = read_robot(parameters, folder)
+        builder.AddNamedSystem("plant", model)
+        return MultibodyArm(model, *_chain(model, parameters), warnings=warnings)
     return _add_touching_arm(builder, parameters, folder, workpiece)
 
 
@@ -227,7 +235,7 @@ def _add_coupled_arm(
     coupled = parameters.rotor_coupling
     allowed = "empty where the robot touches a workpiece; the full model has no contact"
     require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
-    model = read_robot(parameters, folder)
+    model, warnings = read_robot(parameters, folder)
     chain, coordinates, tool = _chain(model, parameters)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
@@ -235,7 +243,7 @@ def _add_coupled_arm(
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(model, chain, coordinates, tool, plant)
+    return CoupledArm(model, chain, coordinates, tool, plant, warnings=warnings)
 
 
 def _add_touching_arm(
@@ -251,33 +259,16 @@ def _add_touching_arm(
         scene_graph.append(add_scene(builder, plant))
         geometries.extend(workpiece.add(plant, tool_frame(plant, parameters)))
 
-    model = read_robot(parameters, folder, workpiece.time_step, add_workpiece)
+    model, warnings = read_robot(parameters, folder, workpiece.time_step, add_workpiece)
     builder.AddNamedSystem("plant", model)
     contact = connect_scene(builder, model, scene_graph[0], geometries)
-    return MultibodyArm(model, *_chain(model, parameters), contact)
+    return MultibodyArm(model, *_chain(model, parameters), contact, warnings=warnings)
 
 
 def _chain(
     model: MultibodyPlant, parameters: RobotParameters
 ) -> tuple[SerialChain, PlantCoordinates, Frame]:
-    """Return the arm as the laws know it, every joint of which must be driven."""
+    """Return the arm as the laws know it."""
     tool = tool_frame(model, parameters)
     chain, coordinates = chain_from_plant(model, tool)
-    undriven = [n for n, a in zip(chain.names, coordinates.actuators, strict=True) if a < 0]
-    if undriven:
-        raise InputError(
-            f"robot.model: {', '.join(undriven)} without actuator; every joint needs one"
-        )
     return chain, coordinates, tool
-
-
-def _posture_near(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
-    if not posture_deg:
-        lower, upper = chain.gather("position_limits").T
-        return np.nan_to_num((lower + upper) / 2.0)
-    if len(posture_deg) != chain.dimension:
-        raise InputError(
-            f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"
-        )
-    is_angle = np.array([link.is_revolute for link in chain.links])
-    return np.where(is_angle, np.deg2rad(posture_deg), posture_deg)

@@ -1,6 +1,6 @@
 """The DELTA robot in a diagram, whichever model moves it."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -281,9 +281,10 @@ def _check(scenario: PathFollowingScenario) -> None:
     require(law == "rigid", "controller.law", law, f"rigid, {drives}")
     one = "none; one pose of the slides belongs to each position"
     require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
-    for key in ("joint_damping", "rotor_coupling"):
-        value = getattr(robot, key)
-        require(not value, f"robot.{key}", value, "none for a DELTA robot")
+    for key, none in asdict(RobotParameters()).items():
+        value = asdict(robot)[key]
+        given = key not in ("model", "tool_frame") and value != none
+        require(not given, f"robot.{key}", value, "none for a DELTA robot")
     turned = "none; a DELTA robot only translates"
     require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
     keyframes = scenario.path.orientation.keyframes

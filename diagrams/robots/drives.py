@@ -9,6 +9,7 @@ from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
 from diagrams.scenario.checks import require, require_whole_fraction
+from diagrams.scenario.simulation import AUTO
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
@@ -19,7 +20,7 @@ from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
 
 # integration schemes of fixed step that the bristles of friction are made for
-_FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
+FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 # omega h of stuck bristles whose force is read once per step, see bristles_for_step
 _BRISTLES_PER_STEP = 0.5
 
@@ -137,10 +138,11 @@ def _bristles(
             f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP
         )
     simulation = scenario.simulation
-    if simulation.accuracy == 0.0 and simulation.integrator not in _FRICTION_INTEGRATORS:
+    allowed = (AUTO, *FRICTION_INTEGRATORS)
+    if simulation.accuracy == 0.0 and simulation.integrator not in allowed:
         raise InputError(
             f"simulation.integrator = {simulation.integrator} with friction; allowed: "
-            f"{', '.join(_FRICTION_INTEGRATORS)}, or error control"
+            f"{', '.join(allowed)}, or error control"
         )
     # stiff enough for the step of the integration, or of the hold if that is shorter
     step = min(simulation.max_step, scenario.controller.sampling_time)

@@ -3,23 +3,17 @@
 from collections.abc import Callable
 from pathlib import Path as FilePath
 
-import numpy as np
-from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    ForceElementIndex,
-    Frame,
-    Joint,
-    JointIndex,
-    PrismaticSpring,
-    RevoluteSpring,
-)
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.multibody.tree import Frame, FrameIndex, JointIndex
 
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import add_models_to, resolve_model
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.joint_edits import frame_named
+from pfsc_drake.robot.models.reading import ModelOptions, read_model
+
+# of a model that are worth naming; the last are those at the tool
+_MOST_NAMES = 12
 
 
 def read_robot(
@@ -27,7 +21,7 @@ def read_robot(
     folder: FilePath,
     time_step: float = 0.0,
     before_finalizing: Callable[[MultibodyPlant], None] | None = None,
-) -> MultibodyPlant:
+) -> tuple[MultibodyPlant, list[str]]:
     """Return a plant with a robot, without the robot's geometry and in no diagram.
 
     Args:
@@ -36,78 +30,43 @@ def read_robot(
         time_step: Of the plant [s]; 0 for a continuous one.
         before_finalizing: What else is to be added to the plant.
 
+    Returns:
+        The plant, and what there is to say about the model, one sentence each.
+
     Raises:
         InputError: If the model cannot be read.
     """
     plant = MultibodyPlant(time_step)
-    _parse(plant, parameters, folder)
-    if before_finalizing is not None:
-        before_finalizing(plant)
-    plant.Finalize()
-    return plant
+    file, options = locate_model(parameters, folder), parameters.options(folder)
+    try:
+        return plant, read_model(plant, file, options, before_finalizing)
+    except InputError as error:
+        # what starts with an option is about the key of that name, what with the file about that
+        key = str(error).split(":")[0].split(".")[0]
+        if key in ModelOptions.__dataclass_fields__:
+            raise InputError(f"robot.{error}") from None
+        if str(error).startswith(str(file.parent)):
+            raise InputError(f"robot.model: {error}") from None
+        raise
 
 
-def add_visible_robot(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath
-) -> tuple[MultibodyPlant, SceneGraph]:
-    """Add a scene graph with a robot's geometry, and return it with the (unwired) plant.
+def locate_model(parameters: RobotParameters, folder: FilePath) -> FilePath:
+    """Return the file of a robot's model.
 
     Args:
-        builder: Builder of the diagram.
         parameters: Which robot.
         folder: Where relative file names start.
 
     Raises:
-        InputError: If the model cannot be read.
+        InputError: If there is no such file.
     """
-    plant = MultibodyPlant(time_step=0.0)
-    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    _parse(plant, parameters, folder)
-    plant.Finalize()
-    return plant, scene_graph
-
-
-def _parse(plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath) -> None:
-    parser = Parser(plant)
-    add_models_to(parser.package_map())
     model = parameters.model
     if FilePath(model).suffix and not model.startswith("package://"):
         model = str(folder / model)
-    file = resolve_model(model)
     try:
-        parser.AddModels(str(file))
-    except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"robot.model: {file}: cannot be read: {reason}") from None
-    if parameters.joint_damping:
-        _set_joint_damping(plant, parameters)
-
-
-def _set_joint_damping(plant: MultibodyPlant, parameters: RobotParameters) -> None:
-    """Give the sprung joints, base first, another damping ``K_d`` than the model's."""
-    inboard = {joint.child_body().index(): joint for joint in _joints(plant)}
-    springs = (
-        plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
-    )
-    sprung = [s.joint() for s in springs if isinstance(s, RevoluteSpring | PrismaticSpring)]
-
-    def depth(joint: Joint) -> int:
-        below = inboard.get(joint.parent_body().index())
-        return 0 if below is None else 1 + depth(below)
-
-    damping = parameters.joint_damping
-    if len(damping) != len(sprung):
-        raise InputError(
-            f"robot.joint_damping: {len(damping)} values; the model {parameters.model} has "
-            f"{len(sprung)} elastic joints"
-        )
-    for joint, K_d in zip(sorted(sprung, key=depth), damping, strict=True):
-        joint.set_default_damping_vector(np.array([K_d]))
-
-
-def _joints(plant: MultibodyPlant) -> list[Joint]:
-    return [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
+        return resolve_model(model)
+    except InputError as error:
+        raise InputError(f"robot.model: {error}") from None
 
 
 def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
@@ -120,8 +79,18 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
     Raises:
         InputError: If the model has no such frame.
     """
-    if not plant.HasFrameNamed(parameters.tool_frame):
+    try:
+        frame = frame_named(plant, parameters.tool_frame)
+    except InputError as error:
+        raise InputError(f"robot.tool_frame: {error}") from None
+    if frame is None:
+        frames = [plant.get_frame(FrameIndex(i)).name() for i in range(1, plant.num_frames())]
+        joints = [plant.get_joint(JointIndex(i)).name() for i in plant.GetJointIndices()]
+        # Drake's own frames at joints are not the user's
+        made = {f"{joint}_{end}" for joint in joints for end in ("parent", "child", "base")}
+        names = [name for name in frames if name and name not in made]
         raise InputError(
-            f"robot.tool_frame: the model {parameters.model} has no frame '{parameters.tool_frame}'"
+            f"robot.tool_frame: the model {parameters.model} has no frame "
+            f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
         )
-    return plant.GetFrameByName(parameters.tool_frame)
+    return frame

@@ -133,6 +133,16 @@ class RobotPart(ABC):
             InputError: If it is out of reach.
         """
 
+    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+        """Return what there is to say about the robot and its start, one sentence each.
+
+        Args:
+            start: What the scenario says of the start.
+            q_J: Joint coordinates found, shape (N,).
+            oriented: Whether the tool's orientation mattered.
+        """
+        return []
+
     @abstractmethod
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """Return the state of the model at rest, elastic joints carrying the links' weight.

@@ -1,9 +1,27 @@
 """The path of a scenario. Lengths in m, angles in degrees."""
 
 import dataclasses as dc
+import math
 from typing import Union
 
-from diagrams.scenario.checks import require, require_numbers, require_positive
+from diagrams.scenario.checks import require, require_numbers
+from pfsc_drake.geometry.size import FARTHEST, SHORTEST
+
+_LARGEST_ANGLE = 3600.0  # deg
+_SHORTEST_TOLERANCE = 1e-7  # m
+
+
+def _require_place(key: str, values: list[float]) -> None:
+    """Refuse what is no point [m] within reach of numbers."""
+    require_numbers(key, values, 3)
+    near = max(map(abs, values)) <= FARTHEST
+    require(near, key, values, f"3 numbers of at most {FARTHEST:g} m")
+
+
+def _require_length(key: str, value: float) -> None:
+    """Refuse what is no length of a path [m]."""
+    good = SHORTEST <= value <= FARTHEST
+    require(good, key, value, f"{SHORTEST:g} m to {FARTHEST:g} m")
 
 
 @dc.dataclass
@@ -11,16 +29,17 @@ class Line:
     """A straight path.
 
     Attributes:
-        start: First point [m].
-        end: Last point [m].
+        start: First point [m], at most 1e4 from the origin.
+        end: Last point [m], at least 1e-4 from the first.
     """
 
     start: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
     end: list[float] = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
 
     def __post_init__(self) -> None:
-        require_numbers("start", self.start, 3)
-        require_numbers("end", self.end, 3)
+        _require_place("start", self.start)
+        _require_place("end", self.end)
+        _require_length("distance of start and end", math.dist(self.start, self.end))
 
 
 @dc.dataclass
@@ -28,10 +47,11 @@ class Circle:
     """A circular path ``center + radius (u cos theta + v sin theta)``.
 
     Attributes:
-        center: Center [m].
-        radius: Radius [m].
-        axis_u: Direction of ``u``.
-        axis_v: Direction of ``v``.
+        center: Center [m], at most 1e4 from the origin.
+        radius: Radius [m], 1e-4 to 1e4.
+        axis_u: Direction of ``u``, of any length.
+        axis_v: Direction in the plane of the circle, at least 0.1 deg from ``u``; ``v`` is
+            its part perpendicular to ``u``. Both lengths are made one.
     """
 
     center: list[float] = dc.field(default_factory=lambda: [0.8, 0.0, 1.0])
@@ -40,8 +60,9 @@ class Circle:
     axis_v: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def __post_init__(self) -> None:
-        require_positive("radius", self.radius)
-        for key in ("center", "axis_u", "axis_v"):
+        _require_length("radius", self.radius)
+        _require_place("center", self.center)
+        for key in ("axis_u", "axis_v"):
             require_numbers(key, getattr(self, key), 3)
 
 
@@ -52,19 +73,32 @@ class BentLemniscate:
 
 @dc.dataclass
 class Waypoints:
-    """A spline through the waypoints of a CSV file, orientation included if it has one.
+    """A path through the waypoints of a CSV file, or near them; orientation included.
+
+    It is a spline through all of them, unless ``tolerance`` or ``corner_distance`` is given.
+    Columns of the file: ``x, y, z`` [m]; if it has an orientation, ``zyx_1, zyx_2, zyx_3`` or
+    ``zyz_1, ...`` [rad], ``zyx_deg_1, ...`` or ``zyz_deg_1, ...`` [deg], ``qw, qx, qy, qz``, or
+    ``r11, r12, ..., r33``; see :func:`read_waypoints`.
 
     Attributes:
         file: CSV file, relative to the scenario's folder.
         closed: Whether the path is closed.
-        parametrization: ``chord`` or ``centripetal``.
+        parametrization: ``chord`` or ``centripetal``, of a spline through all waypoints.
         smoothness: Class C^k of the spline; 0 chooses what the law needs.
+        tolerance: For noisy points: the smoothest path that misses none by more than this
+            [m]; zero goes through all of them.
+        tolerance_deg: The same of the orientation [deg], where ``tolerance`` is given.
+        corner_distance: For sparse corners: straight lines from point to point, blended up
+            to this distance from each corner [m], at most over half a line; zero for none.
     """
 
     file: str = ""
     closed: bool = False
     parametrization: str = "chord"
     smoothness: int = 0
+    tolerance: float = 0.0
+    tolerance_deg: float = 1.0
+    corner_distance: float = 0.0
 
     def __post_init__(self) -> None:
         allowed = ("chord", "centripetal")
@@ -75,6 +109,15 @@ class Waypoints:
             ", ".join(allowed),
         )
         require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
+        for key in ("tolerance", "corner_distance"):
+            value = getattr(self, key)
+            good = value == 0.0 or _SHORTEST_TOLERANCE <= value <= FARTHEST
+            allowed_lengths = f"0, or {_SHORTEST_TOLERANCE:g} m to {FARTHEST:g} m"
+            require(good, key, value, allowed_lengths)
+        both = self.tolerance > 0.0 and self.corner_distance > 0.0
+        require(not both, "corner_distance", self.corner_distance, "0 where tolerance is given")
+        good = 0.001 <= self.tolerance_deg <= 90.0
+        require(good, "tolerance_deg", self.tolerance_deg, "0.001 deg to 90 deg")
 
 
 # the first is what a shape without a tag means
@@ -87,7 +130,7 @@ class Keyframe:
 
     Attributes:
         theta: Path parameter, as a fraction of the path's domain (0..1).
-        angles_deg: Euler angles [deg], in the order of the convention's name.
+        angles_deg: Euler angles [deg], in the order of the convention's name; at most 3600.
     """
 
     theta: float = 0.0
@@ -110,7 +153,12 @@ class OrientationParameters:
     def __post_init__(self) -> None:
         require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
         for i, keyframe in enumerate(self.keyframes):
-            require_numbers(f"keyframes[{i}].angles_deg", keyframe.angles_deg, 3)
+            key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
+            require_numbers(key, angles, 3)
+            good = max(map(abs, angles)) <= _LARGEST_ANGLE
+            require(good, key, angles, f"3 numbers of at most {_LARGEST_ANGLE:g} deg")
+            good = 0.0 <= keyframe.theta <= 1.0
+            require(good, f"keyframes[{i}].theta", keyframe.theta, "0 to 1, a fraction")
 
 
 @dc.dataclass

@@ -1,12 +1,74 @@
 """Which robot a scenario is about."""
 
 import dataclasses as dc
+from pathlib import Path
 
 import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.scenario.checks import (
     require,
+    require_numbers,
 )
+from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.robot.models.elastic_joints import ElasticJoints
+from pfsc_drake.robot.models.reading import ModelOptions
+from pfsc_drake.yaml.typed import ONE_OR_MANY
+
+_FARTHEST = 1e6  # m
+_STRONGEST = 1e6  # m/s^2
+
+
+@dc.dataclass
+class PoseParameters:
+    """A pose in the world.
+
+    Attributes:
+        position: Origin [m].
+        zyx_deg: Angles about z, then the new y, then the new x [deg]:
+            ``R = Rz(a) Ry(b) Rx(c)``. Upside down is ``[0, 0, 180]``.
+    """
+
+    position: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    zyx_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    def __post_init__(self) -> None:
+        require_numbers("position", self.position, 3)
+        near = all(abs(coordinate) <= _FARTHEST for coordinate in self.position)
+        require(near, "position", self.position, f"up to {_FARTHEST:g} m")
+        require_numbers("zyx_deg", self.zyx_deg, 3)
+
+    def transform(self) -> RigidTransform:
+        """Return the pose."""
+        rotation = RotationMatrix(zyx_to_matrix(np.deg2rad(self.zyx_deg)))
+        return RigidTransform(rotation, self.position)
+
+
+@dc.dataclass
+class ElasticParameters:
+    """What becomes of the joints of a rigid model: a number for all, or a list, base first.
+
+    Attributes:
+        stiffness: ``K_s`` [Nm/rad or N/m]; ``.inf`` for joints that stay rigid.
+        damping: ``K_d`` [Nm s/rad or N s/m]; none by default.
+        rotor_inertia: Of the drives, at the motor side [kg m^2], for rigid joints too; by
+            default the model's.
+        gear_ratio: Motor revolutions per joint revolution; by default the model's.
+    """
+
+    stiffness: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    damping: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    rotor_inertia: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+    gear_ratio: list[float] = dc.field(default_factory=list, metadata=ONE_OR_MANY)
+
+    def __post_init__(self) -> None:
+        self.joints()
+
+    def joints(self) -> ElasticJoints:
+        """Return them as the library wants them."""
+        return ElasticJoints(
+            *(np.array(getattr(self, f.name), dtype=float) for f in dc.fields(self))
+        )
 
 
 @dc.dataclass
@@ -14,8 +76,18 @@ class RobotParameters:
     """Which robot.
 
     Attributes:
-        model: Name of a shipped model, a ``package://`` URI, or an SDF/URDF file.
+        model: Name of a shipped model, a ``package://`` URI, or an SDF, URDF or MJCF file.
+            Joints that the model does not drive (a URDF without ``<transmission>``) are driven
+            up to their effort limit.
         tool_frame: Frame of the model whose origin follows the path.
+        base: Frame of the model that is welded to the world; by default the root link, if the
+            model leaves it floating.
+        base_pose: Where that frame stands.
+        gravity: Gravitational acceleration [m/s^2].
+        fixed_joints: Joints that do not move, and where they stand [rad or m].
+        packages: Folders of packages that the model refers to (``package://name/``). Packages
+            above the model's folder and in ROS_PACKAGE_PATH are found without.
+        elastic: Elastic joints and rotors in a model without.
         joint_damping: ``K_d`` of its elastic joints, base first [Nm s/rad or N s/m]; empty for
             the model's.
         rotor_coupling: Name of a shipped robot, or YAML file with robot parameters, that says
@@ -26,10 +98,37 @@ class RobotParameters:
 
     model: str = "comau_racer_1_4"
     tool_frame: str = "tool_point"
+    base: str = ""
+    base_pose: PoseParameters = dc.field(default_factory=PoseParameters)
+    gravity: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, -9.81])
+    fixed_joints: dict[str, float] = dc.field(default_factory=dict)
+    packages: dict[str, str] = dc.field(default_factory=dict)
+    elastic: ElasticParameters = dc.field(default_factory=ElasticParameters)
     joint_damping: list[float] = dc.field(default_factory=list)
     rotor_coupling: str = ""
 
     def __post_init__(self) -> None:
+        require_numbers("gravity", self.gravity, 3)
+        bearable = all(abs(component) <= _STRONGEST for component in self.gravity)
+        require(bearable, "gravity", self.gravity, f"up to {_STRONGEST:g} m/s^2")
+        for name, value in self.fixed_joints.items():
+            require(bool(np.isfinite(value)), f"fixed_joints.{name}", value, "a finite number")
         damping = self.joint_damping
         valid = all(np.isfinite(K_d) and K_d >= 0.0 for K_d in damping)
         require(valid, "joint_damping", damping, "finite numbers, none negative")
+
+    def options(self, folder: Path) -> ModelOptions:
+        """Return what is to be made of the model.
+
+        Args:
+            folder: Where relative folder names start.
+        """
+        return ModelOptions(
+            self.base,
+            self.base_pose.transform(),
+            np.array(self.gravity, dtype=float),
+            self.fixed_joints,
+            {name: folder / path for name, path in self.packages.items()},
+            self.elastic.joints(),
+            self.joint_damping,
+        )

@@ -53,7 +53,8 @@ class PathFollowingScenario:
         start: Where it starts.
         simulation: How it is integrated.
         forces: Wrenches on the tool over time.
-        hand: An operator's hand on the tool, in addition to the forces; none without the block.
+        hand: An operator's hand on the tool, in addition to the forces; none without the block
+            or with ``hand: null``.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
         friction: Friction of the joints.

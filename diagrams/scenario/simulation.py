@@ -10,6 +10,9 @@ from diagrams.scenario.checks import (
     require_positive,
 )
 
+# the integrator that is chosen for a robot before it runs
+AUTO = "auto"
+
 
 @dc.dataclass
 class SensorFailureParameters:
@@ -29,21 +32,23 @@ class SimulationParameters:
     """How the plant is integrated.
 
     Attributes:
-        integrator: Drake's name of the integration scheme.
+        integrator: Drake's name of the integration scheme; ``auto`` for the cheapest one that is
+            stable and whose error over the first tenths of a second, against a step five times
+            shorter, stays below 1e-6 (rad, m).
         max_step: Largest step [s].
         accuracy: Accuracy of error control; 0 for fixed steps.
         frame_period: Time between the frames of the recording [s].
         sensor_failure: A sensor that fails on the way.
     """
 
-    integrator: str = "runge_kutta5"
+    integrator: str = AUTO
     max_step: float = 1e-3
     accuracy: float = 0.0
     frame_period: float = 0.032
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
 
     def __post_init__(self) -> None:
-        schemes = GetIntegrationSchemes()
+        schemes = [AUTO, *GetIntegrationSchemes()]
         require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
         require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
         require_positive("frame_period", self.frame_period)

@@ -9,6 +9,7 @@ from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
 from diagrams.tasks.task import Task
 from pfsc_drake.physics.force_profile import ForceProfile
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 
@@ -27,7 +28,7 @@ def add_surroundings(
         part: The robot.
         task: What it is to do.
         scenario: The scenario.
-        ports: ``joint_state``, the true one, ``tool_pose``, ``manifold_point``.
+        ports: ``joint_state``, the true one, ``manifold_point``.
 
     Returns:
         ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there.
@@ -39,7 +40,10 @@ def add_surroundings(
     sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
     wrenches = []
     if part.contact is not None:
-        builder.Connect(ports["tool_pose"], part.contact.GetInputPort("tool_pose"))
+        # the law's own pose is what encoders make of it, or that of the motors
+        view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
+        builder.Connect(ports["joint_state"], view.GetInputPort("joint_state"))
+        builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
         wrenches.append(part.contact.GetOutputPort("wrench"))
     if sources:
         total = _sum(builder, "wrench", sources)

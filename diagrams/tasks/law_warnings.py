@@ -62,7 +62,9 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
     if parameters.law != "singular_perturbation":
         return []
     damping = np.array(parameters.boundary_layer_damping)
-    rate = float(np.max(robot.K_s * damping * parameters.sampling_time / robot.D_M))
+    # rigid joints among elastic ones have nothing to damp
+    stiffness = np.where(np.isfinite(robot.K_s), robot.K_s, 0.0)
+    rate = float(np.max(stiffness * damping * parameters.sampling_time / robot.D_M))
     if rate <= _FASTEST_DAMPING * (1.0 + 1e-9):
         return []
     return [

@@ -1,5 +1,6 @@
 """The path of a scenario."""
 
+import math
 from pathlib import Path as FilePath
 from typing import Literal, cast
 
@@ -23,23 +24,28 @@ from pfsc_drake.geometry import (
     OrientationCurve,
     Path,
     PiecewisePolynomialCurve,
+    Tolerance,
     interpolate_orientation,
     path_from_waypoints,
     read_waypoints,
     zyx_to_quaternion,
     zyz_to_quaternion,
 )
+from pfsc_drake.geometry.paths.smoothing import Progress
 
 _EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
-def make_path(parameters: PathParameters, law: str, folder: FilePath) -> Path:
+def make_path(
+    parameters: PathParameters, law: str, folder: FilePath, progress: Progress | None = None
+) -> Path:
     """Return the path, smooth enough for the law.
 
     Args:
         parameters: What the scenario says.
         law: Key of ``RELATIVE_DEGREE``; decides the class C^(r+1) of splines.
         folder: Where relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
         InputError: If the path cannot be made or is not smooth enough.
@@ -47,21 +53,62 @@ def make_path(parameters: PathParameters, law: str, folder: FilePath) -> Path:
     smoothness = RELATIVE_DEGREE[law] + 1
     shape = parameters.shape
     if isinstance(shape, Waypoints):
-        table = read_waypoints(folder / shape.file)
-        path = path_from_waypoints(
-            table,
-            smoothness=shape.smoothness or smoothness,
-            closed=shape.closed,
-            parametrization=cast(Literal["chord", "centripetal"], shape.parametrization),
-        )
-        if parameters.orientation.keyframes:
-            orientation = _orientation(parameters.orientation, path.position, smoothness)
-            path = Path(path.position, orientation)
+        path = _through_waypoints(parameters, shape, smoothness, folder, progress)
     else:
         position = _position(shape)
         path = Path(position, _orientation(parameters.orientation, position, smoothness))
     path.require_smoothness(smoothness, f"the law '{law}'")
     return path
+
+
+def require_orientation(path: Path, num_joints: int) -> None:
+    """Refuse a path without orientation for a robot whose joints need one.
+
+    Args:
+        path: The path.
+        num_joints: Of the robot.
+
+    Raises:
+        InputError: If six joints have no orientation to follow.
+    """
+    if num_joints == 6 and path.orientation is None:
+        raise InputError(
+            f"path: {num_joints} joints for 3 outputs (position only); give the orientation too: "
+            "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
+            "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+        )
+
+
+def _through_waypoints(
+    parameters: PathParameters,
+    shape: Waypoints,
+    smoothness: int,
+    folder: FilePath,
+    progress: Progress | None,
+) -> Path:
+    keyframes = parameters.orientation.keyframes
+    table = read_waypoints(folder / shape.file, progress)
+    if keyframes and table.quaternions is not None:
+        raise InputError(
+            f"path.orientation.keyframes: {len(keyframes)} given, and {shape.file} has columns "
+            "of orientation too: leave out the keyframes or the columns"
+        )
+    tolerance = None
+    if shape.tolerance > 0.0:
+        tolerance = Tolerance(shape.tolerance, math.radians(shape.tolerance_deg))
+    path = path_from_waypoints(
+        table,
+        smoothness=shape.smoothness or smoothness,
+        closed=shape.closed,
+        parametrization=cast(Literal["chord", "centripetal"], shape.parametrization),
+        tolerance=tolerance,
+        corner_distance=shape.corner_distance or None,
+        progress=progress,
+    )
+    if not keyframes:
+        return path
+    orientation = _orientation(parameters.orientation, path.position, smoothness)
+    return Path(path.position, orientation, waypoints=path.waypoints)
 
 
 def _position(shape: BentLemniscate | Circle | Line) -> Curve:

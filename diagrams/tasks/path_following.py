@@ -9,19 +9,22 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.scenario import PathFollowingScenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.path import make_path
+from diagrams.tasks.path_warnings import closing_gap, path_warnings
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.geometry import quaternion_to_matrix, shape_report, zyx_to_matrix
+from pfsc_drake.geometry.paths.smoothing import Progress
 from pfsc_drake.geometry.paths.target import PathTarget
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint
 
 # m, between the points of the way along the path
 _SPACING = 2e-3
+_LOOKS_CLOSED = "; it ends where it starts: if it is to go round, write path.shape.closed: true"
 
 
 class PathTask(Task):
@@ -30,15 +33,23 @@ class PathTask(Task):
     Args:
         scenario: The scenario.
         folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
         InputError: If the path or the motion along it cannot be made.
     """
 
-    def __init__(self, scenario: PathFollowingScenario, folder: FilePath) -> None:
+    def __init__(
+        self,
+        scenario: PathFollowingScenario,
+        folder: FilePath,
+        progress: Progress | None = None,
+    ) -> None:
         reference = scenario.reference
         self._scenario, law = scenario, scenario.controller.law
-        self.path = make_path(scenario.path, law, folder)
+        self.path = make_path(scenario.path, law, folder, progress)
+        self.shape = shape_report(self.path)
+        self.warnings = path_warnings(self.path, self.shape)
         self.relative_degree = RELATIVE_DEGREE[law]
         oriented = self.path.orientation is not None
         self.place = PathManifold(self.relative_degree, oriented=oriented)
@@ -53,13 +64,18 @@ class PathTask(Task):
 
     def _check_points(self, points: list[float]) -> None:
         """Refuse arc lengths off the ends of an open path."""
-        rounding = 1e-9 * self.path.length
         for eta in points:
-            if not self.path.closed and not -rounding <= eta <= self.path.length + rounding:
+            if not self._is_on_path(eta):
+                closed = closing_gap(self.path) is not None
                 raise InputError(
                     f"reference.points: {eta:g} m; the path is open and "
-                    f"{self.path.length:.6g} m long"
+                    f"{self.path.length:.6g} m long{_LOOKS_CLOSED if closed else ''}"
                 )
+
+    def _is_on_path(self, eta: float) -> bool:
+        """Return whether an arc length is on the path, up to its very ends but for rounding."""
+        rounding = 1e-9 * self.path.length
+        return self.path.closed or -rounding <= eta <= self.path.length + rounding
 
     def add_place(
         self,
@@ -112,16 +128,20 @@ class PathTask(Task):
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
         """See :class:`Task`."""
-        inside = self.path.closed or 0.0 <= coordinates[0] <= self.path.length
         allowed = f"eta from 0 to {self.path.length:.6g} m"
-        require(inside, key, coordinates.tolist(), allowed)
+        require(self._is_on_path(coordinates[0]), key, coordinates.tolist(), allowed)
 
 
 class TrajectoryTask(PathTask):
     """Classical tracking of a point that moves along the path with time (Sec. 3.8.4)."""
 
-    def __init__(self, scenario: PathFollowingScenario, folder: FilePath) -> None:
-        super().__init__(scenario, folder)
+    def __init__(
+        self,
+        scenario: PathFollowingScenario,
+        folder: FilePath,
+        progress: Progress | None = None,
+    ) -> None:
+        super().__init__(scenario, folder, progress)
         oriented = self.path.orientation is not None
         self.manifold = MovingPoint(self.relative_degree, oriented=oriented)
 
@@ -145,14 +165,17 @@ class TrajectoryTask(PathTask):
 TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}
 
 
-def make_task(scenario: PathFollowingScenario, folder: FilePath) -> Task:
+def make_task(
+    scenario: PathFollowingScenario, folder: FilePath, progress: Progress | None = None
+) -> Task:
     """Return what a scenario's tool is to do.
 
     Args:
         scenario: The scenario.
         folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
         InputError: If the path or the motion along it cannot be made.
     """
-    return TASKS[scenario.controller.manifold](scenario, folder)
+    return TASKS[scenario.controller.manifold](scenario, folder, progress)

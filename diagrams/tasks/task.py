@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.geometry import Path, PiecewisePolynomialCurve
+from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.systems.control.path_projector import PathProjector
 
@@ -50,12 +50,16 @@ class Task(ABC):
         place: Manifold in whose coordinates the tool's true place is told.
         manifold: Manifold that the law makes linear.
         motion: First coordinate of the reference over time, of dimension 1.
+        shape: Numbers of the path that decide whether it can be followed.
+        warnings: What is out of proportion in it, one sentence each.
     """
 
     path: Path
     place: PathManifold
     manifold: Manifold
     motion: PiecewisePolynomialCurve
+    shape: ShapeReport
+    warnings: list[str]
 
     @abstractmethod
     def add_place(

@@ -1,11 +1,13 @@
 """Shipped scenarios: finding and listing them, quickly, without importing Drake."""
 
 import difflib
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.reading import read_yaml
+from pfsc_drake.yaml.text_file import find_status
 
 SCENARIO_DIRECTORY = Path(__file__).resolve().parents[1] / "scenarios"
 
@@ -46,18 +48,33 @@ def find_scenario(name_or_path: str, directory: Path = SCENARIO_DIRECTORY) -> Pa
     names = scenario_names(directory)
     if name_or_path in names:
         return directory / f"{name_or_path}.yaml"
-    path = Path(name_or_path).expanduser()
-    if path.is_file():
-        return path
+    path = expand_home(Path(name_or_path))
+    status = find_status(path)
+    is_folder = status is not None and stat.S_ISDIR(status.st_mode)
+    if status is not None and not is_folder:
+        return path  # reading says what is wrong with a pipe or a device
     if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
-        reason = "is a folder" if path.is_dir() else "no such file"
-        raise InputError(f"scenario file {name_or_path}: {reason}")
+        reason = "is a folder" if is_folder else "no such file"
+        raise InputError(f"scenario file {shortened(name_or_path, 200)}: {reason}")
     nearest = difflib.get_close_matches(name_or_path, names, n=1, cutoff=0.5)
     hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    wanted = shortened(repr(name_or_path))
     raise InputError(
-        f"unknown scenario {name_or_path!r}: {hint}available: {', '.join(names) or 'none'},"
+        f"unknown scenario {wanted}: {hint}available: {', '.join(names) or 'none'},"
         " or the path of a YAML file"
     )
+
+
+def expand_home(path: Path) -> Path:
+    """Path with its leading ``~`` or ``~user`` replaced by the home folder.
+
+    Raises:
+        InputError: If there is no such home.
+    """
+    try:
+        return path.expanduser()
+    except RuntimeError:
+        raise InputError(f"{path}: no home folder is known for {path.parts[0]}") from None
 
 
 def list_scenarios(directory: Path = SCENARIO_DIRECTORY) -> list[CatalogEntry]:

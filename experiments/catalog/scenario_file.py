@@ -1,12 +1,16 @@
 """Reading a scenario file: YAML with typed mappings, and ``--set`` overrides on top."""
 
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.catalog.scenario_catalog import find_scenario
-from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.reading import parse_yaml, read_yaml
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.reading import MAX_DEPTH, parse_yaml, read_yaml
+
+_MAX_PATH = 4096  # characters
 
 __all__ = ["ScenarioFile", "find_scenario", "load_scenario_data", "read_scenario"]
 
@@ -25,8 +29,14 @@ class ScenarioFile:
 
     @property
     def name(self) -> str:
-        """Key ``name`` of the file, else the file's name without suffix."""
-        return str(self.data.get("name", self.path.stem))
+        """Key ``name`` of the file, else the file's name without suffix, as text."""
+        stem = os.fsencode(self.path.stem).decode("utf-8", "replace")
+        return str(self.data.get("name", stem))
+
+    def inputs(self) -> list[Path]:
+        """Returns the file itself and every path that a text in it may stand for."""
+        folder = self.path.parent
+        return [self.path, *(folder / text for text in _texts(self.data))]
 
 
 def read_scenario(name_or_path: str, overrides: list[str]) -> ScenarioFile:
@@ -58,13 +68,27 @@ def load_scenario_data(path: Path, overrides: list[str]) -> dict[str, Any]:
     return data
 
 
+def _texts(data: Any) -> Iterator[str]:
+    """All texts in data that a name of a file could be."""
+    if isinstance(data, str) and len(data) <= _MAX_PATH:
+        yield data
+    elif isinstance(data, dict):
+        for value in data.values():
+            yield from _texts(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _texts(value)
+
+
 def _apply_override(data: dict[str, Any], override: str) -> None:
     """Sets one ``key.path=value`` in place."""
-    source = f"--set {override}"
+    source = f"--set {shortened(override, 100)}"
     path, separator, text = override.partition("=")
     keys = path.strip().split(".")
     if not separator or not all(keys):
         raise InputError(f"{source}: malformed; allowed: key.path=value")
+    if len(keys) > MAX_DEPTH:
+        raise InputError(f"{source}: {len(keys)} levels; allowed: up to {MAX_DEPTH}")
     value = parse_yaml(text, source)
     target: Any = data
     for depth, key in enumerate(keys):
@@ -86,7 +110,7 @@ def _place(target: Any, key: str, here: str) -> str | int:
     if isinstance(target, dict):
         return key
     if not isinstance(target, list):
-        raise InputError(f"{here} is {target!r} and has no key {key!r}")
+        raise InputError(f"{here} is {shortened(repr(target))} and has no key {key!r}")
     if not key.isdecimal() or int(key) >= len(target):
         allowed = f"0 to {len(target) - 1}" if target else "none, it is empty"
         raise InputError(f"{here} is a list, {key!r} is no index of it; allowed: {allowed}")

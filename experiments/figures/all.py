@@ -1,7 +1,6 @@
 """The figures of a path following run, chosen by the signals that its log has."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import matplotlib
 
@@ -21,29 +20,19 @@ from experiments.figures.drives import (
 from experiments.figures.forces import draw_forces, has_forces
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
-from experiments.figures.style import STYLE, Drawing, Figure, save_canvas
+from experiments.figures.style import STYLE, Drawing, Figure, render
 from experiments.results.run_log import FloatArray, RunLog
 
 
-def write_figures(log: RunLog, path_points: FloatArray, directory: Path) -> list[Figure]:
-    """Writes all figures that the log has signals for.
+def render_figures(log: RunLog, path_points: FloatArray) -> list[Figure]:
+    """Returns all figures that the log has signals for, in the order of the report.
 
     Args:
         log: Of a path following run.
         path_points: [k, 3] m, points of the path in order, in the frame of ``y_t``.
-        directory: Folder for the PNG files; created if missing.
-
-    Returns:
-        The figures in the order of the report.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    figures = []
     with matplotlib.rc_context(STYLE):
-        for drawing in draw_figures(log, path_points):
-            path = directory / f"{drawing.name}.png"
-            save_canvas(drawing.canvas, path)
-            figures.append(Figure(path, drawing.title, drawing.caption))
-    return figures
+        return [render(drawing) for drawing in draw_figures(log, path_points)]
 
 
 def draw_figures(log: RunLog, path_points: FloatArray) -> Iterator[Drawing]:

@@ -1,7 +1,7 @@
-"""How the project's figures look: colours, sizes, grid, panels, and the file a figure becomes."""
+"""How the project's figures look: colours, sizes, grid, panels, and the picture of each."""
 
 from dataclasses import dataclass
-from pathlib import Path
+from io import BytesIO
 from typing import Any
 
 import matplotlib
@@ -66,17 +66,19 @@ STYLE: Any = {  # Any: matplotlib's own type of the keys changes with its versio
 
 @dataclass
 class Figure:
-    """A figure as written.
+    """A figure as a picture.
 
     Attributes:
-        path: PNG file.
+        name: Of its file, without suffix.
         title: A few words.
         caption: What to see in it, one or two sentences.
+        png: The picture.
     """
 
-    path: Path
+    name: str
     title: str
     caption: str
+    png: bytes
 
 
 @dataclass
@@ -256,12 +258,9 @@ def _text_width(text: str, size: float, weight: str = "normal") -> float:
     return float(TextPath((0.0, 0.0), text, size=size, prop=font).get_extents().width)
 
 
-def save_canvas(canvas: Canvas, path: Path) -> None:
-    """Writes a canvas as PNG.
-
-    Args:
-        canvas: To write.
-        path: PNG file.
-    """
-    canvas.align_ylabels()
-    canvas.savefig(path, dpi=DPI, facecolor="white")
+def render(drawing: Drawing) -> Figure:
+    """Returns the picture of a drawing."""
+    drawing.canvas.align_ylabels()
+    picture = BytesIO()
+    drawing.canvas.savefig(picture, format="png", dpi=DPI, facecolor="white")
+    return Figure(drawing.name, drawing.title, drawing.caption, picture.getvalue())

@@ -9,15 +9,18 @@ import numpy as np
 from experiments.figures.style import (
     COLOURS,
     STYLE,
+    Drawing,
     Figure,
     make_panels,
     place_legend,
-    save_canvas,
+    render,
 )
-from experiments.pages.report import write_report
+from experiments.pages.report import Report, report_page, write_report
+from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
 from experiments.results.run_log import RunLog
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import read_text
 
 _COMPARED = (
     "max_path_deviation",
@@ -26,9 +29,10 @@ _COMPARED = (
     "max_orientation_error",
     "max_external_force",
 )
+_NEEDED = ("xi", "eta", "eta_p")
 
 
-def write_comparison(folders: Sequence[Path], out: Path) -> Path:
+def write_comparison(folders: Sequence[Path], out: Path) -> Report:
     """Write a page that shows what differs between runs.
 
     Args:
@@ -39,11 +43,12 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
         The page.
 
     Raises:
-        InputError: If a folder holds no run, or fewer than two are given.
+        InputError: If a folder holds no run, or fewer than two are given, or ``out`` cannot take
+            the page (see :func:`experiments.results.folder.open_results`).
     """
     if len(folders) < 2:
         raise InputError(f"compare: {len(folders)} run given; two or more are needed")
-    logs = {folder.name: RunLog.read(folder / "log.h5") for folder in folders}
+    logs = {folder.name: _read_log(folder / "log.h5") for folder in folders}
     if len(logs) < len(folders):
         raise InputError("compare: the folders' names must differ; they are the runs' names here")
     metrics = Metrics()
@@ -52,30 +57,38 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
         for name in _COMPARED:
             if name in own:
                 metrics.add(f"{folder.name}: {name}", own[name].value, own[name].unit)
-    pictures = out / "figures"
-    pictures.mkdir(parents=True, exist_ok=True)
-    figures = [_deviations(logs, pictures)]
-    if all("angles_e" in log for log in logs.values()):
-        figures.append(_orientations(logs, pictures))
-    if all("orientation_lead" in log for log in logs.values()):
-        figures.append(_leads(logs, pictures))
-    if all("wrench_ext" in log for log in logs.values()):
-        figures.append(_forces(logs, pictures))
-    first = next(iter(logs.values()))
-    return write_report(
-        out,
-        title=" against ".join(logs),
-        description="The same motion, side by side.",
-        scenario_yaml_text="\n---\n".join(
-            (folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders
-        ),
-        metrics=metrics,
-        figures=figures,
-        log_attributes={k: v for k, v in first.attributes.items() if k != "scenario"},
-    )
+    scenarios = [read_text(folder / "scenario.yaml") for folder in folders]
+    inputs = [folder / name for folder in folders for name in ("log.h5", "metrics.json")]
+    with open_results(out, "comparison", inputs) as results:
+        figures = [_deviations(logs)]
+        if all("angles_e" in log for log in logs.values()):
+            figures.append(_orientations(logs))
+        if all("orientation_lead" in log for log in logs.values()):
+            figures.append(_leads(logs))
+        if all("wrench_ext" in log for log in logs.values()):
+            figures.append(_forces(logs))
+        first = next(iter(logs.values()))
+        page = report_page(
+            title=" against ".join(logs),
+            description="The same motion, side by side.",
+            scenario_yaml_text="\n---\n".join(scenarios),
+            metrics=metrics,
+            figures=figures,
+            log_attributes={k: v for k, v in first.attributes.items() if k != "scenario"},
+        )
+        return write_report(results, figures, page)
 
 
-def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
+def _read_log(path: Path) -> RunLog:
+    """A log with the signals that are compared."""
+    log = RunLog.read(path)
+    for name in _NEEDED:
+        if name not in log:
+            raise InputError(f"{path}: has no signal {name!r}; allowed: the log of a run")
+    return log
+
+
+def _deviations(logs: dict[str, RunLog]) -> Figure:
     with plt.rc_context(STYLE):
         canvas, (above, below) = make_panels(2)
         for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
@@ -86,12 +99,11 @@ def _deviations(logs: dict[str, RunLog], folder: Path) -> Figure:
         above.set(title="Distance from the path", ylabel="distance in mm")
         below.set(title="Error along the path", ylabel="error in mm")
         place_legend(above)
-        save_canvas(canvas, folder / "deviations.png")
-    caption = "Distance from the path and error along it."
-    return Figure(folder / "deviations.png", "Deviations", caption)
+        caption = "Distance from the path and error along it."
+        return render(Drawing("deviations", "Deviations", caption, canvas))
 
 
-def _leads(logs: dict[str, RunLog], folder: Path) -> Figure:
+def _leads(logs: dict[str, RunLog]) -> Figure:
     caption = (
         "Angle between the orientation that each law asks for and the one that belongs to the "
         "tool's place on the path: zero where the reference waits."
@@ -101,11 +113,11 @@ def _leads(logs: dict[str, RunLog], folder: Path) -> Figure:
         logs,
         "angle in deg",
         "Reference orientation ahead of the tool's place",
-        Figure(folder / "orientation_lead.png", "Waiting or running on", caption),
+        ("orientation_lead", "Waiting or running on", caption),
     )
 
 
-def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:
+def _forces(logs: dict[str, RunLog]) -> Figure:
     caption = "Size of the force that acts on the tool, not what the sensor makes of it."
     return _draw_one(
         {
@@ -115,25 +127,28 @@ def _forces(logs: dict[str, RunLog], folder: Path) -> Figure:
         logs,
         "force in N",
         "Force on the tool",
-        Figure(folder / "forces.png", "Forces", caption),
+        ("forces", "Forces", caption),
     )
 
 
 def _draw_one(
-    signals: dict[str, np.ndarray], logs: dict[str, RunLog], ylabel: str, title: str, figure: Figure
+    signals: dict[str, np.ndarray],
+    logs: dict[str, RunLog],
+    ylabel: str,
+    title: str,
+    named: tuple[str, str, str],
 ) -> Figure:
-    """Draw one signal of every run in one panel, into the figure's file."""
+    """Draw one signal of every run in one panel; ``named`` are name, title, caption."""
     with plt.rc_context(STYLE):
         canvas, (panel,) = make_panels(1)
         for colour, (name, values) in zip(COLOURS, signals.items(), strict=False):
             panel.plot(logs[name].time, values, color=colour, label=name)
         panel.set(title=title, ylabel=ylabel)
         place_legend(panel)
-        save_canvas(canvas, figure.path)
-    return figure
+        return render(Drawing(*named, canvas))
 
 
-def _orientations(logs: dict[str, RunLog], folder: Path) -> Figure:
+def _orientations(logs: dict[str, RunLog]) -> Figure:
     with plt.rc_context(STYLE):
         canvas, panels = make_panels(3)
         for i, (panel, axis) in enumerate(zip(panels, "zyx", strict=True)):
@@ -146,9 +161,8 @@ def _orientations(logs: dict[str, RunLog], folder: Path) -> Figure:
                     panel.plot(log.time, angle, style, color=colour, label=f"{name}, {what}")
             panel.set(title=f"Angle about {axis}", ylabel="angle in deg")
         place_legend(panels[0], columns=2)
-        save_canvas(canvas, folder / "orientations.png")
-    caption = (
-        "Tool and the reference that each law compares it with. With path following the "
-        "reference waits while the tool is held back; with trajectory tracking it runs on."
-    )
-    return Figure(folder / "orientations.png", "Orientation", caption)
+        caption = (
+            "Tool and the reference that each law compares it with. With path following the "
+            "reference waits while the tool is held back; with trajectory tracking it runs on."
+        )
+        return render(Drawing("orientations", "Orientation", caption, canvas))

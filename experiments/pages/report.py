@@ -1,14 +1,16 @@
 """The report of a run: one self-contained HTML page."""
 
 import base64
-import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
 from experiments.figures.style import Figure
+from experiments.results.folder import ResultsFolder
+from experiments.results.manifest import FIGURES
 from experiments.results.metrics import Metric, Metrics
 from experiments.results.units import NARROW_SPACE, format_quantity
 
@@ -18,46 +20,69 @@ MAX_CARDS = 8
 _SYMBOLS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥"}
 
 
-def write_report(
-    directory: Path,
+@dataclass
+class Report:
+    """A report as written.
+
+    Attributes:
+        path: The page to open; None if it could not be written.
+        problem: What could not be written, or None; see ``ResultsFolder.explain_problems``.
+    """
+
+    path: Path | None
+    problem: str | None
+
+
+def write_report(results: ResultsFolder, figures: Sequence[Figure], page: str) -> Report:
+    """Writes a page and its figures.
+
+    Args:
+        results: Folder of the results.
+        figures: In reading order.
+        page: From :func:`report_page`.
+    """
+    for figure in figures:
+        results.write(f"{FIGURES}/{figure.name}.png", figure.png)
+    path = results.write("report.html", page)
+    return Report(path, results.explain_problems())
+
+
+def report_page(
     title: str,
     description: str,
     scenario_yaml_text: str,
     metrics: Metrics,
     figures: Sequence[Figure],
     log_attributes: Mapping[str, str],
-    recording: Path | None = None,
+    recording: str | None = None,
     fault: str | None = None,
+    interrupted: bool = False,
     warnings: Sequence[str] = (),
     diagram_svg: str | None = None,
-) -> Path:
-    """Writes ``report.html``; figures and diagram are inside, only the recording is beside it.
+) -> str:
+    """Returns the page; figures and diagram are inside, only the recording is beside it.
 
     Args:
-        directory: Folder of the run; created if missing.
         title: Name of the scenario.
         description: What was run, plain text.
         scenario_yaml_text: The scenario as resolved.
         metrics: All of them. Those with a target become cards, or the first few if none has one.
-        figures: In reading order; their files must exist.
+        figures: In reading order.
         log_attributes: What identifies the run, see :mod:`experiments.results.provenance`.
-        recording: Meshcat page, linked by its path relative to ``directory``.
+        recording: Path of the Meshcat page, relative to this one.
         fault: Why the run was stopped; None if it completed.
+        interrupted: Whether the user stopped it.
         warnings: What may not have gone as well as hoped, one sentence each.
         diagram_svg: The block diagram as SVG text.
-
-    Returns:
-        Path of the page.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    page = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         title=escape(title),
         description=escape(description.strip()),
-        badges=_badges(metrics, fault),
+        badges=_badges(metrics, fault, interrupted),
         fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
         warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
         cards=_cards(metrics),
-        recording=_recording(recording, directory),
+        recording=_recording(recording),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
         table=_table(metrics),
         details=_details(scenario_yaml_text, diagram_svg),
@@ -66,9 +91,6 @@ def write_report(
             for name, value in log_attributes.items()
         ),
     )
-    path = directory / "report.html"
-    path.write_text(page, encoding="utf-8")
-    return path
 
 
 def _section(heading: str, content: str) -> str:
@@ -76,13 +98,12 @@ def _section(heading: str, content: str) -> str:
     return f"<section>\n<h2>{heading}</h2>\n{content}\n</section>" if content else ""
 
 
-def _badges(metrics: Metrics, fault: str | None) -> str:
+def _badges(metrics: Metrics, fault: str | None, interrupted: bool) -> str:
     """How the run ended, and how many targets were met."""
-    status = (
-        '<span class="badge bad">✗ stopped by fault</span>'
-        if fault
-        else '<span class="badge good">✓ completed</span>'
-    )
+    kind, end = ("bad", "✗ interrupted") if interrupted else ("good", "✓ completed")
+    if fault:
+        kind, end = "bad", "✗ stopped by fault"
+    status = f'<span class="badge {kind}">{end}</span>'
     verdicts = [metric.passed for metric in metrics.values() if metric.passed is not None]
     if not verdicts:
         return status
@@ -149,7 +170,7 @@ def _mark(metric: Metric) -> str:
 
 def _figure(figure: Figure) -> str:
     """A figure, inside the page."""
-    encoded = base64.b64encode(figure.path.read_bytes()).decode("ascii")
+    encoded = base64.b64encode(figure.png).decode("ascii")
     return (
         f'<figure><div class="sheet"><img src="data:image/png;base64,{encoded}"'
         f' alt="{escape(figure.title)}"></div>'
@@ -158,11 +179,11 @@ def _figure(figure: Figure) -> str:
     )
 
 
-def _recording(recording: Path | None, directory: Path) -> str:
+def _recording(recording: str | None) -> str:
     """The recording in a frame, with a link for a window of its own."""
     if recording is None:
         return ""
-    link = quote(Path(os.path.relpath(recording, directory)).as_posix())
+    link = quote(recording)
     return _section(
         "Recording",
         f'<figure><iframe src="{link}" title="Recording of the robot" loading="lazy"'

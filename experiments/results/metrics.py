@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import read_text
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -90,13 +91,13 @@ class Metrics(UserDict[str, Metric]):
         self[name].source = source or self[name].source
 
     def write(self, path: Path) -> None:
-        """Writes flat JSON ``name: {value, unit, target?, source?}``; NaN and infinity are null.
+        """Writes the metrics, see :meth:`to_json`, to a file, which is replaced if it exists."""
+        path.write_text(self.to_json(), encoding="utf-8")
 
-        Args:
-            path: File to write; its directory must exist.
-        """
+    def to_json(self) -> str:
+        """Returns flat JSON ``name: {value, unit, target?, source?}``; NaN, infinity are null."""
         flat = {name: _to_json(metric) for name, metric in self.items()}
-        path.write_text(json.dumps(flat, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        return json.dumps(flat, indent=2, allow_nan=False) + "\n"
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -112,9 +113,11 @@ class Metrics(UserDict[str, Metric]):
             InputError: If the file cannot be read or is no such file.
         """
         try:
-            flat = json.loads(path.read_text(encoding="utf-8"))
+            flat = json.loads(read_text(path))
             return cls({name: _from_json(entry) for name, entry in flat.items()})
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except InputError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise InputError(f"{path}: not a readable metrics file: {error!r}") from None
 
 

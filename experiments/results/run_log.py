@@ -1,6 +1,8 @@
 """The log of one run: named signals over time, kept in one HDF5 file."""
 
+import stat
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Self
 
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import find_status
 
 FloatArray = NDArray[np.float64]
 
@@ -108,15 +111,19 @@ class RunLog:
         return signal
 
     def write(self, path: Path) -> None:
-        """Writes the log as HDF5.
+        """Writes the log, see :meth:`to_hdf5`, to a file, which is replaced if it exists."""
+        path.write_bytes(self.to_hdf5())
+
+    def to_hdf5(self) -> bytes:
+        """Returns the log as the content of an HDF5 file.
+
+        It is made in memory: HDF5 itself cannot be relied on to say that a disk is full.
 
         Dataset ``t`` [s] and one dataset [samples, dim] per signal with attributes ``unit``,
         ``labels`` and, where known, ``limits``; ``attributes`` become the root's attributes.
-
-        Args:
-            path: File to write; its directory must exist. An existing file is replaced.
         """
-        with h5py.File(path, "w") as file:
+        content = BytesIO()
+        with h5py.File(content, "w") as file:
             file.attrs.update(self.attributes)
             file.create_dataset("t", data=self.time).attrs["unit"] = "s"
             for name, signal in self.signals.items():
@@ -127,6 +134,7 @@ class RunLog:
                 dataset.attrs.create("labels", signal.labels, dtype=h5py.string_dtype())
                 if signal.limits is not None:
                     dataset.attrs["limits"] = signal.limits
+        return content.getvalue()
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -141,6 +149,9 @@ class RunLog:
         Raises:
             InputError: If the file cannot be read or is not such a log.
         """
+        status = find_status(path)
+        if status is None or not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path}: no such file; allowed: the log of a run (HDF5)")
         try:
             with h5py.File(path, "r") as file:
                 signals = {

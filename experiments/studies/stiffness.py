@@ -12,8 +12,9 @@ from matplotlib.figure import Figure as Canvas
 from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
-from experiments.figures.style import COLOURS, STYLE, WIDTH, Figure, save_canvas
-from experiments.pages.report import write_report
+from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
+from experiments.pages.report import Report, report_page, write_report
+from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
 from experiments.results.provenance import standard_attributes
 from experiments.run import run_scenario
@@ -39,6 +40,18 @@ _STIFF, _STIFF_STEP = 3e5, 2e-4
 _SAMPLING_TIME, _DAMPING_PER_SAMPLE = 1e-3, 0.3
 # slower than the scenario, so that the softest joints can follow
 _MOTION = ("reference.velocity=0.5", "reference.acceleration=1.0", "reference.points=[0.96, 0.6]")
+
+_DESCRIPTION = (
+    "The path of pfc_elastic_3r at 0.5 m/s with joints of rising stiffness, 1 ms control. "
+    "The joints have no damping. The elastic law is the best while the joint resonances "
+    "stay below about one radian per sampling interval. The visco-elastic law is nearly "
+    "as good, on undamped joints too, and stays so above, for it asks of the joint torque "
+    "only what it can reach within the sampling interval. The singular perturbation law "
+    "needs stiff joints, and K_s epsilon D_b T_s / D_M at most 0.3. The rigid law acts on "
+    "the motors and leaves the joints' deflection uncontrolled. The law for velocity "
+    "servos needs joints that are fast against it; what remains at high stiffness is the "
+    "servos' lag."
+)
 
 # of the picture's height, where the crosses of each law are
 _CROSSES_TOP, _CROSSES_STEP = 0.985, 0.03
@@ -78,7 +91,7 @@ def write_study(
     progress: Callable[[str], None],
     laws: Sequence[str] = LAWS,
     stiffnesses: Sequence[float] = STIFFNESS,
-) -> Path:
+) -> Report:
     """Run all laws on all stiffnesses and write a page.
 
     Args:
@@ -89,7 +102,34 @@ def write_study(
 
     Returns:
         The page.
+
+    Raises:
+        InputError: If ``out`` cannot take the page (see
+            :func:`experiments.results.folder.open_results`); nothing has been run then.
     """
+    with open_results(out, "study") as results:
+        points = _run_all(progress, laws, stiffnesses)
+        metrics = Metrics()
+        for point in points:
+            name = f"{point.law}, K_s1 = {point.stiffness:.3g} Nm/rad"
+            metrics.add(name, point.deviation, "m", source=point.fault)
+        results.write("metrics.json", metrics.to_json())
+        figures = [_picture(points, laws)]
+        page = report_page(
+            title="Which law when",
+            description=_DESCRIPTION,
+            scenario_yaml_text="\n".join(_MOTION),
+            metrics=metrics,
+            figures=figures,
+            log_attributes=standard_attributes("which law when"),
+        )
+        return write_report(results, figures, page)
+
+
+def _run_all(
+    progress: Callable[[str], None], laws: Sequence[str], stiffnesses: Sequence[float]
+) -> list[StudyPoint]:
+    """Run all laws on all stiffnesses."""
     points = []
     with TemporaryDirectory() as folder:
         for stiffness in stiffnesses:
@@ -101,31 +141,7 @@ def write_study(
                 points.append(point)
                 result = point.fault or f"{point.deviation * 1e3:.3g} mm"
                 progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
-    metrics = Metrics()
-    for point in points:
-        name = f"{point.law}, K_s1 = {point.stiffness:.3g} Nm/rad"
-        metrics.add(name, point.deviation, "m", source=point.fault)
-    (out / "figures").mkdir(parents=True, exist_ok=True)
-    metrics.write(out / "metrics.json")
-    return write_report(
-        out,
-        title="Which law when",
-        description=(
-            "The path of pfc_elastic_3r at 0.5 m/s with joints of rising stiffness, 1 ms control. "
-            "The joints have no damping. The elastic law is the best while the joint resonances "
-            "stay below about one radian per sampling interval. The visco-elastic law is nearly "
-            "as good, on undamped joints too, and stays so above, for it asks of the joint torque "
-            "only what it can reach within the sampling interval. The singular perturbation law "
-            "needs stiff joints, and K_s epsilon D_b T_s / D_M at most 0.3. The rigid law acts on "
-            "the motors and leaves the joints' deflection uncontrolled. The law for velocity "
-            "servos needs joints that are fast against it; what remains at high stiffness is the "
-            "servos' lag."
-        ),
-        scenario_yaml_text="\n".join(_MOTION),
-        metrics=metrics,
-        figures=[_picture(points, laws, out / "figures" / "deviation.png")],
-        log_attributes=standard_attributes("which law when"),
-    )
+    return points
 
 
 def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:
@@ -172,11 +188,13 @@ def _run(
         recording=False,
         progress=_Quiet(),
     )
+    if outcome.interrupted:
+        raise KeyboardInterrupt
     deviation = np.nan if outcome.fault else outcome.metrics["max_path_deviation"].value
     return StudyPoint(law, stiffness, resonance, deviation, outcome.fault)
 
 
-def _picture(points: Sequence[StudyPoint], laws: Sequence[str], path: Path) -> Figure:
+def _picture(points: Sequence[StudyPoint], laws: Sequence[str]) -> Figure:
     with plt.rc_context(STYLE):
         canvas = Canvas(figsize=(WIDTH, 5.5))
         panel = canvas.subplots()
@@ -198,10 +216,8 @@ def _picture(points: Sequence[StudyPoint], laws: Sequence[str], path: Path) -> F
         panel.set_xlabel("stiffness of axis 1 in Nm/rad, other axes in proportion")
         panel.set_ylabel("largest distance from the path in mm")
         panel.legend()
-        save_canvas(canvas, path)
-    return Figure(
-        path,
-        "Deviation against stiffness",
-        "Crosses: stopped by a fault. Above the picture the fastest joint resonance, and the "
-        "angle that it turns in one sampling interval of 1 ms.",
-    )
+        caption = (
+            "Crosses: stopped by a fault. Above the picture the fastest joint resonance, and the "
+            "angle that it turns in one sampling interval of 1 ms."
+        )
+        return render(Drawing("deviation", "Deviation against stiffness", caption, canvas))

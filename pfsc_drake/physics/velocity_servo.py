@@ -113,10 +113,10 @@ def joint_inertia(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
 
 
 class VelocityServoLaw:
-    """PI velocity control of the joints with gravity feed-forward, which closes (3.48).
+    """PI velocity control of the joints with feed-forward, which closes (3.48).
 
-    With the gravity torque ``g`` at the present joint coordinates and the integral part
-    ``x`` [Nm], at every tick::
+    With the known load ``g`` - gravity at the present joint coordinates, and what viscous
+    damping takes - and the integral part ``x`` [Nm], at every tick::
 
         u     = g(q_J) + K_w v_ref - K_p v_M + x
         tau_d = sat(u)
@@ -156,18 +156,18 @@ class VelocityServoLaw:
         return np.clip(gravity - braking, -self.limits, self.limits)
 
     def torque(
-        self, v: np.ndarray, v_ref: np.ndarray, gravity: np.ndarray, x: np.ndarray
+        self, v: np.ndarray, v_ref: np.ndarray, load: np.ndarray, x: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the drive torque and the next integral part, each (N,) [Nm].
 
         Args:
             v: Velocity of the motors [rad/s], shape (N,).
             v_ref: Reference velocity [rad/s], shape (N,).
-            gravity: ``g(q_J)`` [Nm], shape (N,).
+            load: ``g``, the known load [Nm], shape (N,).
             x: Integral part [Nm], shape (N,).
         """
         gains = self.gains
-        u = gravity + gains.reference * v_ref - gains.proportional * v + x
+        u = load + gains.reference * v_ref - gains.proportional * v + x
         tau_d = np.clip(u, -self.limits, self.limits)
         realizable = v_ref + (tau_d - u) / gains.reference
         return tau_d, x + gains.integral * gains.period * (realizable - v)

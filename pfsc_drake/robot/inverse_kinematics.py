@@ -8,6 +8,9 @@ from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 _TOLERANCE = 1e-9
 _RESTARTS = 30
+# limits of this magnitude are none [rad or m]
+UNLIMITED = 1e6
+_STEPS = 100  # of one attempt; one that succeeds needs about ten
 
 
 def solve_pose(
@@ -32,7 +35,8 @@ def solve_pose(
     jacobian = pose.factory("jacobian", ["q"], ["jac:pose:q"])
     target = np.concatenate([y_t, np.zeros(9) if R_e is None else np.ravel(R_e)])
     used = slice(0, 3 if R_e is None else 12)
-    lower, upper = robot.gather("position_limits").T
+    limits = robot.gather("position_limits")
+    lower, upper = np.where(np.abs(limits) < UNLIMITED, limits, np.copysign(np.inf, limits)).T
 
     def residual(q: np.ndarray) -> np.ndarray:
         return np.array(pose(q)).ravel()[used] - target[used]
@@ -55,6 +59,7 @@ def solve_pose(
             xtol=1e-15,
             ftol=1e-15,
             gtol=1e-15,
+            max_nfev=_STEPS,
         )
         error = float(np.max(np.abs(solution.fun)))
         if error < _TOLERANCE:

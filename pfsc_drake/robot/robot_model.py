@@ -27,6 +27,16 @@ class RobotModel(Protocol):
         return bool(np.isfinite(self.K_s).all())
 
     @property
+    def is_rigid(self) -> bool:
+        """Whether no joint has a finite stiffness."""
+        return not np.isfinite(self.K_s).any()
+
+    @property
+    def viscous_damping(self) -> np.ndarray:
+        """Damping of the joints' own bearings at the drives, shape (N,) [Nm s/rad or N s/m]."""
+        return self.gather("viscous_damping")
+
+    @property
     def D_M(self) -> np.ndarray:
         """Rotor inertias reflected to the joint side, shape (N,)."""
         return self.gather("reflected_inertia")

@@ -3,16 +3,22 @@
 A mapping with a tag, ``!Circle {radius: 1}``, is held as Drake holds it, with the tag as one more
 key: ``{"radius": 1, "_tag": "!Circle"}``. Drake itself is not imported: it is slow to import and,
 of a key that is there twice, keeps the second without a word.
+
+A document may have MAX_NODES values and keys once its aliases are copies, and MAX_DEPTH levels;
+both are counted before anything is copied.
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.text_file import read_text
 
 TAG_KEY = "_tag"
+MAX_NODES = 100_000
+MAX_DEPTH = 100
 
 
 class _Loader(yaml.SafeLoader):
@@ -48,15 +54,11 @@ def read_yaml(path: Path) -> dict[str, Any]:
         The data.
 
     Raises:
-        InputError: if the file is unreadable, not UTF-8, invalid YAML or no mapping, or holds a key
-            twice. One line that names the file and, where there is one, the line in it.
+        InputError: if the file is unreadable (see :func:`pfsc_drake.yaml.text_file.read_text`),
+            no mapping, or refused by :func:`parse_yaml`. One line that names the file and, where
+            there is one, the line in it.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(f"{path}: cannot be read: {reason}") from None
-    data = parse_yaml(text, str(path))
+    data = parse_yaml(read_text(path), str(path))
     if not isinstance(data, dict):
         kind = "empty" if data is None else f"a {type(data).__name__}"
         raise InputError(f"{path}: the root is {kind}; allowed: a mapping of keys to values")
@@ -73,26 +75,27 @@ def parse_yaml(text: str, source: str) -> Any:
         source: name of the text, for messages.
 
     Raises:
-        InputError: if the text is invalid or holds a key twice; one line.
+        InputError: if the text is invalid, holds a key twice, is too large or too deep once its
+            aliases are copies, or holds characters that no name of a file can have; one line.
     """
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
-        _refuse_duplicate_keys(node, source)
+        if node is not None:
+            _NodeCheck(source).check(node)
         return None if node is None else _without_sharing(loader.construct_document(node))
     except InputError:
         raise
     except RecursionError:
-        reason = "an alias (*name) contains itself, or nesting is deep"
-        raise InputError(f"{source}: {reason}") from None
+        raise InputError(f"{source}: {_TOO_DEEP}") from None
     except yaml.MarkedYAMLError as error:
         problem = error.problem or "not YAML"
         if problem.startswith("expected a mapping node, but found"):
             problem = "a !Tag needs a mapping after it, e.g. !Tag {}"
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
         raise InputError(f"{source}: invalid YAML in line {line}: {problem}") from None
-    except (yaml.YAMLError, ValueError, KeyError, AttributeError) as error:
-        # PyYAML lets the others than YAMLError out of e.g. 2020-02-31, !!bool x, !!timestamp x.
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError) as error:
+        # PyYAML lets the others than YAMLError out of e.g. 2020-02-31, !!bool x, !!int "".
         raise InputError(f"{source}: invalid YAML: {' '.join(str(error).split())}") from None
 
 
@@ -101,22 +104,67 @@ def dump_yaml(data: Any) -> str:
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False)
 
 
-def _refuse_duplicate_keys(node: yaml.Node | None, source: str) -> None:
-    """Raises InputError at the first key that a mapping holds twice."""
-    children: list[yaml.Node] = []
-    if isinstance(node, yaml.MappingNode):
+_TOO_DEEP = f"nested too deeply; allowed: up to {MAX_DEPTH} levels"
+
+
+class _NodeCheck:
+    """Refuses what YAML allows and data cannot be; visits what aliases share only once."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._sizes: dict[int, tuple[int, int]] = {}  # nodes and levels, by identity of the node
+        self._open: set[int] = set()
+
+    def check(self, node: yaml.Node) -> tuple[int, int]:
+        """Returns how many nodes and levels a node has once its aliases are copies."""
+        key = id(node)
+        if key in self._open:
+            self._refuse(node, "an alias (*name) contains itself")
+        if key not in self._sizes:
+            self._open.add(key)
+            self._sizes[key] = self._measure(node)
+            self._open.remove(key)
+        return self._sizes[key]
+
+    def _measure(self, node: yaml.Node) -> tuple[int, int]:
+        """Counts the nodes of a node whose children have been checked."""
+        children: list[yaml.Node] = []
+        if isinstance(node, yaml.ScalarNode):
+            self._check_text(node)
+        elif isinstance(node, yaml.MappingNode):
+            self._refuse_duplicate_keys(node)
+            children = [child for pair in node.value for child in pair]
+        elif isinstance(node, yaml.SequenceNode):
+            children = node.value
+        sizes = [self.check(child) for child in children]
+        total = 1 + sum(size for size, _ in sizes)
+        depth = 1 + max((depth for _, depth in sizes), default=0)
+        if total > MAX_NODES:
+            what = f"{total} values and keys, with aliases (*name) written out"
+            self._refuse(node, f"{shortened(what, 100)}; allowed: up to {MAX_NODES}")
+        if depth > MAX_DEPTH:
+            self._refuse(node, _TOO_DEEP)
+        return total, depth
+
+    def _refuse_duplicate_keys(self, node: yaml.MappingNode) -> None:
+        """Raises InputError at the first key that a mapping holds twice."""
         seen: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
                 if key.value in seen:
                     where = f"a second time in line {key.start_mark.line + 1}"
-                    raise InputError(f"{source}: key {key.value!r} appears {where}")
+                    name = shortened(repr(key.value))
+                    raise InputError(f"{self._source}: key {name} appears {where}")
                 seen.add(key.value)
-        children = [value for _, value in node.value]
-    elif isinstance(node, yaml.SequenceNode):
-        children = node.value
-    for child in children:
-        _refuse_duplicate_keys(child, source)
+
+    def _check_text(self, node: yaml.ScalarNode) -> None:
+        """Raises InputError at a character that neither files nor their names can have."""
+        if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in node.value):
+            text = shortened(ascii(node.value))
+            self._refuse(node, f"{text} holds a NUL or half a character; allowed: text")
+
+    def _refuse(self, node: yaml.Node, reason: str) -> NoReturn:
+        raise InputError(f"{self._source}: line {node.start_mark.line + 1}: {reason}")
 
 
 def _without_sharing(data: Any) -> Any:

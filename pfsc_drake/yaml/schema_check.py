@@ -4,6 +4,8 @@ import collections.abc
 import dataclasses
 import difflib
 import math
+import re
+import sys
 import types
 import typing
 from pathlib import Path
@@ -11,10 +13,19 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.reading import TAG_KEY
 
 REQUIRED = {"required": True}  # metadata of a field whose key may not be left out
+
+# Text that is a number: YAML 1.1 reads 1e-3 as text. Python's float() would take more, '1_0' or
+# digits of other scripts.
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
+_INTEGER = re.compile(r"[-+]?[0-9]{1,19}")
+_LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
+_MAX_INTEGER = 2**63 - 1
+_MAX_NUMBER = sys.float_info.max
 
 _SCALAR_NAMES: dict[Any, str] = {
     bool: "true or false",
@@ -53,7 +64,7 @@ class _Checker:
             self._check_dataclass(schema, value, key)
         elif schema in _SCALAR_NAMES:
             if not _is_scalar(schema, value):
-                self._refuse(value, key, _expected(schema))
+                self._refuse(value, key, _expected(schema) + _range(schema, value))
         elif schema is np.ndarray:
             self._check_array(value, key)
         elif origin in (typing.Union, types.UnionType):
@@ -139,8 +150,8 @@ class _Checker:
         for index, item in enumerate(value):
             if isinstance(item, list):
                 self._check_array(item, f"{key}[{index}]")
-            elif not _is_scalar(float, item):
-                self._refuse(item, f"{key}[{index}]", _expected(float))
+            else:
+                self.check(float, item, f"{key}[{index}]")
 
     def _refuse(self, value: Any, key: str, expected: str) -> NoReturn:
         """Raises the error of a value that does not fit."""
@@ -154,21 +165,36 @@ def _is_scalar(schema: Any, value: Any) -> bool:
     if schema is bool:
         return kind is bool or value in ("true", "false")
     if schema is int:
-        return kind is int or _parses(int, value) or (kind is float and value.is_integer())
+        if kind is float:
+            return value.is_integer() and abs(value) <= _MAX_INTEGER
+        whole = kind is int or (kind is str and bool(_INTEGER.fullmatch(value)))
+        return whole and abs(int(value)) <= _MAX_INTEGER
     if schema is float:
-        return (kind in (int, float) or _parses(float, value)) and not math.isnan(float(value))
+        return kind in (int, float, str) and is_number(value)
     return schema in (str, Path) and kind is str
 
 
-def _parses(kind: type, value: Any) -> bool:
-    """Whether text is a number of this kind; YAML 1.1 reads ``1e-3`` as text."""
-    if not isinstance(value, str):
-        return False
+def is_number(value: float | str) -> bool:
+    """Whether a number, or text that is one, fits a float; infinity does, NaN does not."""
+    if isinstance(value, str) and not _NUMBER.fullmatch(value):
+        return bool(_INFINITY.fullmatch(value))
     try:
-        kind(value)
-    except ValueError:
+        number = float(value)
+    except OverflowError:
         return False
-    return True
+    # text beyond the largest float is read as infinite, which is not what it says
+    return not math.isnan(number) and not (isinstance(value, str) and math.isinf(number))
+
+
+def _range(schema: Any, value: Any) -> str:
+    """What numbers a field allows, where a number was refused for its size."""
+    if isinstance(value, str):
+        beyond = bool((_NUMBER if schema is float else _LONG_INTEGER).fullmatch(value))
+    else:
+        beyond = type(value) is int or (type(value) is float and value.is_integer())
+    if schema is float and beyond:
+        return f" of magnitude up to {_MAX_NUMBER:.2g}"
+    return f" of magnitude up to {_MAX_INTEGER}" if schema is int and beyond else ""
 
 
 def _is_required(field: "dataclasses.Field[Any]") -> bool:
@@ -214,5 +240,9 @@ def _shown(value: Any) -> str:
         return "empty (null)"
     if isinstance(value, bool):
         return str(value).lower()
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
+        return f"an integer of {value.bit_length()} bits"
+    try:
+        return shortened(repr(value))
+    except ValueError:  # an integer inside, of more digits than Python writes
+        return f"a {type(value).__name__}"

@@ -7,6 +7,7 @@ after.
 """
 
 import dataclasses
+import typing
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +15,9 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml, read_yaml
 from pfsc_drake.yaml.schema_check import REQUIRED, check_schema
 
-__all__ = ["REQUIRED", "load_file", "load_typed"]
+__all__ = ["ONE_OR_MANY", "REQUIRED", "load_file", "load_typed"]
+
+ONE_OR_MANY = {"one_or_many": True}  # metadata of a list whose only item may be given without list
 
 Schema = TypeVar("Schema")
 
@@ -53,6 +56,7 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
     """
     from pydrake.common.yaml import yaml_load_typed
 
+    data = _listed(schema_class, data)
     check_schema(schema_class, data, source)
     try:
         result = yaml_load_typed(schema=schema_class, data=dump_yaml(data))
@@ -62,6 +66,19 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
         raise InputError(f"{source}: {' '.join(str(error).split())}") from None
     _validate(result, source, "")
     return result
+
+
+def _listed(schema: Any, data: Any) -> Any:
+    """Returns data in which single items stand in lists where the schema allows them without."""
+    if not (dataclasses.is_dataclass(schema) and isinstance(data, dict)):
+        return data
+    hints, listed = typing.get_type_hints(schema), dict(data)
+    for field in dataclasses.fields(schema):
+        if field.name in data:
+            item = data[field.name]
+            single = field.metadata.get("one_or_many") and isinstance(item, (int, float, str))
+            listed[field.name] = [item] if single else _listed(hints[field.name], item)
+    return listed
 
 
 def _validate(value: Any, source: str, key: str) -> None:

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
+from experiments.integration import choose_integration
+from experiments.simulation import configure
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
 
@@ -20,14 +22,8 @@ def test_closed_loop(benchmark, name):
     with compiled_when_bound():
         station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
-    ApplySimulatorConfig(
-        SimulatorConfig(
-            integration_scheme=scenario.simulation.integrator,
-            max_step_size=scenario.simulation.max_step,
-            use_error_control=False,
-        ),
-        simulator,
-    )
+    integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
+    configure(simulator, integration.scheme, integration.step)
     root = simulator.get_mutable_context()
 
     def restart():

@@ -34,11 +34,14 @@ class Robot:
     Nothing in here uses the chain's own kinematics and dynamics.
     """
 
-    def __init__(self, model, joint_damping=()):
+    def __init__(self, model, joint_damping=(), drive_damping=()):
         self.plant = MultibodyPlant(0.0)
         Parser(self.plant).AddModels(str(resolve_model(model)))
         for i, damping in enumerate(joint_damping):
             self.plant.GetJointByName(f"flex_{i + 1}").set_default_damping(damping)
+        drive = "motor" if self.plant.HasJointNamed("motor_1") else "joint"
+        for i, damping in enumerate(drive_damping):
+            self.plant.GetJointByName(f"{drive}_{i + 1}").set_default_damping(damping)
         self.plant.Finalize()
         self.tool = self.plant.GetFrameByName("tool_point")
         self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
@@ -102,8 +105,8 @@ class Robot:
 @pytest.fixture(scope="session")
 def load_robot():
     @cache
-    def load(model, joint_damping=()):
-        return Robot(model, joint_damping)
+    def load(model, joint_damping=(), drive_damping=()):
+        return Robot(model, joint_damping, drive_damping)
 
     return load
 

@@ -20,7 +20,7 @@ class Arm:
 
     def __init__(self, model: str) -> None:
         parameters = RobotParameters(model)
-        self.plant: MultibodyPlant = read_robot(parameters, Path())
+        self.plant: MultibodyPlant = read_robot(parameters, Path())[0]
         self.tool = tool_frame(self.plant, parameters)
         self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
         self.n = self.chain.dimension

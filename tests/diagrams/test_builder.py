@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, LawGains
+from diagrams.scenario import ForcePulse, GainParameters, LawGains
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 
@@ -150,6 +150,21 @@ def test_torque_is_held_from_the_tick_on(station):
     drive = signals["law"][:, station.law.layout.drive]
     np.testing.assert_array_equal(held, drive[1:])
     assert np.all(np.abs(np.diff(drive, axis=0)).max(axis=1) > 1e-6)  # it does change
+
+
+def test_a_force_is_held_like_the_torque(settings):
+    """Between the ticks it is that of the tick before, though it swells."""
+    push = ForcePulse(0.0, 1.0, np.array([10.0, 20.0, -30.0]), ramp=0.02)
+    settings.forces = [push]
+    station = build_station(settings, Path())
+    simulator, root = start(station)
+    plant = station.part.plant
+    for tick in (3, 7, 12):
+        simulator.AdvanceTo((tick + 0.6) * 1e-3)
+        port = plant.get_applied_spatial_force_input_port()
+        (force,) = port.Eval(plant.GetMyContextFromRoot(root))
+        got = force.F_Bq_W.translational()
+        np.testing.assert_allclose(got, push.at(tick * 1e-3)[:3], rtol=1e-12)
 
 
 def test_log_holds_every_signal(station):

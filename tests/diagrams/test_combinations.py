@@ -20,7 +20,9 @@ from diagrams.scenario import (
 from diagrams.scenario.notch import BallParameters, NotchParameters
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.inverse_kinematics import solve_pose
 from pfsc_drake.systems.physics.delta_plant import DeltaPlant
 
 STIFFNESS = 500.0
@@ -75,6 +77,26 @@ def test_the_sensor_of_a_delta_robot_takes_off_the_load_while_it_moves(delta):
     moving = np.abs(log["wrench_measured"][times > 0.15, :3])
     assert np.abs(np.diff(log["joint_state"][:, 3:6], axis=0)).max() > 1e-4
     assert moving.max() < 0.1
+
+
+def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_borne(delta):
+    """The sensor bears what it bears; the load's share can no longer be taken off."""
+    delta.compliance = soft()
+    delta.simulation.sensor_failure.time = 0.0505
+    delta.simulation.sensor_failure.component = 1
+    station = build_station(delta, SCENARIO_DIRECTORY)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.AdvanceTo(0.06)
+    times, log = station.log.read(root)
+    lost = times > 0.0505
+    np.testing.assert_array_equal(log["sensor_fault"][:, 0] == SensorFault.NOT_FINITE, lost)
+    assert not log["wrench_measured"][lost].any()
+    sensor = station.diagram.GetSubsystemByName("force_torque_sensor")
+    load = sensor.GetOutputPort("load").Eval(sensor.GetMyContextFromRoot(root))
+    weight = station.robot.parameters.masses.load * 9.81
+    assert np.linalg.norm(load[:3]) == pytest.approx(weight, rel=0.05)
 
 
 def test_a_hand_leads_a_delta_robot(delta):
@@ -134,6 +156,40 @@ def test_an_arm_runs_in_a_notch(arm_in_a_notch):
     assert force.max() > 0.5
     difference = log["wrench_measured"][later, :3] - log["wrench_ext"][later, :3]
     assert np.abs(difference).mean() < 0.3
+
+
+def test_the_contacts_torque_is_about_the_true_tool_point(arm_in_a_notch):
+    """Encoders of 300 increments are wrong by millimetres; contact is where it is."""
+    arm_in_a_notch.encoders.link_increments = [300.0]
+    station = build_station(arm_in_a_notch, SCENARIO_DIRECTORY)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    # 2 mm are free
+    station.place_robot(root, shifted(station, np.array([0.0023, 0.0, 0.0])))
+    simulator.AdvanceTo(1e-3)
+    log, plant = station.log.read(root)[1], station.part.plant
+    context = plant.GetMyContextFromRoot(root)
+    y_t = station.part.tool.CalcPoseInWorld(context).translation()
+    assert np.linalg.norm(log["tool_pose"][-1, :3] - y_t) > 1e-3
+    contact = plant.get_contact_results_output_port().Eval(context).hydroelastic_contact_info(0)
+    there = contact.F_Ac_W().Shift(y_t - contact.contact_surface().centroid())
+    # on the tool, whichever of the two it is
+    sign = np.sign(there.translational() @ log["wrench_ext"][-1, :3])
+    assert np.linalg.norm(there.translational()) > 0.1
+    expected = sign * np.concatenate([there.translational(), there.rotational()])
+    np.testing.assert_allclose(log["wrench_ext"][-1], expected, rtol=0, atol=1e-12)
+
+
+def shifted(station, shift):
+    """Return the state of the plant at rest with the tool shifted from the start."""
+    plant, part = station.part.plant, station.part
+    context = plant.CreateDefaultContext()
+    plant.SetPositionsAndVelocities(context, station.initial_state)
+    X_WT = part.tool.CalcPoseInWorld(context)
+    near = (part.coordinates.link_rows @ station.initial_state)[: part.robot.dimension]
+    q = solve_pose(part.robot, X_WT.translation() + shift, X_WT.rotation().matrix(), near, "here")
+    return part.state_at_rest(q)
 
 
 def test_the_ball_of_an_arm_is_at_its_tool_point(arm_in_a_notch):

@@ -21,9 +21,11 @@ class Outcome:
     """What a run hands back."""
 
     fault: str | None = None
-    report: Path = Path("somewhere/report.html")
+    report: Path | None = Path("somewhere/report.html")
     metrics: Metrics = field(default_factory=Metrics)
     warnings: list[str] = field(default_factory=list)
+    interrupted: bool = False
+    problem: str | None = None
 
 
 class FakeRun:
@@ -126,6 +128,33 @@ def test_interrupt(fake_run, scenario, capsys):
     assert error_line(capsys) == "interrupted\n"
 
 
+def test_interrupted_run_that_is_kept(fake_run, scenario, tmp_path, capsys):
+    fake_run.outcome.interrupted = True
+    assert main(["run", str(scenario), "--out", str(tmp_path / "out")]) == 130
+    line = error_line(capsys)
+    assert line.startswith("interrupted at t = 1.000 s, everything logged so far is kept in")
+
+
+@pytest.mark.parametrize("fault", [None, "singular"])
+def test_results_that_could_not_be_written(fake_run, scenario, capsys, fault):
+    fake_run.outcome.problem = "cannot write log.h5 into out: No space left on device; lost"
+    fake_run.outcome.report, fake_run.outcome.fault = None, fault
+    assert main(["run", str(scenario)]) == 4
+    captured = capsys.readouterr()
+    assert "Open the report" not in captured.out
+    assert captured.err.count("\n") == 1
+    assert "error: cannot write log.h5 into out: No space left on device; lost" in captured.err
+    assert ("fault: singular" in captured.err) == (fault is not None)
+    assert "everything logged so far is kept" not in captured.err
+
+
+def test_home_is_found(fake_run, scenario, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["run", "~/my_run.yaml", "--out", "~/results"]) == 0
+    ((loaded, out, *_),) = fake_run.calls
+    assert (loaded.path, out) == (scenario, tmp_path / "results")
+
+
 def test_other_exceptions_are_not_hidden(fake_run, scenario):
     fake_run.raises = ZeroDivisionError()
     with pytest.raises(ZeroDivisionError):
@@ -143,7 +172,11 @@ def test_other_exceptions_are_not_hidden(fake_run, scenario):
         (["run", "FILE", "--duration", "0"], "--duration 0: allowed: a positive number"),
         (["run", "FILE", "--duration", "inf"], "--duration inf: allowed"),
         (["run", "FILE", "--set", "a"], "--set a: malformed"),
-        (["run", "FILE", "--out", "FILE"], "is a file; allowed: a folder"),
+        (["run", "FILE", "--duration", "1_0"], "--duration 1_0: allowed"),
+        (["run", "FILE", "--duration", "\u0661"], "--duration \u0661: allowed"),
+        (["run", "FILE", "--duration", "1e400"], "--duration 1e400: allowed"),
+        (["run", "FILE", "--out", "~nobody_has_this_name/x"], "no home folder is known for ~nob"),
+        (["run", "~nobody_has_this_name/x.yaml"], "no home folder is known for ~nobody"),
         (["run", "none.yaml"], "scenario file none.yaml: no such file"),
         (["run", "zzz"], "unknown scenario 'zzz'"),
     ],

@@ -57,7 +57,7 @@ def path():
 def make_law(arm):
     """Return the rigid law of the arm with poles at -20."""
 
-    def make(integral=0.0, law="rigid"):
+    def make(integral=0.0, law="rigid", limit=2000.0):
         options = ActuationOptions(1e-3)
         linearization = linearize(
             arm.chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=False), options
@@ -70,7 +70,7 @@ def make_law(arm):
             linearization,
             stabilization,
             DecouplingInverse(1e-3),
-            limits=np.full(3, 2000.0),
+            limits=np.full(3, limit),
             max_alpha=0.8,
             safe_state=SafeState(np.full(3, 30.0)),
         )

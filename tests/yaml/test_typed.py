@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pfsc_drake import InputError
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import REQUIRED, load_file, load_typed
+from pfsc_drake.yaml.typed import ONE_OR_MANY, REQUIRED, load_file, load_typed
 
 
 @dataclass
@@ -128,6 +130,20 @@ def test_defaults_stay_where_keys_are_missing():
             "{name: x, controller: {period: fast}}",
             "key 'controller.period' is 'fast': expected a number",
         ),
+        ("{name: x, controller: {period: '1_0'}}", "is '1_0': expected a number"),
+        ("{name: x, controller: {period: \u0661\u0662}}", "'\u0661\u0662': expected a number"),
+        ("{name: x, controller: {gains: {order: '\u0662'}}}", "expected an integer"),
+        (f"{{name: x, limit: 1{'0' * 400}}}", "expected a number of magnitude up to 1.8e+308"),
+        ("{name: x, limit: 1e400}", "is '1e400': expected a number of magnitude up to 1.8e+308"),
+        (f"{{name: x, limit: 0x{'f' * 5000}}}", "is an integer of 20000 bits: expected a number"),
+        (f"{{name: x, mixed: -1{'0' * 400}}}", "expected a number or text"),
+        (f"{{name: x, start: [1{'0' * 400}]}}", "'start[0]' is an integer of 1329 bits: expected"),
+        (f"{{name: x, start: 0x{'f' * 5000}}}", "expected a list of numbers"),
+        (f"{{name: x, figures: [0x{'f' * 5000}]}}", "is a list: expected true or false"),
+        (
+            f"{{name: x, controller: {{gains: {{order: {2**63}}}}}}}",
+            "is an integer of 64 bits: expected an integer of magnitude up to 9223372036854775807",
+        ),
         ("{name: x, controller: {period: true}}", "'controller.period' is true: expected a number"),
         ("{name: x, controller: {period: .nan}}", "'controller.period' is nan: expected a number"),
         ("{name: x, controller: {period: [1]}}", "'controller.period' is [1]: expected a number"),
@@ -207,6 +223,59 @@ def test_whatever_passes_the_check_is_accepted_by_drake():
                 assert "expected" in str(error), (key, value)
 
 
+LEAVES = (
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**1100), 2**1100)
+    | st.floats()
+    | st.sampled_from(["1_0", "\u0661", "1e400", "inf", ".inf", "nan", "-", "1e", "true", "x", ""])
+    | st.dates()
+    | st.binary(max_size=3)
+)
+VALUES = st.recursive(
+    LEAVES,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["eta", "order", "radius", "size", "_tag"]), inner, max_size=2
+        )
+    ),
+    max_leaves=5,
+)
+PLACES = st.sampled_from(
+    [
+        "name",
+        "path",
+        "controller",
+        "stations",
+        "start",
+        "limit",
+        "file",
+        "figures",
+        "mixed",
+        "controller.gains",
+        "controller.gains.eta",
+        "controller.gains.order",
+        "controller.period",
+    ]
+)
+
+
+@given(PLACES, VALUES)
+def test_every_value_is_loaded_or_refused_in_one_line(place, value):
+    data = {"name": "x", "controller": {"gains": {}}}
+    *way, last = place.split(".")
+    target = data
+    for key in way:
+        target = target[key]
+    target[last] = value
+    try:
+        load_typed(Scenario, data, "made_up.yaml")
+    except InputError as error:
+        assert str(error).startswith("made_up.yaml: ")
+        assert "\n" not in str(error)
+
+
 def test_required_list():
     @dataclass
     class Needs:
@@ -219,6 +288,12 @@ def test_required_list():
 
 def test_infinity_is_a_number():
     assert load("{name: x, limit: .inf}").limit == math.inf
+    assert load("{name: x, limit: '-inf'}").limit == -math.inf
+
+
+@pytest.mark.parametrize("text", ["1", "-1.", ".5", "+1e-3", "1.5E+3", "007"])
+def test_text_that_is_a_number(text):
+    assert load(f"{{name: x, limit: '{text}'}}").limit == float(text)
 
 
 def test_mappings_keep_the_order_of_the_file():
@@ -248,3 +323,34 @@ def test_import_stays_light():
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+@dataclass
+class Several:
+    """One number or several."""
+
+    values: list[float] = field(default_factory=list, metadata=ONE_OR_MANY)
+
+
+@dataclass
+class Holder:
+    """Lists."""
+
+    several: Several = field(default_factory=Several)
+    plain: list[float] = field(default_factory=list)
+
+
+@pytest.mark.parametrize(
+    ("written", "values"), [(3, [3.0]), (2.5, [2.5]), ("1e3", [1e3]), ([1, 2], [1.0, 2.0])]
+)
+def test_one_value_where_there_may_be_many(written, values):
+    data = {"several": {"values": written}}
+    assert load_typed(Holder, data, "here").several.values == values
+    assert data == {"several": {"values": written}}
+
+
+def test_one_value_that_is_none_and_lists_that_must_be_lists():
+    with pytest.raises(InputError, match=r"here: .*several\.values\[0\].* 'abc'"):
+        load_typed(Holder, {"several": {"values": "abc"}}, "here")
+    with pytest.raises(InputError, match=r"here: .*'plain' is 3"):
+        load_typed(Holder, {"plain": 3}, "here")

@@ -7,6 +7,7 @@ relative degree: ``u = gain q^(r) + drift + offset``.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,9 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
+
+_FOR_RIGID = ("velocity_servo", "rigid")
+_FOR_MIXED = (*_FOR_RIGID, "singular_perturbation")
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class DrivenMotion:
 
 
 def velocity_servo(robot: RobotModel, state: DriveState) -> DrivenMotion:
-    """Joint velocity servos (3.48), r = 1: the input is ``q'``."""
+    """Joint velocity servos (3.48), r = 1: the input is ``q'``. For joints of any kind."""
     n = robot.dimension
     return DrivenMotion([state.q_J], ca.SX.eye(n), ca.SX(n, 1), ca.SX(n, 1))
 
@@ -63,13 +67,19 @@ def velocity_servo(robot: RobotModel, state: DriveState) -> DrivenMotion:
 def rigid(robot: RobotModel, state: DriveState) -> DrivenMotion:
     """Rigid joints (2.42), r = 2: the inverse dynamics of (3.29).
 
-    On a robot with elastic joints the law acts on the motor coordinates, because
-    with link coordinates the loop is unstable (Sec. 3.8.3).
+    Where joints are elastic the law acts on motor coordinates, because with link
+    coordinates the loop is unstable (Sec. 3.8.3). It serves any mixture of rigid and
+    elastic joints: of a rigid joint, motor and link coordinate are one.
     """
-    q, v = (state.q_M, state.v_M) if robot.is_elastic else (state.q_J, state.v_J)
+    q, v = (state.q_J, state.v_J) if robot.is_rigid else (state.q_M, state.v_M)
     D_E = robot.mass_matrix(q)
     n_E = _link_torque(robot, [q, v, ca.SX(robot.dimension, 1)], 0)
-    return DrivenMotion([q, v], D_E + ca.diag(robot.D_M), ca.SX(*n_E.shape), n_E - state.tau_ext[0])
+    return DrivenMotion(
+        [q, v],
+        D_E + ca.diag(robot.D_M),
+        ca.SX(*n_E.shape),
+        n_E - state.tau_ext[0] + _viscous(robot) * v,
+    )
 
 
 def singular_perturbation(
@@ -77,26 +87,31 @@ def singular_perturbation(
 ) -> DrivenMotion:
     """Composite law for stiff elastic joints, r = 2: slow (3.70) plus fast (3.71).
 
+    Rigid joints among them have no fast part.
+
     Args:
         robot: The robot.
         state: Its state.
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], shape (N,).
     """
-    _require_elastic(robot, "singular_perturbation")
+    if robot.is_rigid:
+        _refuse(robot, "singular_perturbation")
     D_E = robot.mass_matrix(state.q_J)
     n_E = _link_torque(robot, [state.q_J, state.v_J, ca.SX(robot.dimension, 1)], 0)
-    tau_J_rate = robot.K_s * (state.v_M - state.v_J)
+    tau_J_rate = np.where(np.isfinite(robot.K_s), robot.K_s, 0.0) * (state.v_M - state.v_J)
     fast = -ca.DM(boundary_layer_damping) * tau_J_rate
     return DrivenMotion(
         [state.q_J, state.v_J],
         D_E + ca.diag(robot.D_M),
         ca.SX(*n_E.shape),
-        n_E - state.tau_ext[0] + fast,
+        n_E - state.tau_ext[0] + fast + _viscous(robot) * state.v_M,
     )
 
 
 def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> DrivenMotion:
     """Visco-elastic joints (2.65), (2.66), r = 3, in the form that respects the hold.
+
+    Every joint must be elastic: rigid ones among them would have another relative degree.
 
     The motor acceleration is constant over a sampling interval; it is chosen so that the
     joint torque's rate has reached tau_J' at the interval's end (implicit)::
@@ -125,18 +140,22 @@ def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) ->
     known = _link_torque(robot, [state.q_J, state.v_J, a_J, ca.SX(*a_J.shape)], 1)
     known = known - state.tau_ext[1]
     K = K_d + K_s * sampling_time
-    half = sampling_time / 2.0
-    per_rate = D_M / K + half
+    half, viscous = sampling_time / 2.0, _viscous(robot)
+    # viscous damping takes the mean motor velocity, v_M + T_s/2 a_M
+    D_v = D_M + half * viscous
+    per_rate = D_v / K + half
     return DrivenMotion(
         [state.q_J, state.v_J, a_J],
-        ca.diag(per_rate) @ D_E + half * ca.diag(D_M),
+        ca.diag(per_rate) @ D_E + half * ca.diag(D_v),
         per_rate * known,
-        D_M * a_J + tau_J - D_M / K * K_s * (state.v_M - state.v_J),
+        D_v * a_J + tau_J - D_v / K * K_s * (state.v_M - state.v_J) + viscous * state.v_M,
     )
 
 
 def elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> DrivenMotion:
     """Purely elastic joints (2.65), (2.67), r = 4: the exact law (3.65) for any number of axes.
+
+    Every joint must be elastic, see :func:`visco_elastic`.
 
     ``a_M = a_J + K_s^-1 tau_J''``, ``tau_d = D_M a_M + tau_J``. While the torque is held,
     ``tau_J`` and ``a_J`` go on changing at known rates; their mean values over the
@@ -162,12 +181,23 @@ def elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> Drive
     known = _link_torque(robot, [state.q_J, state.v_J, a_J, jerk, unknown], 2)
     known = known - state.tau_ext[2]
     first, second = sampling_time / 2, sampling_time**2 / 6
+    # viscous damping takes the mean motor velocity, v_M + T_s/2 a_M
+    viscous = _viscous(robot)
+    D_v = D_M + first * viscous
     return DrivenMotion(
         [state.q_J, state.v_J, a_J, jerk],
-        ca.diag(D_M / K_s + second) @ D_E + second * ca.diag(D_M),
-        (D_M / K_s + second) * known,
-        D_M * (a_J + first * jerk) + tau_J + first * tau_J_rate,
+        ca.diag(D_v / K_s + second) @ D_E + second * ca.diag(D_M),
+        (D_v / K_s + second) * known,
+        D_M * (a_J + first * jerk)
+        + tau_J
+        + first * tau_J_rate
+        + viscous * (state.v_M + first * a_J),
     )
+
+
+def _viscous(robot: RobotModel) -> ca.DM:
+    """Return the viscous damping of the drives, (N, 1); zeros are structural."""
+    return ca.sparsify(ca.DM(robot.viscous_damping))
 
 
 def _link_acceleration(robot: RobotModel, state: DriveState, D_E: ca.SX, tau_J: ca.SX) -> ca.SX:
@@ -191,7 +221,14 @@ def joint_jets(derivatives: Sequence[ca.SX]) -> list[Jet]:
 
 def _require_elastic(robot: RobotModel, law: str) -> None:
     if not robot.is_elastic:
-        stiff = [name for name, k in zip(robot.names, robot.K_s, strict=True) if not np.isfinite(k)]
-        raise InputError(
-            f"law '{law}': needs a robot with elastic joints; rigid are {', '.join(stiff)}"
-        )
+        _refuse(robot, law)
+
+
+def _refuse(robot: RobotModel, law: str) -> NoReturn:
+    """Say which joints a law does not suit, and which laws suit the robot."""
+    stiff = [name for name, k in zip(robot.names, robot.K_s, strict=True) if not np.isfinite(k)]
+    suitable = _FOR_RIGID if robot.is_rigid else _FOR_MIXED
+    raise InputError(
+        f"law '{law}': needs a robot with elastic joints; rigid are {', '.join(stiff)}; "
+        f"laws for this robot: {', '.join(suitable)}"
+    )

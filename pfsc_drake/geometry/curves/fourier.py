@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
 
+# Between the axes of a circle: from smaller ones its plane is not known well.
+_LEAST_ANGLE_DEG = 0.1
+
 
 class FourierCurve(Curve):
     """sigma(theta) = c + sum_k a_k cos(k theta) + b_k sin(k theta), k = 1..harmonics.
@@ -58,17 +61,20 @@ class FourierCurve(Curve):
             The closed curve.
 
         Raises:
-            InputError: radius not positive, or u and v parallel or zero.
+            InputError: radius not positive, u or v zero, or less than 0.1 deg between them.
         """
         if not (0.0 < radius < math.inf):
             raise InputError(f"circle radius: {radius}; a positive number of metres is required")
-        u, v = np.array(axis_u, dtype=float), np.array(axis_v, dtype=float)
-        size = float(np.linalg.norm(u) * np.linalg.norm(v))
-        u = u / (np.linalg.norm(u) or 1.0)
+        u, v = _direction("u", axis_u), _direction("v", axis_v)
         v = v - (u @ v) * u
-        if not float(np.linalg.norm(v)) > 1e-9 * size:
+        # Of two unit vectors: the sine of the angle between them, or between their lines.
+        angle = math.degrees(math.asin(min(1.0, float(np.linalg.norm(v)))))
+        if angle < _LEAST_ANGLE_DEG:
             axes = f"u = {np.asarray(axis_u).tolist()}, v = {np.asarray(axis_v).tolist()}"
-            raise InputError(f"circle axes: {axes}; two linearly independent vectors are required")
+            raise InputError(
+                f"circle axes: {axes}, {angle:.2g} deg between them; at least"
+                f" {_LEAST_ANGLE_DEG:g} deg is required"
+            )
         v /= np.linalg.norm(v)
         return cls(center, [radius * u], [radius * v])
 
@@ -134,3 +140,16 @@ class FourierCurve(Curve):
             row[:, 1::2], row[:, 2::2] = a.T, b.T
             a, b = k * b, -k * a
         return table
+
+
+def _direction(name: str, axis: ArrayLike) -> np.ndarray:
+    """Unit vector of a vector of any length; one that is zero or not finite is refused."""
+    vector = np.array(axis, dtype=float)
+    largest = float(np.abs(vector).max(initial=0.0))
+    if not 0.0 < largest < math.inf:
+        raise InputError(
+            f"circle axes: {name} = {vector.tolist()}; a finite vector that is not zero is required"
+        )
+    # First by the largest component: squares of large numbers overflow.
+    vector = vector / largest
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -122,17 +122,7 @@ def interpolate_orientation(
     if closed and np.size(parameters) == len(q) + 1:
         q = np.vstack([q, q[0]])
     theta = check_parameters(parameters, len(q))
-    for row in range(1, len(q)):
-        cosine = float(q[row - 1] @ q[row])
-        angle = 2.0 * math.acos(min(1.0, abs(cosine)))
-        if angle > _MAX_NEIGHBOUR_ANGLE:
-            raise InputError(
-                f"orientation: keyframes {row - 1} and {row} (from 0) are"
-                f" {math.degrees(angle):.1f} deg apart; at most"
-                f" {math.degrees(_MAX_NEIGHBOUR_ANGLE):.0f} deg is allowed"
-            )
-        if cosine < 0.0:
-            q[row] = -q[row]
+    q = check_neighbours(q)
     degree = smoothness + 1
     if not closed:
         degree = min(degree, len(q) - 1)
@@ -153,6 +143,32 @@ def interpolate_orientation(
         q = np.vstack([q[:-1], -q])
         q[-1] = q[0]
     return OrientationCurve(interpolate_at(theta, q, degree, closed=True))
+
+
+def check_neighbours(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions with signs such that neighbours are close.
+
+    Args:
+        quaternions: (w, x, y, z), [n, 4], of length one.
+
+    Returns:
+        The same orientations, [n, 4].
+
+    Raises:
+        InputError: neighbours are more than 170 degrees apart.
+    """
+    cosines = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    angles = 2.0 * np.arccos(np.minimum(1.0, np.abs(cosines)))
+    far = np.flatnonzero(angles > _MAX_NEIGHBOUR_ANGLE)
+    if far.size:
+        row = int(far[0])
+        raise InputError(
+            f"orientation: keyframes {row} and {row + 1} (from 0) are"
+            f" {math.degrees(angles[row]):.1f} deg apart; at most"
+            f" {math.degrees(_MAX_NEIGHBOUR_ANGLE):.0f} deg is allowed"
+        )
+    signs = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0))
+    return quaternions * np.concatenate([[1.0], signs])[:, None]
 
 
 def _normalize(q: np.ndarray) -> np.ndarray:

@@ -1,12 +1,15 @@
 """Adaptive piecewise polynomial approximation of functions."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
 
 _MAX_HALVINGS = 30
+# About half a gigabyte of a path's table.
+_MAX_PIECES = 200_000
 _NEGLIGIBLE = 0.01
 _ROUNDING = 1e-13
 
@@ -22,13 +25,7 @@ def power_coefficients(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         Coefficients of powers of (theta - theta_s), [segments, degree + 1, dimension].
     """
     count = values.shape[1]
-    chebyshev = np.linalg.inv(
-        np.polynomial.chebyshev.chebvander(_chebyshev_points(count), count - 1)
-    )
-    powers = np.zeros((count, count))
-    for j in range(count):
-        unit = np.polynomial.Chebyshev.basis(j, domain=[0.0, 1.0])
-        powers[: j + 1, j] = unit.convert(kind=np.polynomial.Polynomial).coef
+    chebyshev, powers = _conversions(count)
     # In two steps: their product has large entries of both signs, which would cost digits.
     series = np.einsum("ij,sjd->sid", chebyshev, values)
     scaled = np.einsum("ij,sjd->sid", powers, series)
@@ -72,7 +69,7 @@ def fit_pieces(
         of (theta - theta_s).
 
     Raises:
-        InputError: no agreement even on very short segments.
+        InputError: no agreement even on very short segments, or on as many as 200,000.
     """
     starts, lengths = breakpoints[:-1], np.diff(breakpoints)
     # Off the nodes, and close to the ends, where interpolation errors are largest.
@@ -80,6 +77,7 @@ def fit_pieces(
     # Rounding errors of the function itself do not get smaller with the segments.
     negligible = _NEGLIGIBLE * tolerance * (breakpoints[-1] - breakpoints[0])
     done: list[tuple[np.ndarray, np.ndarray]] = []
+    found = 0
     for _ in range(_MAX_HALVINGS):
         nodes = chebyshev_nodes(starts, lengths, degree + 1)
         values = function(nodes.ravel()).reshape(*nodes.shape, -1)
@@ -91,6 +89,14 @@ def fit_pieces(
         allowed = tolerance + _ROUNDING * np.abs(values).max(axis=(1, 2))
         good = (error <= allowed) | (error * lengths <= negligible)
         done.append((starts[good], coefficients[good]))
+        found += int(np.count_nonzero(good))
+        if found + 2 * np.count_nonzero(~good) > _MAX_PIECES:
+            where = starts[0] if np.all(good) else starts[~good][0]
+            raise InputError(
+                f"curve: more than {_MAX_PIECES} polynomials are needed, near"
+                f" theta = {where:.9g} and elsewhere; a smoother curve, or one of fewer"
+                " segments, is required"
+            )
         if np.all(good):
             pieces = np.concatenate([item[0] for item in done])
             order = np.argsort(pieces)
@@ -102,5 +108,18 @@ def fit_pieces(
     raise InputError(f"curve: not smooth near theta = {starts[0]:.9g}; a regular curve is required")
 
 
+@cache
+def _conversions(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Maps from values at `count` nodes to a Chebyshev series, and from there to powers."""
+    nodes = _chebyshev_points(count)
+    chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1))
+    powers = np.zeros((count, count))
+    for j in range(count):
+        unit = np.polynomial.Chebyshev.basis(j, domain=[0.0, 1.0])
+        powers[: j + 1, j] = unit.convert(kind=np.polynomial.Polynomial).coef
+    return chebyshev, powers
+
+
+@cache
 def _chebyshev_points(count: int) -> np.ndarray:
     return np.polynomial.chebyshev.chebpts1(count)

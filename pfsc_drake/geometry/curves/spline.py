@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import splu
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
@@ -13,6 +15,8 @@ from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 Parametrization = Literal["chord", "centripetal"]
 
 _MIN_SMOOTHNESS, _MAX_SMOOTHNESS = 2, 6
+# Periodic splines of more waypoints are solved by sparse matrices.
+_DENSE = 1000
 # Waypoints closer than this part of the path's chord length are one point.
 _COINCIDENT = 1e-9
 
@@ -46,17 +50,7 @@ def interpolate(
     """
     points = _check_waypoints(waypoints)
     check_smoothness(smoothness)
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    tiny = _COINCIDENT * float(chords.sum())
-    if closed and not np.linalg.norm(points[-1] - points[0]) <= tiny:
-        points = np.vstack([points, points[0]])
-        chords = np.append(chords, np.linalg.norm(points[-1] - points[-2]))
-    if np.any(chords <= tiny):
-        row = int(np.argmax(chords <= tiny))
-        raise InputError(
-            f"waypoints: rows {row} and {row + 1} (from 0) coincide at {points[row].tolist()};"
-            " neighbours must differ"
-        )
+    points, chords = close_polygon(points, closed)
     degree = smoothness + 1
     distinct, needed = (len(points) - 1, 3) if closed else (len(points), degree + 1)
     if distinct < needed:
@@ -70,6 +64,33 @@ def interpolate(
     else:
         knots = check_parameters(parameters, len(points))
     return interpolate_at(knots, points, degree, closed=closed)
+
+
+def close_polygon(points: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a polygon, and the lengths of its sides.
+
+    Args:
+        points: [n, dimension], m. If `closed`, the last one may repeat the first.
+        closed: Whether a side leads from the last point to the first.
+
+    Returns:
+        Points, with the first once more at the end if `closed`, and lengths, m, positive.
+
+    Raises:
+        InputError: neighbours coincide.
+    """
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    tiny = _COINCIDENT * float(chords.sum())
+    if closed and not np.linalg.norm(points[-1] - points[0]) <= tiny:
+        points = np.vstack([points, points[0]])
+        chords = np.append(chords, np.linalg.norm(points[-1] - points[-2]))
+    if np.any(chords <= tiny):
+        row = int(np.argmax(chords <= tiny))
+        raise InputError(
+            f"waypoints: rows {row} and {row + 1} (from 0) coincide at {points[row].tolist()};"
+            " neighbours must differ"
+        )
+    return points, chords
 
 
 def interpolate_at(
@@ -92,15 +113,33 @@ def interpolate_at(
         # Not-a-knot ends: the spline reproduces polynomials of its degree.
         spline = make_interp_spline(parameters, points, k=degree)
         starts = np.unique(spline.t[degree:-degree])[:-1]
+    return piecewise(spline, starts, parameters[-1], closed=closed)
+
+
+def piecewise(
+    spline: BSpline, starts: np.ndarray, end: float, *, closed: bool
+) -> PiecewisePolynomialCurve:
+    """A B-spline as a curve of polynomials.
+
+    Args:
+        spline: Of simple knots; defined over a whole period, wherever it begins, if `closed`.
+        starts: Where the pieces start, [pieces].
+        end: End of the last piece; end of the period if `closed`.
+        closed: True for a periodic curve.
+
+    Returns:
+        The curve on [starts[0], end], of class C^(k - 1) for a spline of degree k.
+    """
+    degree = spline.k
     # The piece to the right of its start is expanded there; in a periodic spline of even
     # degree the first start lies inside the piece that crosses the seam.
     sites = starts.copy()
     if closed:
-        sites[starts < spline.t[degree]] += parameters[-1] - parameters[0]
+        sites[starts < spline.t[degree]] += end - starts[0]
     coefficients = np.stack(
         [spline(sites, nu=j) / math.factorial(j) for j in range(degree + 1)], axis=1
     )
-    breakpoints = np.append(starts, parameters[-1])
+    breakpoints = np.append(starts, end)
     return PiecewisePolynomialCurve(
         breakpoints, coefficients, closed=closed, known_smoothness=degree - 1
     )
@@ -126,12 +165,27 @@ def _periodic_spline(
         starts = np.append(parameters[0], base)
     index = np.arange(-degree, count + degree + 1)
     knots = base[index % count] + period * (index // count)
-    unfolded = BSpline.design_matrix(sites, knots, degree).toarray()
-    folded = np.zeros((count, count))
-    for column in range(unfolded.shape[1]):
-        folded[:, column % count] += unfolded[:, column]
-    coefficients = np.linalg.solve(folded, values)
+    folded = fold_columns(BSpline.design_matrix(sites, knots, degree), count)
+    if count <= _DENSE:
+        coefficients = np.linalg.solve(folded.toarray(), values)
+    else:
+        coefficients = splu(folded.tocsc()).solve(values)
     return BSpline(knots, coefficients[np.arange(count + degree) % count], degree), starts
+
+
+def fold_columns(matrix: csr_array, period: int) -> csr_array:
+    """Sum of the columns that are whole periods apart, for periodic splines.
+
+    Args:
+        matrix: Design matrix [rows, columns].
+        period: Number of distinct coefficients.
+
+    Returns:
+        Matrix [rows, period].
+    """
+    entries = matrix.tocoo()
+    place = (entries.row, entries.col % period)
+    return csr_array((entries.data, place), shape=(matrix.shape[0], period))
 
 
 def accumulate(chords: np.ndarray, parametrization: Parametrization) -> np.ndarray:

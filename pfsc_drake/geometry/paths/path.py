@@ -1,6 +1,7 @@
 """Path of positions and orientations."""
 
 import math
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +20,20 @@ _SUSPICIOUS = 0.2
 _SAMPLES_PER_SEGMENT = 64
 
 
+class PathWaypoints(NamedTuple):
+    """What a path was made of.
+
+    Attributes:
+        positions: Waypoints [n, 3], m; the last may repeat the first.
+        parameters: theta of each, or of the path's nearest point, [n].
+        manner: Whether the path leads through them, or near them by smoothing or rounding.
+    """
+
+    positions: np.ndarray
+    parameters: np.ndarray
+    manner: Literal["interpolated", "smoothed", "rounded"]
+
+
 class Path:
     """Path gamma of section 3.1: position sigma_t(theta) and orientation sigma_r(theta).
 
@@ -27,6 +42,7 @@ class Path:
         orientation: Quaternions over the same parameter, or None for arms that only
             position. Closed if `position` is, with a period of one or two laps.
         initial_normal: e_perp at the begin of the path, [3], see `ParallelTransportFrame`.
+        waypoints: What the path was made of, if it was.
 
     Attributes:
         position: The curve sigma_t.
@@ -34,6 +50,7 @@ class Path:
         arc_length: Arc length of `position`.
         frame: Parallel transport frame of `position`.
         projector: Projector onto `position`.
+        waypoints: What the path was made of, or None.
 
     Raises:
         InputError: the position is not a regular curve in R^3, or the orientation does not
@@ -46,6 +63,7 @@ class Path:
         orientation: OrientationCurve | None = None,
         *,
         initial_normal: ArrayLike | None = None,
+        waypoints: PathWaypoints | None = None,
     ) -> None:
         if position.dimension != 3:
             raise InputError(f"path: curve of dimension {position.dimension}; 3 is required")
@@ -54,6 +72,7 @@ class Path:
             _check_domains(position, orientation)
         self.position = position
         self.orientation = orientation
+        self.waypoints = waypoints
         self.arc_length = ArcLength(position)
         self.frame = ParallelTransportFrame(position, initial_normal)
         self.projector = Projector(position)

@@ -12,9 +12,11 @@ from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.point import PathPointLayout
 
 _DEGREE = 7
-# Of each quantity, relative to its largest value on the path.
+# Of each quantity, relative to its size on the path.
 _TOLERANCE = 1e-13
 _SCALE_SAMPLES = 512
+# Part of a vector's norm down to which errors of a component are relative to the component.
+_SMALL_COMPONENT = 0.03
 # Breakpoints closer than this part of the domain are one.
 _SAME = 1e-13
 
@@ -47,7 +49,7 @@ def tabulate(
 ) -> PathTable:
     """Table of a path.
 
-    Each quantity agrees to 1e-13 of its largest value, or to the rounding errors of the curve
+    Each quantity agrees to 1e-13 of its size on the path, or to the rounding errors of the curve
     itself where these are larger (polynomials of high degree on long segments).
 
     Args:
@@ -56,6 +58,9 @@ def tabulate(
         arc_length: Arc length of `position`.
         frame: Parallel transport frame of `position`.
         layout: Which quantities, and where they go.
+
+    Raises:
+        InputError: the path would need more than 200,000 pieces.
     """
     order = layout.order
 
@@ -71,8 +76,7 @@ def tabulate(
 
     breakpoints = _common_breakpoints(position, orientation, frame)
     samples = np.linspace(breakpoints[0], breakpoints[-1], _SCALE_SAMPLES + 1)
-    scale = np.abs(path_points((samples[1:] + samples[:-1]) / 2.0)).max(axis=0)
-    scale[scale == 0.0] = 1.0
+    scale = _scale(path_points((samples[1:] + samples[:-1]) / 2.0), layout)
     breakpoints, coefficients = fit_pieces(
         lambda theta: path_points(theta) / scale,
         breakpoints,
@@ -82,6 +86,23 @@ def tabulate(
     rows = np.ascontiguousarray((coefficients * scale).transpose(0, 2, 1))
     sigma, tangent = rows[:, layout.position][:, :3], rows[:, layout.position][:, 3:6]
     return PathTable(breakpoints, rows, _slopes(np.diff(breakpoints), sigma, tangent))
+
+
+def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
+    """Size of each quantity among samples [n, layout.size]: [layout.size].
+
+    It is the largest value of a component, and not less than a part of the largest norm of its
+    vector: what is zero but for rounding errors (as components of e_perp and of the derivatives
+    are on a tilted plane) is not to be followed for its own sake, which would never end.
+    """
+    scale = np.ones(layout.size)
+    vectors = [(layout.eta, 1), (layout.normal, 3), (layout.position, 3), (layout.quaternion, 4)]
+    for place, dimension in vectors:
+        parts = np.abs(points[:, place]).reshape(len(points), -1, dimension)
+        norm = np.linalg.norm(parts, axis=2).max(axis=0)[:, None]
+        scale[place] = np.maximum(parts.max(axis=0), _SMALL_COMPONENT * norm).ravel()
+    scale[scale == 0.0] = 1.0
+    return scale
 
 
 def _common_breakpoints(

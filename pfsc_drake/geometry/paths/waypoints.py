@@ -1,83 +1,44 @@
-"""Waypoint files."""
+"""Paths through waypoints."""
 
-import math
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.orientation import interpolate_orientation
-from pfsc_drake.geometry.curves.spline import Parametrization, accumulate, interpolate
-from pfsc_drake.geometry.paths.path import Path
-from pfsc_drake.geometry.rotation import (
-    matrix_to_quaternion,
-    zyx_to_quaternion,
-    zyz_to_quaternion,
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.orientation import (
+    OrientationCurve,
+    check_neighbours,
+    interpolate_orientation,
 )
+from pfsc_drake.geometry.curves.rounded_polygon import blend_distances, round_corners
+from pfsc_drake.geometry.curves.spline import (
+    Parametrization,
+    accumulate,
+    check_smoothness,
+    close_polygon,
+    interpolate,
+)
+from pfsc_drake.geometry.paths.path import Path, PathWaypoints
+from pfsc_drake.geometry.paths.smoothing import Progress, smooth_orientation, smooth_positions
+from pfsc_drake.geometry.paths.waypoint_file import WaypointTable
+from pfsc_drake.geometry.size import SHORTEST
 
-_POSITION = ("x", "y", "z")
-_PARAMETER = "theta"
-_ORIENTATIONS = {
-    "zyx": ("zyx_1", "zyx_2", "zyx_3"),
-    "zyz": ("zyz_1", "zyz_2", "zyz_3"),
-    "quaternion": ("qw", "qx", "qy", "qz"),
-    "matrix": tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
-}
+# Splines through more waypoints would take minutes and gigabytes.
+MAX_INTERPOLATED = 50_000
 
 
 @dataclass(frozen=True)
-class WaypointTable:
-    """Waypoints of a path.
+class Tolerance:
+    """How far a smooth path may be from its waypoints.
 
     Attributes:
-        positions: [n, 3], m.
-        quaternions: (w, x, y, z), [n, 4], or None without orientation.
-        parameters: theta [n], strictly increasing, or None to choose them by distance.
+        position: m, positive.
+        orientation: rad, positive.
     """
 
-    positions: np.ndarray
-    quaternions: np.ndarray | None = None
-    parameters: np.ndarray | None = None
-
-
-def read_waypoints(csv_path: str | FilePath) -> WaypointTable:
-    """Read waypoints from a CSV file.
-
-    The first line that is neither empty nor a comment (#) names the columns, in any order:
-    `x, y, z` [m]; optionally one group of `zyx_1, zyx_2, zyx_3` [rad], (2.7),
-    `zyz_1, zyz_2, zyz_3` [rad], (2.6), `qw, qx, qy, qz`, or `r11, r12, ..., r33`; and
-    optionally `theta`.
-
-    Args:
-        csv_path: File name.
-
-    Returns:
-        The table.
-
-    Raises:
-        InputError: the file cannot be read, a column is unknown or missing, or a value is
-            not a number, not finite, not increasing (theta) or not an orientation.
-    """
-    name = str(csv_path)
-    lines, header, rows = _read_numbers(name)
-    column = {label: rows[:, index] for index, label in enumerate(header)}
-    positions = np.stack([column[label] for label in _POSITION], axis=1)
-    parameters = column.get(_PARAMETER)
-    if parameters is not None:
-        bad = np.flatnonzero(np.diff(parameters) <= 0.0)
-        if bad.size:
-            row = int(bad[0]) + 1
-            raise InputError(
-                f"{name}, line {lines[row]}, column theta: {parameters[row]:.9g}; more than the"
-                f" {parameters[row - 1]:.9g} of the line before is required"
-            )
-    quaternions = None
-    for kind, labels in _ORIENTATIONS.items():
-        if labels[0] in column:
-            values = np.stack([column[label] for label in labels], axis=1)
-            quaternions = _to_quaternions(name, lines, kind, values)
-    return WaypointTable(positions, quaternions, parameters)
+    position: float
+    orientation: float
 
 
 def path_from_waypoints(
@@ -86,8 +47,11 @@ def path_from_waypoints(
     smoothness: int,
     closed: bool = False,
     parametrization: Parametrization = "chord",
+    tolerance: Tolerance | None = None,
+    corner_distance: float | None = None,
+    progress: Progress | None = None,
 ) -> Path:
-    """Path through waypoints.
+    """Path through waypoints, or near them.
 
     Args:
         table: Waypoints. For a closed path the last may repeat the first; it must if the
@@ -95,118 +59,104 @@ def path_from_waypoints(
         smoothness: k of the class C^k of position and orientation, 2..6.
         closed: True for a closed path.
         parametrization: "chord" or "centripetal", see `interpolate`.
+        tolerance: If given, the smoothest path that comes as near as this to all waypoints,
+            see `smooth_positions`; neighbours may then coincide.
+        corner_distance: If given, m: the path consists of straight lines, blended up to this
+            distance from each corner (at most half of the line), see `round_corners`.
+        progress: Told the fraction done and what is done.
 
     Returns:
-        The path.
+        The path; its `waypoints` are those of the table.
 
     Raises:
-        InputError: as `interpolate`, `interpolate_orientation` and `Path` do.
+        InputError: options that exclude each other, too many waypoints or a path that is too
+            short; else as `interpolate`, `interpolate_orientation` and `Path` do.
     """
-    positions, parameters = table.positions, table.parameters
+    positions = table.positions
+    length = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+    if not length >= SHORTEST:
+        raise InputError(
+            f"waypoints: {length:.3g} m from the first to the last; at least {SHORTEST:g} m are"
+            " required"
+        )
+    check_smoothness(smoothness)
+    if tolerance is not None:
+        _require_no(table, corner_distance, "path.shape.tolerance")
+        return _smooth_path(table, smoothness, closed, tolerance, progress)
+    if len(positions) > MAX_INTERPOLATED:
+        raise InputError(
+            f"waypoints: {len(positions)}; a path through all of them may have at most"
+            f" {MAX_INTERPOLATED}: write path.shape.tolerance (m), which thins them"
+        )
+    if corner_distance is not None:
+        _require_no(table, None, "path.shape.corner_distance")
+        return _rounded_path(table, smoothness, closed, corner_distance)
     position = interpolate(
         positions,
         smoothness=smoothness,
         closed=closed,
         parametrization=parametrization,
-        parameters=parameters,
+        parameters=table.parameters,
     )
-    if table.quaternions is None:
-        return Path(position)
+    parameters = table.parameters
+    polygon, chords = close_polygon(positions, closed)
     if parameters is None:
-        chords = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-        gap = float(np.linalg.norm(positions[-1] - positions[0]))
-        if closed and gap > 1e-9 * chords.sum():
-            chords = np.append(chords, gap)
         parameters = accumulate(chords, parametrization)
-    orientation = interpolate_orientation(
-        table.quaternions, parameters, smoothness=smoothness, closed=closed
-    )
-    return Path(position, orientation)
-
-
-def _read_numbers(name: str) -> tuple[list[int], list[str], np.ndarray]:
-    """Line numbers [n], column names [m] and values [n, m] of a file."""
-    try:
-        text = FilePath(name).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(f"{name}: {reason}; a readable CSV file is required") from error
-    header: list[str] = []
-    lines: list[int] = []
-    rows: list[list[float]] = []
-    for line, content in enumerate(text.splitlines(), start=1):
-        content = content.partition("#")[0].strip()
-        if not content:
-            continue
-        cells = [cell.strip() for cell in content.split(",")]
-        if not header:
-            header = cells
-            _check_header(name, line, header)
-            continue
-        if len(cells) != len(header):
-            raise InputError(
-                f"{name}, line {line}: {len(cells)} values; {len(header)} are required"
-            )
-        rows.append([_number(name, line, *item) for item in zip(header, cells, strict=True)])
-        lines.append(line)
-    if not rows:
-        raise InputError(f"{name}: no waypoints; a line with column names and data are required")
-    return lines, header, np.array(rows)
-
-
-def _check_header(name: str, line: int, header: list[str]) -> None:
-    known = [
-        *_POSITION,
-        _PARAMETER,
-        *(label for group in _ORIENTATIONS.values() for label in group),
-    ]
-    for label in header:
-        if label not in known:
-            raise InputError(
-                f"{name}, line {line}: column '{label}' is unknown; allowed: {', '.join(known)}"
-            )
-        if header.count(label) > 1:
-            raise InputError(f"{name}, line {line}: column '{label}' twice; once is allowed")
-    present = [group for group in _ORIENTATIONS.values() if any(key in header for key in group)]
-    if len(present) > 1:
-        groups = " and ".join(f"'{group[0]}...'" for group in present)
-        raise InputError(f"{name}, line {line}: columns {groups}; one kind of orientation allowed")
-    for label in (*_POSITION, *(label for group in present for label in group)):
-        if label not in header:
-            raise InputError(f"{name}, line {line}: column '{label}' is missing; it is required")
-
-
-def _number(name: str, line: int, label: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(
-            f"{name}, line {line}, column {label}: '{cell}'; a finite number is required"
+    orientation = None
+    if table.quaternions is not None:
+        orientation = interpolate_orientation(
+            table.quaternions, parameters, smoothness=smoothness, closed=closed
         )
-    return value
+    return Path(position, orientation, waypoints=PathWaypoints(polygon, parameters, "interpolated"))
 
 
-def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:
-    """Unit quaternions [n, 4] from the columns of one kind of orientation."""
-    if kind == "zyx":
-        return zyx_to_quaternion(values)
-    if kind == "zyz":
-        return zyz_to_quaternion(values)
-    if kind == "quaternion":
-        norm = np.linalg.norm(values, axis=1, keepdims=True)
-        bad = np.flatnonzero(norm[:, 0] < 1e-6)
-        if bad.size:
-            raise InputError(
-                f"{name}, line {lines[bad[0]]}, columns qw..qz: {values[bad[0]].tolist()};"
-                " a quaternion that is not zero is required"
-            )
-        return values / norm
-    quaternions = []
-    for line, value in zip(lines, values.reshape(-1, 3, 3), strict=True):
-        try:
-            quaternions.append(matrix_to_quaternion(value))
-        except InputError as error:
-            raise InputError(f"{name}, line {line}, columns r11..r33: {error}") from error
-    return np.array(quaternions)
+def _require_no(table: WaypointTable, corner_distance: float | None, key: str) -> None:
+    if table.parameters is not None:
+        raise InputError(f"waypoints: have a column theta; {key} makes its own: leave one out")
+    if corner_distance is not None:
+        raise InputError(f"{key} and path.shape.corner_distance exclude each other: leave one out")
+
+
+def _smooth_path(
+    table: WaypointTable,
+    smoothness: int,
+    closed: bool,
+    tolerance: Tolerance,
+    progress: Progress | None,
+) -> Path:
+    position, theta = smooth_positions(
+        table.positions,
+        smoothness=smoothness,
+        tolerance=tolerance.position,
+        closed=closed,
+        progress=progress,
+    )
+    orientation: OrientationCurve | None = None
+    if table.quaternions is not None:
+        orientation = smooth_orientation(
+            table.quaternions,
+            theta,
+            position.domain[1],
+            smoothness=smoothness,
+            tolerance=tolerance.orientation,
+            closed=closed,
+        )
+    return Path(position, orientation, waypoints=PathWaypoints(table.positions, theta, "smoothed"))
+
+
+def _rounded_path(table: WaypointTable, smoothness: int, closed: bool, distance: float) -> Path:
+    points, chords = close_polygon(table.positions, closed)
+    theta = accumulate(chords, "chord")
+    widths = blend_distances(points, distance, closed=closed)
+
+    def rounded(values: np.ndarray, around: bool) -> Curve:
+        return round_corners(values, theta, widths, smoothness=smoothness, closed=around)
+
+    position, orientation = rounded(points, closed), None
+    if table.quaternions is not None:
+        q = table.quaternions
+        if closed and len(q) < len(points):
+            q = np.vstack([q, q[:1]])
+        q = check_neighbours(q)
+        orientation = OrientationCurve(rounded(q, closed))
+    return Path(position, orientation, waypoints=PathWaypoints(points, theta, "rounded"))

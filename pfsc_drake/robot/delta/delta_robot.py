@@ -49,8 +49,8 @@ class DeltaRobot(RobotModel):
 
         Args:
             attribute: ``effort_limit`` [N], ``velocity_limit`` [m/s], ``position_limits`` [m],
-                ``reflected_inertia``, ``stiffness``, ``damping``, ``kind``, ``is_revolute`` or
-                ``name``.
+                ``reflected_inertia``, ``stiffness``, ``damping``, ``viscous_damping``, ``kind``,
+                ``is_revolute`` or ``name``.
 
         Returns:
             Shape (3,), for ``position_limits`` (3, 2).
@@ -66,6 +66,7 @@ class DeltaRobot(RobotModel):
             "reflected_inertia": np.zeros(NUM_ARMS),
             "stiffness": np.full(NUM_ARMS, np.inf),
             "damping": np.zeros(NUM_ARMS),
+            "viscous_damping": np.zeros(NUM_ARMS),
             "effort_limit": drives.effort.copy(),
             "velocity_limit": drives.velocity.copy(),
             "position_limits": np.column_stack([drives.position_lower, drives.position_upper]),

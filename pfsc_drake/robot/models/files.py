@@ -57,6 +57,10 @@ def resolve_model(name_or_path: str | Path) -> Path:
         if text not in shipped:
             raise InputError(f"robot model {text!r}: must be a file or one of {', '.join(shipped)}")
         path = shipped[text]
-    if not path.is_file():
+    try:
+        exists = path.exists()
+    except OSError:  # a name that no file system takes
+        exists = False
+    if not exists:
         raise InputError(f"robot model {text!r}: no such file")
     return path

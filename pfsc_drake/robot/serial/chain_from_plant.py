@@ -166,7 +166,7 @@ def _refuse_branches(plant: MultibodyPlant, chain: list[Joint]) -> None:
         if {joint.parent_body().index(), joint.child_body().index()} & on_chain:
             raise InputError(
                 f"joint '{joint.name()}': branches off the chain of the tool; "
-                "fix it or remove it from the model"
+                "list it in fixed_joints or remove it from the model"
             )
 
 
@@ -277,6 +277,7 @@ def _link(
         else plant.get_joint_actuator(actuator).calc_reflected_inertia(context),
         stiffness=np.inf if flex is None else springs[flex.index()],
         damping=0.0 if flex is None else float(flex.default_damping_vector()[0]),
+        viscous_damping=float(motor.default_damping_vector()[0]),
         effort_limit=np.inf
         if actuator is None
         else plant.get_joint_actuator(actuator).effort_limit(),

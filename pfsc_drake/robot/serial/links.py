@@ -25,6 +25,8 @@ class ChainLink:
         reflected_inertia: Rotor inertia on the joint side, an entry of D_M.
         stiffness: Joint stiffness K_s [Nm/rad or N/m]; infinite when rigid.
         damping: Joint damping K_d [Nm s/rad or N s/m] of an elastic joint.
+        viscous_damping: Damping at the drive, of a rigid joint or of an elastic joint's motor
+            [Nm s/rad or N s/m].
         effort_limit: Drive torque or force limit [Nm or N].
         position_limits: Lower and upper limit of q.
         velocity_limit: Limit of the magnitude of q'.
@@ -41,6 +43,7 @@ class ChainLink:
     reflected_inertia: float = 0.0
     stiffness: float = np.inf
     damping: float = 0.0
+    viscous_damping: float = 0.0
     effort_limit: float = np.inf
     position_limits: tuple[float, float] = (-np.inf, np.inf)
     velocity_limit: float = np.inf

@@ -40,7 +40,8 @@ class VelocityServo(LeafSystem):
         (1,); joint coordinates when last seen, shape (N,).
 
     Args:
-        robot: The robot, N joints; its gravity torque is fed forward.
+        robot: The robot, N joints; its gravity torque and the viscous damping of its drives
+            are fed forward.
         law: The law; its gains' period is the sampling time.
 
     Raises:
@@ -73,6 +74,7 @@ class VelocityServo(LeafSystem):
         self.DeclareVectorOutputPort("fault", 1, self._calc_fault, prerequisites_of_calc=sources)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(law.gains.period, 0.0, self._update)
+        self._viscous = robot.viscous_damping
         function = BoundFunction(gravity_function(robot))
         self._q, self._gravity = function.arguments["q"], function.results["tau"]
         self._evaluate = function.evaluate
@@ -100,7 +102,8 @@ class VelocityServo(LeafSystem):
         if fault:
             torque = self._law.safe_torque(v_M, self._gravity)
         else:
-            torque, x = self._law.torque(v_M, reference, self._gravity, x)
+            load = self._gravity + self._viscous * reference
+            torque, x = self._law.torque(v_M, reference, load, x)
         output.SetFromVector(np.concatenate([torque, x, [fault], self._q]))
 
     def _calc_drive_torque(self, context: Context, output: BasicVector) -> None:

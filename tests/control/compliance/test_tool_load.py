@@ -3,10 +3,11 @@
 import casadi as ca
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
+from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces, SpatialInertia
 
 from pfsc_drake.control.compliance.tool_load import (
     Taring,
@@ -65,6 +66,29 @@ class Robot:
 @pytest.fixture(scope="module")
 def robot():
     return Robot()
+
+
+def test_everything_that_is_fixed_behind_the_sensor_is_tool():
+    """A gripper with a finger on it: the inertia is that which Drake finds of both together."""
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4")))
+    finger_inertia = SpatialInertia.SolidBoxWithMass(0.8, 0.1, 0.04, 0.2)
+    finger = plant.AddRigidBody(
+        "finger", plant.GetFrameByName("tool_point").model_instance(), finger_inertia
+    )
+    tool, joint = plant.GetFrameByName("tool_point"), plant.GetJointByName("weld_tool")
+    X_TF = RigidTransform(RollPitchYaw(0.3, -0.2, 0.5), [0.05, -0.03, 0.1])
+    plant.WeldFrames(tool, finger.body_frame(), X_TF)
+    plant.Finalize()
+    load = tool_load_from_plant(plant, joint, tool)
+    bodies = [joint.child_body().index(), finger.index()]
+    context = plant.CreateDefaultContext()
+    M = plant.CalcSpatialInertia(context, joint.frame_on_child(), bodies)
+    alone = joint.child_body().default_mass()
+    assert load.mass == pytest.approx(alone + 0.8, rel=1e-12)
+    np.testing.assert_allclose(load.p_SC, M.get_com(), atol=1e-12)
+    I_C = M.Shift(M.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
+    np.testing.assert_allclose(load.I_C, I_C, atol=1e-12)
 
 
 def states(seed, n=8):

@@ -1,5 +1,7 @@
 """From the drive input to the joint motion, against Drake's dynamics."""
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -229,6 +231,60 @@ def test_elastic_law_averages_over_the_hold(load_robot):
     assert 6.0 < errors[0] / errors[1] < 10.0
     assert 6.0 < errors[1] / errors[2] < 10.0
     assert 1.8 < naive[1] / naive[2] < 2.2
+
+
+@pytest.mark.parametrize("law", ["elastic", "visco_elastic"])
+def test_damped_drives_are_averaged_over_the_hold(load_robot, law):
+    """The mean motor velocity over the interval, to second order, in Drake's plant."""
+    model, d = "comau_racer_1_4_elastic_3r", np.array([300.0, 200.0, 100.0])
+    joints = (10.0, 8.0, 6.0) if law == "visco_elastic" else ()
+    orders = {"elastic": 3, "visco_elastic": 2}[law]
+    damped, free = load_robot(model, joints, tuple(d)), load_robot(model, joints)
+    state = random_state(damped, np.random.default_rng(11))
+    scale = {"elastic": 1e3, "visco_elastic": 10.0}[law]
+    wanted, none = scale * np.array([2.0, -1.0, 3.0]), np.zeros(3 * orders)
+    errors, naive = [], []
+    # visco-elastic joints have a mode that decays with K_s / K_d
+    for T_s in np.array([2e-3, 1e-3, 5e-4]) * {"elastic": 1.0, "visco_elastic": 0.05}[law]:
+        drives = []
+        for robot in (damped, free):
+            evaluate = compile_law(robot.chain, getattr(actuation, law), orders, T_s)
+            _, gain, drift, offset = evaluate(state, none)
+            drives.append(gain @ wanted + drift + offset)
+        motion = simulate(damped, state, drives[0], lambda t: np.zeros(3), T_s).sol
+        mean = quad_vec(lambda t, motion=motion: d * motion(t)[9:], 0.0, T_s, epsabs=1e-9)[0] / T_s
+        errors.append(np.abs(drives[0] - drives[1] - mean).max())
+        naive.append(np.abs(d * state[9:] - mean).max())
+    assert errors[-1] < 0.1 * naive[-1]
+    assert np.all(np.divide(errors[:-1], errors[1:]) > 3.0)
+
+
+def test_rigid_joints_among_elastic_ones(load_robot):
+    """Each joint by itself: a rigid one as in the rigid robot, an elastic one by its motor."""
+    chain = load_robot("comau_racer_1_4_elastic_3r").chain
+    links = [
+        dataclasses.replace(link, stiffness=k)
+        for link, k in zip(chain.links, (3.5e4, np.inf, 1.9e4), strict=True)
+    ]
+    mixed = dataclasses.replace(chain, links=tuple(links))
+    assert not mixed.is_elastic and not mixed.is_rigid
+    q, v, q_M, v_M = np.random.default_rng(2).uniform(-1, 1, (4, 3))
+    q_M[1], v_M[1] = q[1], v[1]
+    state, damping = np.concatenate([q, v, q_M, v_M]), np.array([0.02, 0.5, 0.03])
+    motion, *law = compile_law(mixed, actuation.rigid, 1)(state, np.zeros(3))
+    assert np.array_equal(motion, [q_M, v_M])
+    expected = compile_law(chain, actuation.rigid, 1)(state, np.zeros(3))[1:]
+    for got, value in zip(law, expected, strict=True):
+        assert np.allclose(got, value, rtol=0, atol=1e-12)
+    drives = [
+        compile_law(robot, actuation.singular_perturbation, 1, damping)(state, np.zeros(3))
+        for robot in (mixed, chain)
+    ]
+    fast = damping * chain.K_s * (v_M - v)
+    assert fast[1] == 0.0 and np.abs(fast[[0, 2]]).min() > 1.0
+    assert np.allclose(drives[0][3], drives[1][3], rtol=0, atol=1e-9)
+    with pytest.raises(InputError, match=r"rigid are motor_2; laws for this robot: .*perturbation"):
+        compile_law(mixed, actuation.elastic, 3, 0.0)
 
 
 def test_extrapolation_makes_the_held_law_second_order(load_robot):

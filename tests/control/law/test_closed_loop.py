@@ -105,13 +105,23 @@ def simulate(loop, x):
     return times, np.array(states)
 
 
+# law, model, joint damping as a fraction of the stiffness [s], orientation, damping of the drives
 CASES = {
-    "velocity servos": ("velocity_servo", "comau_racer_1_4", 0.0, True),
-    "rigid": ("rigid", "comau_racer_1_4", 0.0, True),
-    "visco-elastic": ("visco_elastic", "comau_racer_1_4_elastic", 5e-3, True),
-    "elastic": ("elastic", "comau_racer_1_4_elastic", 0.0, True),
-    "elastic, three axes": ("elastic", "comau_racer_1_4_elastic_3r", 0.0, False),
-    "visco-elastic, three axes": ("visco_elastic", "comau_racer_1_4_elastic_3r", 2e-3, False),
+    "velocity servos": ("velocity_servo", "comau_racer_1_4", 0.0, True, 0.0),
+    "rigid": ("rigid", "comau_racer_1_4", 0.0, True, 0.0),
+    "visco-elastic": ("visco_elastic", "comau_racer_1_4_elastic", 5e-3, True, 0.0),
+    "elastic": ("elastic", "comau_racer_1_4_elastic", 0.0, True, 0.0),
+    "elastic, three axes": ("elastic", "comau_racer_1_4_elastic_3r", 0.0, False, 0.0),
+    "visco-elastic, three axes": ("visco_elastic", "comau_racer_1_4_elastic_3r", 2e-3, False, 0.0),
+    "rigid, damped drives": ("rigid", "comau_racer_1_4", 0.0, True, 20.0),
+    "elastic, damped drives": ("elastic", "comau_racer_1_4_elastic_3r", 0.0, False, 30.0),
+    "visco-elastic, damped drives": (
+        "visco_elastic",
+        "comau_racer_1_4_elastic_3r",
+        2e-3,
+        False,
+        30.0,
+    ),
 }
 
 
@@ -119,11 +129,15 @@ CASES = {
 def test_outputs_obey_the_predicted_linear_dynamics(
     case, load_robot, make_law, virtual_output, oriented_path, position_path
 ):
-    name, model, damping, oriented = CASES[case]
+    name, model, damping, oriented, viscous = CASES[case]
     robot = load_robot(model)
     rigid = load_robot(model.replace("_elastic", ""))
+    if damping or viscous:
+        joints = tuple(damping * robot.chain.K_s) if damping else ()
+        drives = tuple(viscous / (1.0 + i) for i in range(robot.n)) if viscous else ()
+        robot = load_robot(model, joints, drives)
+        assert np.array_equal(robot.chain.viscous_damping, drives or np.zeros(robot.n))
     if damping:
-        robot = load_robot(model, tuple(damping * robot.chain.K_s))
         assert np.allclose(robot.chain.K_d, damping * robot.chain.K_s, rtol=1e-12)
     path = oriented_path if oriented else position_path
     theta = 0.7

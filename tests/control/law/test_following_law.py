@@ -71,7 +71,7 @@ def test_good_input_has_no_fault(tick):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_state_that_is_not_finite_is_a_fault(tick, bad):
-    for index in range(6):
+    for index in range(12):  # of motors too, by whose velocities the safe state brakes
         assert tick.fault(**tick.changed("state", index, bad)) == Fault.INPUT_NOT_FINITE
 
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from pfsc_drake.control.manifolds.manifold import Kind, indices, manifold_force_function
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.jets import Jet
 
 
@@ -40,3 +41,23 @@ def test_force_of_a_moving_point_is_its_power(oriented):
     force = manifold_force_function(manifold)(wrench, point, values[:, 0])
     power = wrench @ twist if oriented else wrench[:3] @ twist[:3]
     assert float(np.array(force).ravel() @ values[:, 1]) == pytest.approx(power, abs=1e-12)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_angles_and_torques_are_called_by_the_axis_they_turn_about(oriented_path, axis):
+    """Small turns of the tool away from the path's orientation, about one axis of it."""
+    manifold, unit = PathManifold(2, oriented=True), np.eye(3)["xyz".index(axis)]
+    point = oriented_path.evaluator(2).evaluate_at(0.7)
+    R_d = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
+    R_e = Jet([ca.SX(R_d @ Rotation.from_rotvec(0.1 * unit).as_matrix()), ca.SX(3, 3)])
+    y_t = Jet([ca.SX(point[manifold.layout.position][:3]), ca.SX(3, 1)])
+    output = manifold.virtual_output(y_t, R_e, ca.SX(point), Jet([ca.SX(0), ca.SX(0)]))
+    angles = [float(ca.DM(x.coefficients[0])) for x in output]
+    wrench = np.concatenate([np.zeros(3), R_d @ unit])
+    forces = np.array(manifold_force_function(manifold)(wrench, point, np.zeros(6))).ravel()
+    found = list(zip(manifold.coordinates, angles, forces, strict=True))
+    for coordinate, angle, force in found[3:]:
+        named = coordinate.name == f"phi_{axis}"
+        assert named == (coordinate.force == f"tau_{axis}")
+        assert angle == pytest.approx(0.1 * named, abs=1e-12)
+        assert force == pytest.approx(1.0 * named, abs=1e-12)

@@ -165,6 +165,14 @@ def test_refused(change, parts):
         assert part in str(caught.value)
 
 
+def test_a_way_there_and_back_is_looked_at_as_a_whole():
+    """Begin and end are within reach, the point where it turns is not."""
+    line = "path.shape=!Line {start: [0, 0, 0.6], end: [0, 0, 1.0]}"
+    build(line, "reference.points=[0.02, 0.03]")
+    with pytest.raises(InputError, match=r"path at eta = 0\..* outside the workspace"):
+        build(line, "reference.points=[0.02, 0.35, 0.03]")
+
+
 def test_replay_draws_robot_and_path_upside_down():
     station = build()
     evaluator, q = station.path.evaluator(2), station.initial_state[:3]

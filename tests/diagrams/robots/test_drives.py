@@ -1,5 +1,6 @@
 """Servos, bus, friction and encoders of a path following station."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import ForcePulse, GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import models_directory
+from pfsc_drake.robot.models.files import models_directory, resolve_model
 from pfsc_drake.robot.models.parameters import load_parameters
 
 KNOWN = load_parameters("comau_racer_1_4").friction
@@ -35,11 +36,11 @@ def build(settings):
     return build_station(settings, Path())
 
 
-def run(settings, duration):
+def run(settings, duration, max_step=TICK):
     station = build(settings)
     simulator = Simulator(station.diagram)
     configuration = SimulatorConfig(
-        integration_scheme="runge_kutta3", max_step_size=TICK, use_error_control=False
+        integration_scheme="runge_kutta3", max_step_size=max_step, use_error_control=False
     )
     ApplySimulatorConfig(configuration, simulator)
     station.set_start(simulator.get_mutable_context())
@@ -91,6 +92,37 @@ def test_servos_hold_the_weight_at_the_start(settings, load_arm):
     np.testing.assert_allclose(signals["drive_torque"][0], weight, atol=1e-6)
 
 
+def test_servos_without_integral_part_answer_at_once(settings, load_arm):
+    """``g + K_w (v_ref - v)`` with ``K_w = J (1 - exp(-omega T)) / T``, J at the start."""
+    settings.controller.law = "velocity_servo"
+    settings.servo.integral_rate = 0.0
+    settings.start.offset = [0.005, 0.0]
+    station, _, signals = run(settings, 0.02)
+    arm = load_arm("comau_racer_1_4_3r")
+    arm.plant.SetPositions(arm.context, station.initial_state[:3])
+    J = np.diag(arm.plant.CalcMassMatrix(arm.context))
+    gain = J * (1.0 - np.exp(-settings.servo.bandwidth * TICK)) / TICK
+    lag = signals["law"][:, station.law.layout.drive] - signals["joint_state"][:, 9:]
+    weight = np.array([arm.weight(q) for q in signals["joint_state"][:, :3]])
+    assert np.abs(gain * lag).max() > 10.0
+    np.testing.assert_allclose(signals["drive_torque"], weight + gain * lag, rtol=0, atol=1e-6)
+
+
+def test_servos_keep_the_scaled_limits(settings, load_arm):
+    """Weaker drives than the model's: servos that start off the path use them up, no more."""
+    settings.controller.law = "velocity_servo"
+    settings.start.offset = [0.02, 0.0]
+    full, _, signals = run(settings, 0.02)
+    wanted = np.abs(signals["drive_torque"]).max(axis=0) / full.robot.gather("effort_limit")
+    weight = np.abs(load_arm("comau_racer_1_4_3r").weight(full.initial_state[:3]))
+    scale = 0.5 * wanted.max()
+    assert np.all(weight < scale * full.robot.gather("effort_limit"))
+    settings.controller.effort_scale = scale
+    station, _, signals = run(settings, 0.02)
+    used = np.abs(signals["drive_torque"]) / station.robot.gather("effort_limit")
+    assert used.max() == pytest.approx(scale, rel=1e-12)
+
+
 def test_a_bus_delays_by_its_time(settings):
     """A velocity law that starts off the path: the first wanted velocity arrives 3 ticks late."""
     settings.controller.law = "velocity_servo"
@@ -111,6 +143,25 @@ def test_a_bus_delays_by_its_time(settings):
     np.testing.assert_array_equal(delivered[3:], sent[: len(delivered) - 3])
 
 
+def test_a_bus_samples_at_the_ticks_of_the_law_whatever_the_servo_does(settings):
+    """Else the law would be evaluated between its ticks, with a measurement it never got."""
+    settings.controller.law = "velocity_servo"
+    settings.servo.bus_delay, settings.servo.period = 2 * TICK, TICK / 4
+    settings.start.offset = [0.005, 0.0]
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    bus = station.diagram.GetSubsystemByName("bus_delay")
+    delivered = []
+    for quarter in range(40):
+        simulator.AdvanceTo((quarter + 0.5) * TICK / 4)
+        delivered.append(bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(root)))
+    sent = station.log.read(root)[1]["law"][:, station.law.layout.drive]
+    np.testing.assert_array_equal(delivered[8:], np.repeat(sent, 4, axis=0)[:32])
+
+
 def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
     settings.controller.law = "velocity_servo"
     settings.servo.period = 0.25 * TICK
@@ -119,8 +170,12 @@ def test_a_faster_servo_gets_the_velocity_of_the_tick(settings):
     assert deviation(station, signals).max() < 1e-3
 
 
-def test_friction_acts_against_the_motion(settings):
-    """Law and drives as without friction, but the drives carry it: tau_d = g + friction."""
+@pytest.mark.parametrize("increments", [[], [2000.0]])
+def test_friction_acts_against_the_motion(settings, increments):
+    """The true one, whatever the encoders make of it."""
+    settings.encoders.motor_increments = increments
+    settings.encoders.difference_quotient = bool(increments)
+    settings.encoders.filter_time = 0.02 if increments else 0.0
     settings.friction.f_c, settings.friction.f_v = [40.0, 100.0, 20.0], [15.0, 90.0, 40.0]
     _, _, signals = run(settings, 0.3)
     velocity = signals["joint_state"][:, 9:]
@@ -130,6 +185,21 @@ def test_friction_acts_against_the_motion(settings):
     expected = np.array([40.0, 100.0, 20.0]) * np.sign(velocity)
     expected += np.array([15.0, 90.0, 40.0]) * velocity
     np.testing.assert_allclose(torque[moving], expected[moving], atol=1e-6)
+
+
+@pytest.mark.parametrize(("step", "softness"), [(TICK / 4, 1 / 16), (4 * TICK, 1.0)])
+def test_stuck_joints_give_way_as_little_as_the_integration_allows(settings, step, softness):
+    """Bristles bend with the square of the step, which is never longer than the hold."""
+    settings.friction.f_c = [100.0, 100.0, 100.0]
+    settings.reference.dwell = 1.0
+    settings.forces = [ForcePulse(0.0, 1.0, np.array([0.0, 30.0, 0.0]), ramp=0.02)]
+    bends = []
+    for max_step in (TICK, step):
+        settings.simulation.max_step = max_step
+        _, _, signals = run(settings, 0.1, max_step)
+        bends.append(signals["joint_state"][-1, 0] - signals["joint_state"][0, 0])
+    assert np.abs(signals["friction_torque"][-1, 0]) > 10.0
+    assert bends[1] == pytest.approx(softness * bends[0], rel=0.05)
 
 
 def test_friction_reaches_the_joints(settings):
@@ -147,6 +217,35 @@ def test_friction_reaches_the_joints(settings):
     force = station.part.plant.get_applied_generalized_force_input_port()
     applied = force.Eval(station.part.plant.GetMyContextFromRoot(root))
     np.testing.assert_allclose(applied, [-3.0, 4.0, -3.0], atol=1e-12)
+
+
+def test_friction_is_that_of_the_motors(settings):
+    """The links of elastic joints swing, the friction is in the drives."""
+    settings.robot.model = "comau_racer_1_4_elastic_3r"
+    settings.friction.f_v = [15.0, 90.0, 40.0]
+    _, _, signals = run(settings, 0.2)
+    _, v_J, _, v_M = np.hsplit(signals["joint_state"], 4)
+    assert np.abs(v_M - v_J).max() > 1e-3
+    np.testing.assert_allclose(signals["friction_torque"], v_M * [15.0, 90.0, 40.0], atol=1e-9)
+
+
+def test_friction_goes_with_error_control_by_any_scheme(settings):
+    settings.friction.f_v = [15.0, 90.0, 40.0]
+    settings.simulation.integrator, settings.simulation.accuracy = "implicit_euler", 1e-4
+    assert "joint_friction" in names(build(settings))
+
+
+def test_friction_needs_rotors(settings, tmp_path):
+    """A drive without inertia of its own could not stick at any step."""
+    text = resolve_model("comau_racer_1_4_3r").read_text(encoding="utf-8")
+    bare, count = re.subn(r"<drake:rotor_inertia>[^<]*<", "<drake:rotor_inertia>0<", text)
+    assert count == 3
+    (tmp_path / "bare.sdf").write_text(bare, encoding="utf-8")
+    settings.robot.model = "bare.sdf"
+    build_station(settings, tmp_path)
+    settings.friction.f_c = [1.0, 1.0, 1.0]
+    with pytest.raises(InputError, match="friction: needs a robot with rotor inertia"):
+        build_station(settings, tmp_path)
 
 
 def test_friction_of_the_robot_itself(settings):
@@ -199,3 +298,29 @@ def test_encoders_differentiate(settings):
     _, _, signals = run(settings, 0.2)
     q_J, v_J, _, _ = np.hsplit(signals["joint_state_measured"], 4)
     np.testing.assert_allclose(v_J[1:], np.diff(q_J, axis=0) / TICK, atol=1e-9)
+
+
+def test_encoders_of_a_fast_servo_differentiate_over_its_own_period(settings):
+    """Else it would act on a velocity that is up to three of its periods old."""
+    settings.controller.law = "velocity_servo"
+    period = settings.servo.period = TICK / 4
+    settings.encoders.link_increments = settings.encoders.motor_increments = [1e8]
+    settings.encoders.difference_quotient = True
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    encoders = station.diagram.GetSubsystemByName("encoder_increments")
+    plant, measured, torques = station.part.plant, [], []
+    for tick in range(400):
+        simulator.AdvanceTo(tick * period)
+        actuation = plant.get_actuation_input_port()
+        torques.append(actuation.Eval(plant.GetMyContextFromRoot(root)))
+        inner = encoders.GetMyContextFromRoot(root)
+        measured.append(encoders.GetOutputPort("joint_state").Eval(inner)[6:])
+    q_M, v_M = np.hsplit(np.array(measured), 2)
+    assert np.abs(v_M[-1]).max() > 1e-2
+    np.testing.assert_allclose(v_M[1:], np.diff(q_M, axis=0) / period, atol=1e-9)
+    # and its torques act over one of its periods
+    assert np.abs(np.diff(torques[300:], axis=0)).max(axis=1).min() > 0.0

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import ForcePulse, HandParameters, HandWaypoint, PathFollowingScenario
+from diagrams.scenario import (
+    ForcePulse,
+    HandParameters,
+    HandWaypoint,
+    Line,
+    PathFollowingScenario,
+)
+from diagrams.tasks.path_following import make_task
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
@@ -141,6 +148,28 @@ def test_hands_that_cannot_be(load_scenario, change, part):
     settings.hand = HandParameters(**change)
     with pytest.raises(InputError, match=part):
         build_station(settings, SCENARIOS)
+
+
+def test_an_open_path_may_be_held_at_its_very_ends(settings):
+    settings.path.shape = Line([0.8, -0.1, 1.0], [0.8, 0.4, 1.0])
+    settings.reference.points = [0.1, 0.1]
+    ends = [HandWaypoint(0.0, [0.0, 0, 0]), HandWaypoint(1.0, [0.5, 0, 0])]
+    settings.hand = HandParameters(ends, "manifold")
+    assert build_station(settings, SCENARIOS).path.length == pytest.approx(0.5, rel=1e-9)
+    # what is said in world axes has nothing to do with the length
+    settings.hand = steady_hand([0.8, 0.0, 1.0])
+    build_station(settings, SCENARIOS)
+
+
+def test_a_closed_path_counts_on(settings):
+    """A target one lap later is the same place."""
+    wrenches = []
+    lap = make_task(settings, SCENARIOS).path.length
+    for eta in (0.98, 0.98 + lap):
+        settings.hand = steady_hand([eta, 0.0, 0.01], frame="manifold", grip_ramp=0.005)
+        wrenches.append(run(settings, 0.02)[1]["wrench_ext"].values)
+    assert np.abs(wrenches[0][-1]).max() > 1.0
+    np.testing.assert_allclose(wrenches[1], wrenches[0], atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,21 @@
 """Workpiece and ball: shapes, places, and the station that holds them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.builder import build_station
+from diagrams.builder import build_station, build_station_replay
+from diagrams.drawing.replay import RecordedMotion
 from diagrams.scenario import PathFollowingScenario
 from diagrams.surroundings.notch import notch_surface
 from diagrams.surroundings.notch_motion import place_in_notch
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.delta.shapes import PLATE
 from pfsc_drake.yaml.typed import load_typed
 
 FILE = SCENARIO_DIRECTORY / "pfc_delta_notch.yaml"
@@ -56,6 +61,14 @@ def test_surface_is_round_about_the_displaced_axis(settings, station):
     assert nearest.min() > notch.ball.radius
 
 
+def test_a_notch_without_upright_walls_has_no_empty_triangles(settings, station):
+    """As deep as it is round, the rim begins where the arc ends."""
+    shallow = dataclasses.replace(settings.notch, depth=settings.notch.radius)
+    vertices, triangles = notch_surface(station.path, shallow, UP)
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-8
+
+
 def test_surface_is_open_upwards(settings, station):
     vertices, triangles = notch_surface(station.path, settings.notch, UP)
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
@@ -77,6 +90,14 @@ def test_places_in_the_notch(settings, station):
     places = place_in_notch(path, notch, np.array([seat, seat + 1e-3 * left]), theta, UP)
     below = notch.clearance * above @ UP  # the axis is above, not normal to the path
     np.testing.assert_allclose(places, [[0.0, -below], [1e-3, -below]], atol=1e-5)
+    # from the start on, whose parameter the station knows
+    taught, slope = path.position.derivatives(np.array([station.initial_theta]), 1)[0]
+    left = np.cross(UP, slope) / np.linalg.norm(np.cross(UP, slope))
+    here = taught + notch.displacement + notch.clearance * UP + 1e-3 * left
+    further = station.further_lengths(here[None])["notch_position"]
+    named = dict(zip(further.labels, further.values[0], strict=True))
+    assert named["left"] == pytest.approx(1e-3, abs=2e-5)
+    assert named["above"] == pytest.approx(0.0, abs=2e-5)
 
 
 def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station):
@@ -88,6 +109,18 @@ def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station
     contact = station.diagram.GetSubsystemByName("contact_wrench")
     wrench = contact.GetOutputPort("wrench").Eval(contact.GetMyContextFromRoot(root))
     assert not wrench.any()
+
+
+def test_the_balls_shell_is_of_its_material(settings, station):
+    scene = station.diagram.GetSubsystemByName("scene_graph").model_inspector()
+    tool = station.part.plant.GetBodyByName("tool")
+    (ball,) = station.part.plant.GetCollisionGeometriesForBody(tool)
+    properties, parameters = scene.GetProximityProperties(ball), settings.notch.ball
+    for group, name, value in (
+        ("material", "hunt_crossley_dissipation", parameters.dissipation),
+        ("hydroelastic", "hydroelastic_modulus", parameters.modulus),
+    ):
+        assert properties.GetProperty(group, name) == value > 0.0
 
 
 def test_sensor_carries_the_load_of_the_robot():
@@ -111,6 +144,24 @@ def test_robot_has_the_same_mass_as_without_a_notch(station):
     carried = sum(plant.GetBodyByName(name).default_mass() for name in ("end_effector", "tool"))
     assert carried == pytest.approx(masses.effective_plate)
     assert plant.GetBodyByName("tool").default_mass() == pytest.approx(masses.load)
+
+
+def test_the_gripper_hangs_from_the_plate_down_to_the_ball(settings, station):
+    """Its middle is half way down, z_0 points down; so much torque is on the sensor."""
+    com = station.part.plant.GetBodyByName("tool").default_com()
+    np.testing.assert_allclose(com, [0.0, 0.0, settings.notch.ball.distance / 2.0], atol=1e-12)
+
+
+def test_the_recording_shows_workpiece_and_ball(settings, station):
+    y_t = station.robot.tool_position(station.initial_state[:3])
+    point = station.path.evaluator(2)(y_t.tolist(), station.initial_theta)
+    pose = np.concatenate([y_t, np.eye(3).ravel()])
+    rows = (np.tile(row, (2, 1)) for row in (station.initial_state[:3], pose, point))
+    motion = RecordedMotion(np.array([0.0, 0.04]), *rows)
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    build_station_replay(settings, SCENARIO_DIRECTORY, station, motion, meshcat)
+    assert meshcat.HasPath("/drake/workpiece")
+    assert meshcat.HasPath(f"/drake/delta_robot/{PLATE}/ball")
 
 
 @pytest.mark.parametrize(

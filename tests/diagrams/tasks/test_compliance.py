@@ -9,6 +9,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.yaml.typed import load_typed
@@ -74,6 +75,24 @@ def test_an_untared_sensor_moves_nothing(settings):
     assert yielding[~tared].max() < 1e-12
     # afterwards what the mean of the window missed, some 10 mN
     assert motion.max() < 2e-5
+
+
+def test_the_reference_starts_where_the_tool_is(settings):
+    """An arm that starts beside its path is not pulled onto it before its sensor is tared."""
+    settings.start.offset = [0.01, -0.005]
+    _, _, signals = run(settings, 0.03)
+    assert not signals["tared"].any()
+    reference = signals["reference"][:, 1:3]
+    np.testing.assert_allclose(reference, np.tile([0.01, -0.005], (len(reference), 1)), atol=1e-8)
+    assert np.abs(signals["tool_pose"] - signals["tool_pose"][0]).max() < 1e-8
+
+
+def test_a_sensor_too_weak_for_its_tool_says_so(settings):
+    """The tool weighs 14 N."""
+    settings.sensor.measurement_range = np.repeat([10.0, 20.0], 3)
+    _, _, signals = run(settings, 0.1)
+    assert np.all(signals["sensor_fault"][2:] == SensorFault.SATURATED)
+    assert not signals["tared"].any()
 
 
 @pytest.mark.parametrize("axis", [1, 2])

@@ -70,6 +70,22 @@ def test_a_push_along_the_path_shifts_the_reference(arm, load_scenario, force):
     assert np.abs(log["xi"].values[late]).max() < 1e-3
 
 
+@pytest.mark.parametrize("with_turning", [False, True])
+def test_a_torque_pushes_along_a_path_that_turns_if_it_is_to(settings, with_turning):
+    """By its power: torque times the turn of the path's orientation per metre."""
+    settings.compliance.tangential = impedance(3.0, 85.0, Profile(6000.0))
+    settings.compliance.with_turning = with_turning
+    torque = np.array([4.0, -3.0, 5.0])
+    settings.forces = [ForcePulse(0.06, 2.0, np.zeros(3), torque, ramp=0.02)]
+    station, log, _ = run(settings, 0.15)
+    theta = station.path.arc_length.parameter
+    ends = [station.path.orientation.rotation_matrix(theta(0.3 + h)) for h in (1e-4, -1e-4)]
+    turn = Rotation.from_matrix(ends[0] @ ends[1].T).as_rotvec() / 2e-4
+    assert abs(turn @ torque) > 1.0
+    expected = turn @ torque if with_turning else 0.0
+    assert log["manifold_force"].values[-1, 0] == pytest.approx(expected, abs=0.3)
+
+
 @pytest.mark.parametrize("axis", range(3))
 def test_a_torque_turns_the_tool(settings, axis):
     """By tau / k about the axis of the torque, in the world, whatever the angles are called."""

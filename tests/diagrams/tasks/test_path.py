@@ -18,6 +18,7 @@ from diagrams.scenario import (
 from diagrams.tasks.path import make_path
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import shape_report
 
 # an arc of a helix, radius 0.3 m, with the tool tilted more and more
 ANGLE = np.linspace(0.0, 2.0, 9)
@@ -146,7 +147,7 @@ def test_on_a_closed_path_the_first_keyframe_stands_for_the_end():
     np.testing.assert_allclose(before, after, atol=1e-5)
 
 
-@pytest.mark.parametrize("thetas", [(0.1, 0.5, 1.0), (0.0, 0.5, 0.9), (0.0, 0.5, 1.1)])
+@pytest.mark.parametrize("thetas", [(0.1, 0.5, 1.0), (0.0, 0.5, 0.9)])
 def test_keyframes_must_cover_an_open_path(thetas):
     keyframes = [Keyframe(t, [0.0, 0.0, 10.0 * t]) for t in thetas]
     with pytest.raises(InputError) as caught:
@@ -160,14 +161,115 @@ def test_keyframes_must_increase():
         make(Line(), keyframes)
 
 
-def test_orientation_of_waypoints_and_keyframes_that_replace_it(tmp_path):
+def test_orientation_of_waypoints_or_keyframes(tmp_path):
     columns = ["x", "y", "z", "zyx_1", "zyx_2", "zyx_3"]
     write_csv(tmp_path, columns, np.hstack([POSITIONS, ZYX]))
     path = make(Waypoints("points.csv"), folder=tmp_path)
     thetas = [path.project_globally(p).theta for p in POSITIONS]
     expected = Rotation.from_euler("ZYX", ZYX).as_matrix()
     np.testing.assert_allclose(path.orientation.rotation_matrix(thetas), expected, atol=1e-9)
-    replaced = make(Waypoints("points.csv"), [Keyframe(0.0, [90.0, 0.0, 0.0])], folder=tmp_path)
+    keyframe = Keyframe(0.0, [90.0, 0.0, 0.0])
+    with pytest.raises(InputError, match=r"keyframes: 1 given, and points\.csv has columns .* too"):
+        make(Waypoints("points.csv"), [keyframe], folder=tmp_path)
+    write_csv(tmp_path, columns[:3], POSITIONS)
+    other = make(Waypoints("points.csv"), [keyframe], folder=tmp_path)
     expected = Rotation.from_euler("ZYX", [90, 0, 0], degrees=True).as_matrix()
-    np.testing.assert_allclose(replaced.orientation.rotation_matrix(0.2), expected, atol=1e-14)
-    np.testing.assert_array_equal(replaced.position.breakpoints, path.position.breakpoints)
+    np.testing.assert_allclose(other.orientation.rotation_matrix(0.2), expected, atol=1e-14)
+    np.testing.assert_array_equal(other.position.breakpoints, path.position.breakpoints)
+    np.testing.assert_array_equal(other.waypoints.positions, POSITIONS)
+
+
+@pytest.mark.parametrize(("law", "smoothness"), [("rigid", 3), ("elastic", 5)])
+def test_a_tolerance_smooths_noisy_waypoints(tmp_path, law, smoothness):
+    angle = np.linspace(0.0, 2.0, 600)
+    helix = np.stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), 0.1 * angle], axis=1)
+    zyx = np.rad2deg(np.stack([0.1 * angle, 0.2 * angle, 0.0 * angle], axis=1))
+    rng = np.random.default_rng(1)
+    noise = np.array([2e-4] * 3 + [0.05] * 3)
+    rows = np.hstack([helix, zyx]) + noise * rng.normal(size=(600, 6))
+    columns = ["x", "y", "z", "zyx_deg_1", "zyx_deg_2", "zyx_deg_3"]
+    write_csv(tmp_path, columns, rows)
+    shape = Waypoints("points.csv", tolerance=1e-3, tolerance_deg=0.3)
+    path = make(shape, law=law, folder=tmp_path)
+    assert path.position.smoothness == smoothness
+    at_points = positions(path, path.waypoints.parameters)
+    assert np.linalg.norm(at_points - rows[:, :3], axis=1).max() <= 1e-3
+    turned = Rotation.from_matrix(path.orientation.rotation_matrix(path.waypoints.parameters))
+    taught = Rotation.from_euler("ZYX", rows[:, 3:], degrees=True)
+    assert np.rad2deg((turned.inv() * taught).magnitude()).max() <= 0.3
+    shape = shape_report(path)
+    # of a helix: (r^2 + h^2) / r
+    assert shape.smallest_radius == pytest.approx(0.1 / 0.3, rel=0.1)
+
+
+def test_corners_are_rounded(tmp_path):
+    corners = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0.0, 0.1, 0.0]])
+    zyx = np.array([[0.0, 0, 0], [30, 0, 0], [90, 0, 0], [0, 0, 0]])
+    columns = ["x", "y", "z", "zyx_deg_1", "zyx_deg_2", "zyx_deg_3"]
+    write_csv(tmp_path, columns, np.hstack([corners, zyx]))
+    path = make(Waypoints("points.csv", closed=True, corner_distance=0.02), folder=tmp_path)
+    assert (path.position.smoothness, path.orientation.smoothness) == (5, 5)
+    middles = [0.1, 0.25, 0.4, 0.55]
+    np.testing.assert_allclose(
+        positions(path, middles), (corners + np.roll(corners, -1, 0)) / 2, atol=1e-14
+    )
+    turn = Rotation.from_matrix(path.orientation.rotation_matrix(middles)).as_euler("ZYX", True)
+    np.testing.assert_allclose(turn[:, 0], [15.0, 60.0, 45.0, 0.0], atol=1e-9)
+    assert shape_report(path).distance_from_points < 0.01
+
+
+@pytest.mark.parametrize(
+    ("keys", "parts"),
+    [
+        ({"tolerance": -1.0}, ("tolerance = -1.0", "1e-07 m to 10000 m")),
+        ({"tolerance": math.nan}, ("tolerance = nan",)),
+        ({"tolerance_deg": 0.0}, ("tolerance_deg = 0.0", "90 deg")),
+        ({"tolerance": 1e-3, "corner_distance": 0.1}, ("corner_distance = 0.1", "tolerance")),
+        ({"corner_distance": 1e300}, ("corner_distance = 1e+300",)),
+    ],
+)
+def test_options_of_waypoints(keys, parts):
+    with pytest.raises(InputError) as caught:
+        Waypoints("points.csv", **keys)
+    assert all(part in str(caught.value) for part in parts)
+
+
+@pytest.mark.parametrize("key", ["tolerance", "corner_distance"])
+def test_a_column_theta_leaves_no_choice(tmp_path, key):
+    rows = np.hstack([ANGLE[:, None], POSITIONS])
+    write_csv(tmp_path, ["theta", "x", "y", "z"], rows)
+    with pytest.raises(InputError, match=f"column theta; path.shape.{key} makes its own"):
+        make(Waypoints("points.csv", **{key: 1e-3}), folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("make_shape", "part"),
+    [
+        (lambda: Circle(radius=1e300), "radius = 1e+300; allowed: 0.0001 m to 10000 m"),
+        (lambda: Circle(radius=1e-300), "radius = 1e-300"),
+        (lambda: Circle(center=[1e300, 0, 0]), "center = [1e+300, 0, 0]"),
+        (lambda: Line([0, 0, 0], [0, 0, 1e-300]), "distance of start and end = 1e-300"),
+        (lambda: Line([-1e300, 0, 0], [0, 0, 1.0]), "start = [-1e+300, 0, 0]"),
+        (lambda: OrientationParameters("zyx", [Keyframe(0, [1e300, 0, 0])]), "at most 3600 deg"),
+        (lambda: OrientationParameters("zyx", [Keyframe(30.0)]), "theta = 30.0; allowed: 0 to 1"),
+    ],
+)
+def test_lengths_and_angles_beyond_all_robots(make_shape, part):
+    with pytest.raises(InputError) as caught:
+        make_shape()
+    assert part in str(caught.value)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 0.05, 179.95, 180.0])
+def test_axes_of_a_circle_that_span_no_plane(tilt):
+    axis = [1e200 * math.cos(math.radians(tilt)), 1e200 * math.sin(math.radians(tilt)), 0.0]
+    angle = min(tilt, 180.0 - tilt)
+    with pytest.raises(InputError, match=r"deg between them; at least 0\.1 deg") as caught:
+        make(Circle(axis_u=[1.0, 0.0, 0.0], axis_v=axis))
+    assert float(str(caught.value).split(" deg")[0].split()[-1]) == pytest.approx(angle, abs=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_axes_of_a_circle_may_have_any_length():
+    path = make(Circle(axis_u=[0.0, 1e300, 0.0], axis_v=[0.0, 1e-300, 1e-300]))
+    assert path.length == pytest.approx(0.3 * math.pi)

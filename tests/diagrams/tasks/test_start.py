@@ -1,12 +1,14 @@
 """The state in which a run starts, against Drake's kinematics and dynamics."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
+from diagrams.robots.start_posture import describe_posture, posture_warnings
 from diagrams.scenario import Circle, Line
 from diagrams.tasks.path_following import make_task
 from pfsc_drake.errors import InputError
@@ -134,6 +136,17 @@ def test_start_without_posture(on_line, start):
     assert np.all((lower <= arm.angles("motor")) & (arm.angles("motor") <= upper))
 
 
+@pytest.mark.parametrize("name", [THREE, SIX])
+def test_without_posture_the_arm_starts_near_the_middle_of_its_ranges(load_scenario, start, name):
+    """From near an end of them neither of these starts would be found."""
+    settings = load_scenario(name)
+    settings.start.posture_deg = []
+    _, _, arm, _ = start(settings)
+    lower, upper = arm.chain.gather("position_limits").T
+    away = np.abs(arm.angles("motor") - (lower + upper) / 2.0)
+    assert np.all(away < 0.9 * (upper - lower) / 2.0)
+
+
 @pytest.mark.parametrize("laps", [-1, 1, 2])
 def test_start_laps_later(load_scenario, start, laps):
     """A closed path counts its laps; the place is the same."""
@@ -192,3 +205,94 @@ def test_posture_of_another_robot(on_line, start, posture):
     settings = on_line()
     settings.start.posture_deg = posture
     refused(start, settings, "start.posture_deg", str(len(posture)), "3 joints")
+
+
+def beam(name, joint):
+    """Return a link of a robot, and the joint that carries it, as URDF."""
+    return (
+        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
+        f'ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="{name}_joint" {joint}</joint>'
+    )
+
+
+@pytest.fixture
+def on_rails(tmp_path, load_scenario):
+    """A scenario of a robot with a rail, a lift and an arm of 1 m; it starts at (0, 0.6, 0.2)."""
+    limit = '<limit lower="-3" upper="3" effort="100" velocity="1"/>'
+    rail = f'type="prismatic"><parent link="world"/><child link="rail"/>{limit}'
+    lift = f'type="prismatic"><parent link="rail"/><child link="lift"/><axis xyz="0 0 1"/>{limit}'
+    arm = f'type="revolute"><parent link="lift"/><child link="arm"/><axis xyz="0 0 1"/>{limit}'
+    tool = (
+        '<link name="tool_point"/><joint name="t" type="fixed"><parent link="arm"/>'
+        '<child link="tool_point"/><origin xyz="1 0 0"/></joint>'
+    )
+    file = tmp_path / "rails.urdf"
+    text = '<link name="world"/>' + beam("rail", rail) + beam("lift", lift) + beam("arm", arm)
+    file.write_text(f'<robot name="rails">{text}{tool}</robot>', encoding="utf-8")
+    settings = load_scenario(THREE)
+    settings.robot.model = str(file)
+    settings.path.shape = Line([0.0, 0.6, 0.2], [0.5, 0.6, 0.2])
+    settings.reference.points, settings.start.offset = [0.0, 0.4], [0.0, 0.0]
+    return settings
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
+    """The arm reaches the point from either side; the place on the rail says from which."""
+    on_rails.start.posture_deg = [0.8 * side, 0.2, 90.0 - 5.0 * side]
+    _, _, arm, x = start(on_rails)
+    q = (arm.coordinates.link_rows @ x)[:3]
+    np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
+    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, False) == []
+    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, False)
+    assert "lift_joint most" in warning and f"rail_joint {0.8 * side:g} m" in warning
+
+
+def test_a_posture_in_radians(load_scenario, start):
+    settings = load_scenario(SIX)
+    given = settings.start.posture_deg
+    _, _, arm, x = start(settings)
+    found = (arm.coordinates.link_rows @ x)[:6]
+    assert posture_warnings(given, arm.chain, found, True) == []
+    assert posture_warnings([], arm.chain, found, True) == []
+    in_radians = np.deg2rad(given).round(2).tolist()
+    (warning,) = posture_warnings(in_radians, arm.chain, found, True)
+    line = describe_posture(arm.chain, found)
+    assert "radians" in warning and line in warning
+    assert "write [25.21, 115.2, -40.11, -5.157, 95.11, -17.19]" in warning
+    assert line.startswith(f"motor_1 {np.rad2deg(found[0]):.4g} deg, motor_2 ")
+
+
+def test_a_posture_far_from_any_solution(load_scenario, start):
+    _, _, arm, x = start(load_scenario(SIX))
+    found = (arm.coordinates.link_rows @ x)[:6]
+    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found, True)
+    assert "far from any solution, motor_6 most" in warning
+    # small angles in degrees are no radians
+    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found, True)
+    assert "far from any solution" in warning
+
+
+def test_a_posture_in_radians_that_leads_astray(load_scenario, start):
+    """Taken for degrees, the posture leads to the other wrist; the digits still tell."""
+    settings = load_scenario(SIX)
+    settings.start.posture_deg = [25, 115, -40, 175, -95, 163]
+    _, _, arm, x = start(settings)
+    other = (arm.coordinates.link_rows @ x)[:6]
+    in_radians = np.deg2rad([25, 115, -40, -5, 95, -17]).round(2).tolist()
+    (warning,) = posture_warnings(in_radians, arm.chain, other, True)
+    assert "radians" in warning
+
+
+@pytest.mark.parametrize("limit", ["1e16", "1e150"])
+def test_without_a_posture_half_limited_joints_start_where_they_can(on_rails, start, limit):
+    """The middle of -3 and infinity is nowhere; the lift may only be above 0.1 m."""
+    file = Path(on_rails.robot.model)
+    text = file.read_text(encoding="utf-8")
+    text = text.replace('upper="3"', f'upper="{limit}"', 2)
+    second = text.index("lift_joint")
+    text = text[:second] + text[second:].replace('lower="-3"', 'lower="0.1"', 1)
+    file.write_text(text, encoding="utf-8")
+    on_rails.start.posture_deg = []
+    _, _, arm, _ = start(on_rails)
+    np.testing.assert_allclose(arm.tool_pose()[0], [0.0, 0.6, 0.2], atol=1e-8)

@@ -4,6 +4,8 @@ Status 2, one line on stderr that names the file, the thing, the value and what 
 is simulated.
 """
 
+import os
+
 import pytest
 
 from pfsc_drake.robot.models.files import resolve_model
@@ -43,6 +45,58 @@ def test_a_joint_without_drive(refused, mine, tmp_path):
     refused(mine(), "robot.model", "actuator", changes=["robot.model=lame.sdf"])
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        ("<mass>50.98077</mass>", "<mass>-1</mass>", ["link 'link_1'", "mass = -1"]),
+        ("<mass>50.98077</mass>", "<mass></mass>", ["link 'link_1'", "mass = empty"]),
+        ("<ixx>2.0392", "<ixx>9.0392", ["link 'link_1'", "principal moments"]),
+        ("<spring_stiffness>", "<spring_stiffness>-", ["'flex_1'", "stiffness = -"]),
+        ("<upper>", "<upper>-", ["'motor_1'", "lower, upper = -2.87979, -2.87979"]),
+        ("<drake:gear_ratio>90", "<drake:gear_ratio>0", ["'motor_1'", "gear_ratio = 0"]),
+        ("<drake:rotor_inertia>", "<drake:rotor_inertia>nan", ["'motor_1'", "rotor_inertia"]),
+        ("</model>", "<include><uri>arm.sdf</uri></include></model>", ["includes itself"]),
+    ],
+)
+def test_numbers_that_no_robot_has(refused, mine, tmp_path, old, new, parts):
+    text = resolve_model("comau_racer_1_4_elastic_3r").read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "arm.sdf"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    refused(
+        mine(), "robot.model: ", *parts, "allowed: ", changes=["robot.model=arm.sdf"], file=file
+    )
+
+
+def test_files_that_are_no_files(refused, mine, tmp_path):
+    os.mkfifo(tmp_path / "pipe.sdf")
+    refused(mine(), "pipe.sdf", "regular file", changes=["robot.model=pipe.sdf"])
+    (tmp_path / "folder.sdf").mkdir()
+    refused(mine(), "folder.sdf", "regular file", changes=["robot.model=folder.sdf"])
+    refused(mine(), "no such file", changes=[f"robot.model={'x' * 300}.sdf"])
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        ("robot.base=elbow", ["robot.base: 'elbow'"]),
+        ("robot.base_pose={position: [0, 0]}", ["robot.base_pose", "position = [0.0, 0.0]"]),
+        ("robot.base_pose.zyx=[0, 0, 0]", ["zyx", "zyx_deg"]),
+        ("robot.gravity=[0, 0]", ["robot", "gravity = [0.0, 0.0]", "3 finite numbers"]),
+        ("robot.gravity=9.81", ["robot.gravity", "9.81", "a list"]),
+        ("robot.fixed_joints={elbow: 1}", ["robot.fixed_joints: 'elbow'", "motor_1, "]),
+        ("robot.fixed_joints={flex_1: 0}", ["robot.fixed_joints: 'flex_1'", "spring"]),
+        ("robot.packages={mine: nope}", ["robot.packages: mine", "no such folder"]),
+        ("robot.elastic.stiffness=1e4", ["robot.elastic: ", "elastic already"]),
+        ("robot.elastic.stiffness=soft", ["robot.elastic.stiffness[0]", "'soft'", "a number"]),
+        ("robot.elastic.stiffness=-1", ["robot.elastic", "stiffness = [-1.0]", ".inf for a rigid"]),
+        ("robot.elastic.gear_ratio=[1, 0]", ["robot.elastic", "gear_ratio = [1.0, 0.0]"]),
+    ],
+)
+def test_keys_of_the_robot(refused, mine, change, parts):
+    refused(mine(), *parts, changes=[change])
+
+
 @pytest.mark.parametrize("law", ["elastic", "singular_perturbation"])
 def test_law_for_elastic_joints_on_a_rigid_robot(refused, mine, law):
     changes = ["robot.model=comau_racer_1_4_3r", f"controller.law={law}"]
@@ -50,7 +104,7 @@ def test_law_for_elastic_joints_on_a_rigid_robot(refused, mine, law):
 
 
 def test_as_many_outputs_as_joints(refused, mine):
-    parts = ("6 joints", "3 outputs", "position only")
+    parts = ("6 joints", "3 outputs", "position only", "keyframes: [{angles_deg: [0, 0, 0]}]")
     refused(mine(SIX), *parts, changes=["path.orientation.keyframes=[]"])
     parts = ("3 joints", "6 outputs", "position and orientation")
     refused(mine(), *parts, changes=["path.orientation.keyframes=[{theta: 0}]"])

@@ -4,6 +4,8 @@ Status 2, one line on stderr that names the file, the thing, the value and what 
 is simulated.
 """
 
+import os
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,38 @@ def test_binary_and_empty_waypoints(refused, mine, tmp_path):
     refused(mine(), "no waypoints", changes=spline(), file=file)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", ["1e300", "1e-300", "1e999"])
+def test_lengths_that_no_path_has(refused, mine, tmp_path, number):
+    points = POINTS.astype(object)
+    points[:, 1] = [f"{k}e{number.partition('e')[2]}" for k in range(1, 10)]
+    points[:, [0, 2]] = 0
+    csv(tmp_path, points)
+    refused(mine(), "required", changes=spline())
+    refused(mine(), "radius", "10000 m", changes=[f"path.shape=!Circle {{radius: {number}}}"])
+
+
+def test_a_pipe_and_a_device_instead_of_waypoints(refused, mine, tmp_path):
+    os.mkfifo(tmp_path / "points.csv")
+    refused(mine(), "is a FIFO", changes=spline())
+    refused(mine(), "is a device", changes=["path.shape=!Waypoints {file: /dev/zero}"])
+
+
+def test_degrees_for_radians(refused, mine, tmp_path):
+    rows = np.hstack([POINTS, np.full((9, 3), 90.0)])
+    file = csv(tmp_path, rows, "x,y,z,zyx_1,zyx_2,zyx_3")
+    refused(mine(), "line 2", "90 rad", "zyx_deg_1", changes=spline(), file=file)
+
+
+def test_a_tolerance_below_the_noise(refused, mine, tmp_path):
+    angle = np.linspace(0.0, 1.5, 300)
+    clean = np.stack([0.8 + 0.0 * angle, 0.2 * np.sin(angle), 1.0 + 0.1 * angle], axis=1)
+    csv(tmp_path, clean + 2e-4 * np.random.default_rng(0).normal(size=clean.shape))
+    refused(mine(), "tolerance = 5e-05 m", "allow", changes=spline(", tolerance: 5e-5"))
+    parts = ("corner_distance", "tolerance")
+    refused(mine(), *parts, changes=spline(", tolerance: 5e-5, corner_distance: 0.1"))
+
+
 def test_duplicate_waypoints(refused, mine, tmp_path):
     csv(tmp_path, np.insert(POINTS, 4, POINTS[3], axis=0))
     place = str(POINTS[3].tolist())
@@ -86,3 +120,11 @@ def test_reference_beyond_the_ends_of_an_open_path(refused, mine, tmp_path):
     for point in (9.0, -0.01):
         changes = [*spline(), f"reference.points=[0.05, {point}]"]
         refused(mine(), "reference.points", f"{point:g} m", "open", "m long", changes=changes)
+
+
+def test_reference_beyond_a_path_that_should_be_closed(refused, mine, tmp_path):
+    angle = 2.0 * np.pi * np.arange(25) / 24
+    flat = [0.8 + 0.1 * np.sin(angle), 0.1 * np.cos(angle), 1.0 + 0.0 * angle]
+    csv(tmp_path, np.stack(flat, axis=1))
+    changes = [*spline(), "reference.points=[0.05, 1.0]"]
+    refused(mine(), "reference.points: 1 m", "path.shape.closed: true", changes=changes)

@@ -1,8 +1,12 @@
 """Finding and listing scenarios, on a folder of made-up ones."""
 
+import os
+from pathlib import Path
+
 import pytest
 
 from experiments.catalog.scenario_catalog import CatalogEntry, find_scenario, list_scenarios
+from experiments.catalog.scenario_file import read_scenario
 from pfsc_drake import InputError
 
 
@@ -63,3 +67,24 @@ def test_nearest_is_only_suggested_when_near(folder):
 def test_folder_is_no_scenario(folder):
     with pytest.raises(InputError, match="is a folder"):
         find_scenario(str(folder), folder)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "n" * 300 + ".yaml", "a\0b", "a/b\0.yaml"])
+def test_names_that_no_file_can_have(folder, name):
+    with pytest.raises(InputError, match=r"unknown scenario|no such file") as caught:
+        find_scenario(name, folder)
+    assert len(str(caught.value)) < 500
+
+
+def test_pipes_and_devices_are_found_and_not_read(folder, tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero")):
+        with pytest.raises(InputError, match="is a pipe, socket or device"):
+            read_scenario(str(path), [])
+
+
+def test_home(folder, monkeypatch):
+    monkeypatch.setenv("HOME", str(folder))
+    assert find_scenario("~/a_demo.yaml", folder / "none") == folder / "a_demo.yaml"
+    with pytest.raises(InputError, match="no home folder is known for ~nobody_is_called_so"):
+        find_scenario("~nobody_is_called_so/x.yaml", folder)

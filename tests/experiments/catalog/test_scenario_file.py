@@ -1,8 +1,11 @@
 """Reading scenario files and overriding keys of them."""
 
+import os
+from pathlib import Path
+
 import pytest
 
-from experiments.catalog.scenario_file import load_scenario_data, read_scenario
+from experiments.catalog.scenario_file import ScenarioFile, load_scenario_data, read_scenario
 from pfsc_drake import InputError
 
 TEXT = """\
@@ -74,6 +77,10 @@ def test_override_changes_one_place_of_an_alias(scenario):
         ("points.2.0=1", "points is a list, '2' is no index of it; allowed: 0 to 1"),
         ("points.x=1", "points is a list, 'x' is no index of it; allowed: 0 to 1"),
         ("controller.law.x=1", "controller.law is 'elastic' and has no key 'x'"),
+        ("a." * 2999 + "a=1", "3000 levels; allowed: up to 100"),
+        ("a=" + "[" * 3000, "nested too deeply; allowed: up to 100 levels"),
+        ("controller.law.x=" + "y" * 3000, "controller.law is 'elastic' and has no key 'x'"),
+        ('name="a\\0b"', "holds a NUL"),
         ("duration=[1", "--set duration=[1: invalid YAML in line 1"),
     ],
 )
@@ -82,6 +89,17 @@ def test_malformed_overrides(scenario, override, message):
         load_scenario_data(scenario, [override])
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_whose_name_is_no_text_has_one(tmp_path):
+    path = tmp_path / os.fsdecode(b"mine\xff.yaml")
+    path.write_text("duration: 1\n")
+    assert read_scenario(str(path), []).name == "mine\ufffd"
+
+
+def test_inputs_are_the_file_and_whatever_it_may_name(scenario):
+    inputs = ScenarioFile(scenario, {"a": "x.csv", "b": [{"c": "/y.urdf"}], "d": 1}).inputs()
+    assert inputs == [scenario, scenario.parent / "x.csv", Path("/y.urdf")]
 
 
 def test_read_scenario_knows_its_name(scenario):

@@ -1,11 +1,13 @@
-"""Figures: written where the log has the signals, at a readable size, not empty."""
+"""Figures: drawn where the log has the signals, at a readable size, not empty."""
+
+from io import BytesIO
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from experiments.figures import style as figure_style
-from experiments.figures.all import draw_figures, write_figures
+from experiments.figures.all import draw_figures, render_figures
 from experiments.results.run_log import RunLog
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
@@ -35,14 +37,13 @@ def coarse(monkeypatch):
     monkeypatch.setitem(figure_style.STYLE, "figure.constrained_layout.use", False)
 
 
-def test_all_figures_are_written(drawn_log, tmp_path):
-    figures = write_figures(drawn_log, PATH, tmp_path / "figures")
-    assert [figure.path.stem for figure in figures] == NAMES
-    assert sorted(path.stem for path in (tmp_path / "figures").iterdir()) == sorted(NAMES)
+def test_all_figures_are_drawn(drawn_log):
+    figures = render_figures(drawn_log, PATH)
+    assert [figure.name for figure in figures] == NAMES
     for figure in figures:
         assert figure.title
         assert figure.caption.endswith(".")
-        with Image.open(figure.path) as image:
+        with Image.open(BytesIO(figure.png)) as image:
             width, height = image.size
             pixels = np.asarray(image.convert("L"))
         assert width == 1800
@@ -79,19 +80,19 @@ def test_no_forces_no_figure(drawn_log):
 
 
 @pytest.mark.usefixtures("coarse")
-def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log, tmp_path):
+def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():
         if signal.values.dtype.kind == "f":
             signal.values[150:] = np.nan
-    assert len(write_figures(drawn_log, PATH, tmp_path)) == len(NAMES)
+    assert len(render_figures(drawn_log, PATH)) == len(NAMES)
 
 
 @pytest.mark.usefixtures("coarse")
-def test_a_log_of_one_sample_can_be_drawn(drawn_log, tmp_path):
+def test_a_log_of_one_sample_can_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():
         signal.values = signal.values[100:101]
     drawn_log.time = drawn_log.time[100:101]
-    assert len(write_figures(drawn_log, PATH, tmp_path)) == len(NAMES)
+    assert len(render_figures(drawn_log, PATH)) == len(NAMES)
 
 
 def test_a_log_without_samples_has_no_figures():

@@ -1,5 +1,7 @@
 """Runs side by side."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -67,8 +69,86 @@ def test_forces_are_compared_where_both_have_them(make_run, tmp_path):
     assert not (other / "figures" / "forces.png").exists()
 
 
-def test_wrong_folders_are_refused(make_run, tmp_path, capsys):
+@pytest.fixture(name="refused")
+def fixture_refused(tmp_path, capsys):
+    """Return a function that compares folders in vain and returns the line on stderr."""
+
+    def compare(*folders, out=tmp_path / "page"):
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        assert main(["compare", *map(str, folders), "--out", str(out)]) == 2
+        line = capsys.readouterr().err
+        assert line.startswith("error: ")
+        assert line.count("\n") == 1
+        after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        assert before == after
+        return line
+
+    return compare
+
+
+def test_wrong_folders_are_refused(make_run, tmp_path, refused):
     run = make_run("slow", 0.01)
-    for arguments in ([str(run)], [str(run), str(run)], [str(run), str(tmp_path / "none")]):
-        assert main(["compare", *arguments, "--out", str(tmp_path / "page")]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+    assert "two or more" in refused(run)
+    assert "names must differ" in refused(run, run)
+    assert f"{tmp_path / 'none' / 'log.h5'}: no such file" in refused(run, tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("scenario.yaml", None, "scenario.yaml: cannot be read: No such file"),
+        ("scenario.yaml", b"\xff", "scenario.yaml: cannot be read: not UTF-8"),
+        ("metrics.json", None, "metrics.json: cannot be read: No such file"),
+        ("metrics.json", b"[1]", "metrics.json: not a readable metrics file"),
+        ("metrics.json", b"[" * 100_000, "metrics.json: not a readable metrics file"),
+        ("log.h5", b"x", "log.h5: not a readable run log"),
+    ],
+)
+def test_unreadable_files_of_a_run_are_refused(make_run, refused, name, content, reason):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
+    (folders[1] / name).unlink()
+    if content is not None:
+        (folders[1] / name).write_bytes(content)
+    assert reason in refused(*folders)
+
+
+def test_pipes_are_not_waited_for(make_run, refused):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
+    (folders[1] / "log.h5").unlink()
+    os.mkfifo(folders[1] / "log.h5")
+    assert main(["compare", *map(str, folders)]) == 2
+
+
+@pytest.mark.parametrize("signal", ["xi", "eta", "eta_p"])
+def test_logs_that_cannot_be_compared(make_run, refused, signal):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
+    log = RunLog.read(folders[1] / "log.h5")
+    del log.signals[signal]
+    log.write(folders[1] / "log.h5")
+    assert f"log.h5: has no signal '{signal}'" in refused(*folders)
+
+
+def test_no_page_is_written_into_a_run_or_a_users_folder(make_run, tmp_path, refused):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02)]
+    line = refused(*folders, out=folders[0])
+    assert f"--out {folders[0]}: its log.h5 is an input of this comparison" in line
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "report.html").write_text("mine")
+    assert "holds report.html, which no comparison has written" in refused(*folders, out=other)
+    assert "is no folder" in refused(*folders, out=other / "report.html")
+
+
+def test_a_page_is_written_anew(make_run, tmp_path):
+    folders = [make_run("slow", 0.01), make_run("fast", 0.02, oriented=False)]
+    out = tmp_path / "page"
+    (tmp_path / "page").mkdir()
+    (out / "notes.txt").write_text("mine")
+    for _ in range(2):
+        assert main(["compare", *map(str, folders), "--out", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == {
+        "notes.txt",
+        "manifest.json",
+        "figures",
+        "report.html",
+    }

@@ -4,10 +4,9 @@ import base64
 from html.parser import HTMLParser
 
 import pytest
-from PIL import Image
 
 from experiments.figures.style import Figure
-from experiments.pages.report import write_report
+from experiments.pages.report import report_page
 from experiments.results.metrics import Metrics
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -40,33 +39,31 @@ class Page(HTMLParser):
         return [a[attribute] for t, a in self.tags if t == tag and a.get(attribute)]
 
 
+PNG = b"\x89PNG of a red sheet"
+
+
 @pytest.fixture
-def run(tmp_path):
-    image = tmp_path / "figures" / "path.png"
-    image.parent.mkdir()
-    Image.new("RGB", (20, 10), "red").save(image)
+def run():
     metrics = Metrics()
     metrics.add("max_path_deviation", 4.32e-5, "m", "< 0.05e-3", "Sec. <b>3.8.3")
     metrics.add("controller_tick_us_p99", 271.0, "us", "<= 250")
     metrics.add("peak_torque_1", 775.0, "Nm")
     return {
-        "directory": tmp_path,
         "title": "pfc_<b>elastic</b>",
         "description": "Follow a & b",
         "scenario_yaml_text": "name: x\nnote: '</pre><script>alert(1)</script>'\n",
         "metrics": metrics,
-        "figures": [Figure(image, "The <path>", 'A "caption"')],
+        "figures": [Figure("path", "The <path>", 'A "caption"', PNG)],
         "log_attributes": {"git_revision": "abc+dirty", "drake_version": "1.51.1"},
     }
 
 
-def read(path) -> tuple[Page, str]:
-    html = path.read_text(encoding="utf-8")
+def read(html) -> tuple[Page, str]:
     return Page(html), html
 
 
 def test_everything_is_on_the_page(run):
-    page, _ = read(write_report(**run))
+    page, _ = read(report_page(**run))
     for text in (
         "pfc_<b>elastic</b>",
         "Follow a & b",
@@ -88,25 +85,25 @@ def test_everything_is_on_the_page(run):
 
 
 def test_nothing_of_the_run_becomes_markup_and_nothing_is_fetched(run):
-    page, html = read(write_report(**run, recording=run["directory"] / "recording.html"))
+    page, html = read(report_page(**run, recording="recording.html"))
     assert {tag for tag, _ in page.tags}.isdisjoint({"script", "b", "path", "link"})
     assert "http:" not in html
     assert "https:" not in html
     assert "$" not in html  # every placeholder was filled in
     (source,) = page.values("img", "src")
-    assert base64.b64decode(source.split(",")[1]) == run["figures"][0].path.read_bytes()
+    assert base64.b64decode(source.split(",")[1]) == PNG
 
 
 def test_linear_drives_have_forces(run):
     run["metrics"].add("peak_torque_2", 120.0, "N")
-    page, _ = read(write_report(**run))
+    page, _ = read(report_page(**run))
     assert "Peak force 2" in page.text
     assert "peak_torque_2" in page.text  # the name in metrics.json
     assert "Peak torque 1" in page.text
 
 
 def test_targets_are_judged(run):
-    page, html = read(write_report(**run))
+    page, html = read(report_page(**run))
     assert html.count("✓ met") == html.count("✗ missed") == 2  # card and table
     assert page.text.index("43.2") < page.text.index("271")
 
@@ -114,30 +111,37 @@ def test_targets_are_judged(run):
 def test_cards_without_targets_show_the_first_metrics(run):
     for metric in run["metrics"].values():
         metric.target = None
-    page, html = read(write_report(**run))
+    page, html = read(report_page(**run))
     assert html.count('class="card"') == 3
     assert "targets met" not in page.text
 
 
 def test_fault(run):
-    page, _ = read(write_report(**run, fault="singular at <A>"))
+    page, _ = read(report_page(**run, fault="singular at <A>"))
     assert "stopped by fault" in page.text
     assert "singular at <A>" in page.text
     assert "completed" not in page.text
 
 
+def test_interruption(run):
+    page, _ = read(report_page(**run, interrupted=True))
+    assert "interrupted" in page.text
+    assert "completed" not in page.text
+    page, _ = read(report_page(**run, interrupted=True, fault="singular"))
+    assert "stopped by fault" in page.text
+
+
 def test_recording_is_linked_relative_to_the_page(run):
-    recording = run["directory"] / "a folder" / "recording.html"
-    page, _ = read(write_report(**run, recording=recording))
+    page, _ = read(report_page(**run, recording="a folder/recording.html"))
     assert page.values("iframe", "src") == ["a%20folder/recording.html"]
     assert page.values("a", "href") == ["a%20folder/recording.html"]
-    page, _ = read(write_report(**run))
+    page, _ = read(report_page(**run))
     assert page.values("iframe", "src") == []
 
 
 def test_diagram_is_an_image(run):
     svg = "<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>"
-    page, _ = read(write_report(**run, diagram_svg=svg))
+    page, _ = read(report_page(**run, diagram_svg=svg))
     source = page.values("img", "src")[1]
     assert source.startswith("data:image/svg+xml;base64,")
     assert base64.b64decode(source.split(",")[1]).decode() == svg
@@ -146,6 +150,6 @@ def test_diagram_is_an_image(run):
 
 def test_works_without_metrics_and_figures(run):
     run.update(metrics=Metrics(), figures=[])
-    page, _ = read(write_report(**run))
+    page, _ = read(report_page(**run))
     assert "All metrics" not in page.text
     assert "Scenario as resolved" in page.text

@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from diagrams.scenario.notch import BallParameters
 from experiments.cli import main
 
 # N/m, of Tab. 3.2; m, of the scenario
@@ -72,6 +73,21 @@ def test_ball_stays_in_the_notch(log):
     distance = np.linalg.norm(log["notch_position"], axis=1)
     assert distance[0] < 1e-9
     assert distance.max() < CLEARANCE + 1e-3
+
+
+def test_the_notch_drags_at_the_ball_that_slides_in_it(log):
+    """Coulomb's friction of both surfaces, against the motion."""
+    velocity = np.gradient(log["y_t"], log["t"], axis=0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    sliding = (speed[:, 0] > 0.05) & (force(log) > 1.0)
+    assert sliding.sum() > 50
+    direction = (velocity / np.maximum(speed, 1e-9))[sliding]
+    pressed = log["wrench_ext"][sliding, :3]
+    along = np.sum(direction * pressed, axis=1)
+    across = np.linalg.norm(pressed - along[:, None] * direction, axis=1)
+    friction = BallParameters().friction
+    assert friction > 0.0
+    assert np.median(-along / across) == pytest.approx(friction, rel=0.2)
 
 
 def test_a_push_is_measured_with_the_contact(tmp_path):

@@ -51,7 +51,7 @@ def test_circle() -> None:
 def test_errors() -> None:
     with pytest.raises(InputError, match="circle radius: -1"):
         FourierCurve.circle([0, 0, 0], -1.0)
-    with pytest.raises(InputError, match="linearly independent"):
+    with pytest.raises(InputError, match=r"0 deg between them; at least 0\.1 deg"):
         FourierCurve.circle([0, 0, 0], 1.0, [1, 0, 0], [-2, 0, 0])
     with pytest.raises(InputError, match="shapes"):
         FourierCurve([0, 0], [[1, 0, 0]], [[0, 1, 0]])

@@ -39,3 +39,10 @@ def test_jumps_inside_a_segment_are_refused() -> None:
             degree=6,
             tolerance=1e-9,
         )
+
+
+def test_roughness_everywhere_is_refused_before_the_memory_ends() -> None:
+    with pytest.raises(InputError, match=r"more than \d+ polynomials .* near theta = 0 "):
+        fit_pieces(
+            lambda x: np.sin(1e9 * x)[:, None], np.array([0.0, 1.0]), degree=6, tolerance=1e-9
+        )

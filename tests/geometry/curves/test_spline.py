@@ -136,3 +136,15 @@ def test_errors() -> None:
         interpolate(points, smoothness=2, parameters=[0, 1, 2])
     with pytest.raises(InputError, match="waypoints: shape"):
         interpolate([1.0, 2.0], smoothness=2)
+
+
+def test_a_large_closed_spline_is_the_same_curve() -> None:
+    """Beyond a thousand waypoints its equations are sparse."""
+    angle = 2.0 * np.pi * np.arange(1500) / 1500
+    points = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for smoothness in (3, 5):
+        curve = interpolate(points, smoothness=smoothness, closed=True)
+        theta = np.linspace(*curve.domain, 5000)
+        turn = 2.0 * np.pi / curve.period * theta
+        expected = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        np.testing.assert_allclose(curve.derivatives(theta, 0)[:, 0], expected, atol=1e-12)

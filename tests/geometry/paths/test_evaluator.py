@@ -19,6 +19,7 @@ from pfsc_drake.geometry import (
     Projector,
     WaypointTable,
     interpolate,
+    interpolate_orientation,
     path_from_waypoints,
     zyx_to_quaternion,
 )
@@ -265,3 +266,22 @@ def test_evaluate_at_refuses_what_is_not_on_the_path() -> None:
         OPEN.evaluator(2).evaluate_at(-1.0)
     with pytest.raises(InputError, match="nan"):
         CLOSED.evaluator(2).evaluate_at(math.nan)
+
+
+def test_the_normal_turns_with_every_lap_of_a_table_of_two(twisted: FourierCurve) -> None:
+    """Holonomy, and an orientation that returns after two laps only."""
+    part = np.linspace(0.0, 1.0, 14)
+    turn = zyx_to_quaternion(np.stack([2.0 * np.pi * part, 0 * part, 0 * part], axis=1))
+    theta = twisted.domain[0] + twisted.period * part
+    orientation = interpolate_orientation(turn, theta, smoothness=3, closed=True)
+    assert orientation.period == pytest.approx(2.0 * twisted.period)
+    path = Path(twisted, orientation)
+    assert abs(path.frame.holonomy) > 0.05
+    evaluator = path.evaluator(2)
+    for laps in (-3, -2, -1, 0, 1, 2, 3, 4):
+        at = 0.7 + laps * twisted.period
+        sigma = twisted.derivatives(at, 0)[0]
+        expected = path.frame.normals(at)[0]
+        for out in (evaluator(sigma.tolist(), at + 1e-3), evaluator.evaluate_at(at)):
+            np.testing.assert_allclose(out[evaluator.layout.normal], expected, atol=1e-10)
+            assert out[1] == pytest.approx(path.arc_length(at), abs=1e-10)

@@ -157,6 +157,33 @@ def test_curvature_may_jump_at_a_breakpoint() -> None:
     np.testing.assert_allclose(frame.normals([2.0, 3.0])[0], [e_2, e_3], atol=1e-12)
 
 
+def test_kinks_too_small_to_be_refused_do_not_add_up() -> None:
+    """150 tangents, each turned by 9e-10 from the last, and then a bend across them.
+
+    The frame has to follow every turn: what were left of e_perp along the tangent would turn it
+    about the tangent in the bend.
+    """
+    kink, count = 9e-10, 150
+    angle = kink * np.arange(count + 1)
+    directions = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    points = np.vstack([np.zeros(3), np.cumsum(directions, axis=0)]) * 0.01
+    coefficients = np.zeros((count + 1, 3, 3))
+    coefficients[:, 0], coefficients[:, 1] = points[:-1], directions
+    breaks = 0.01 * np.arange(count + 2)
+    breaks[-1] = breaks[-2] + 1.0
+    coefficients[-1, 2, 2] = 1.0  # sigma'' upwards: the tangent turns by atan(2)
+    curve = PiecewisePolynomialCurve(breaks, coefficients)
+    assert curve.first_discontinuity(1) is None
+    e_0 = np.array([0.0, math.sqrt(0.5), math.sqrt(0.5)])
+    found = ParallelTransportFrame(curve, e_0).normals(breaks[-1])[0]
+    # two turns on great circles, from the first tangent to the last straight one, and up
+    first, last = directions[0], directions[-1]
+    end = (last + np.array([0.0, 0.0, 2.0])) / math.sqrt(5.0)
+    e_1 = e_0 - (e_0 @ last) / (1.0 + first @ last) * (first + last)
+    e_2 = e_1 - (e_1 @ end) / (1.0 + last @ end) * (last + end)
+    np.testing.assert_allclose(found, e_2, atol=1e-9)
+
+
 def test_errors() -> None:
     with pytest.raises(InputError, match="dimension 2; 3"):
         ParallelTransportFrame(PiecewisePolynomialCurve.line([0, 0], [1, 0]))

@@ -172,6 +172,57 @@ def test_centre_of_a_circle_is_not_a_strict_minimum() -> None:
     assert result.alpha == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("centre", "beyond", "angle"),
+    [
+        ([-2.1390000529541577, 0.7008301371461622, 0.09631938828645387], 3.723607138829761e-07,
+         2.6103183199737243),
+        ([5.439234560342072, 2.0992735673252816, -13.029900141443427], 2.531541242187901e-09,
+         2.86309806649092),
+        ([2.580872003751626, -5.05491376376775, -5.837945308992216], 2.8610591008271826e-06,
+         4.966457368696757),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("step", [0.0, 1e-13, -1e-12, 1e-11, -1e-9])
+def test_no_stalled_maximum_counts_as_the_foot(
+    centre: list[float], beyond: float, angle: float, step: float
+) -> None:
+    """Just beyond the centre of a circle, at its farthest point: steps end in rounding errors."""
+    circle = FourierCurve.circle(centre, 1.0)
+    direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+    point = (np.array(centre) - beyond * direction).tolist()
+    result = Projector(circle).project(point, angle + step)
+    assert not result.converged or result.alpha < 1.0
+
+
+def test_a_step_that_overshoots_is_halved() -> None:
+    """Between two bends full steps of Newton's method go to and fro for ever."""
+    points = [
+        [-0.11535051720022994, 0.012813117540587025, 0.02659754115572893],
+        [0.11606088400600399, 0.05359802001989985, 0.050554667091403306],
+        [0.17207247192249286, -0.07557246021442587, -0.08119978047538409],
+        [0.22071125671825753, -0.17984778731589407, -0.20572198832362212],
+        [0.2831490670874785, -0.16973587947805696, -0.2125305128172127],
+        [0.23539170749444274, -0.32426069132120533, -0.22111818377081632],
+        [0.269404085667612, -0.322610318635475, -0.1550582995045272],
+        [0.49123447944386844, -0.2719930174950428, -0.06185399220643992],
+        [0.45390586180028014, -0.25639284025481723, -0.2409150248025054],
+        [0.480611618521719, -0.1856534164969723, -0.33608293420311974],
+    ]
+    point, guess = (
+        [0.292585444369587, -0.25847094679877924, 0.04290028416161609],
+        0.7078023964083564,
+    )
+    curve = interpolate(points, smoothness=3)
+    result = Projector(curve).project(point, guess)
+    assert result.converged
+    assert result.iterations < 20
+    sigma, slope = curve.derivatives(result.theta, 1)
+    assert abs((np.array(point) - sigma) @ slope) < 1e-11
+    before = np.linalg.norm(np.array(point) - curve.derivatives(guess, 0)[0])
+    assert np.linalg.norm(np.array(point) - sigma) < before
+
+
 def test_maximum_is_left() -> None:
     circle = FourierCurve.circle([0, 0, 0], 1.0)
     result = Projector(circle).project([0.5, 0.0, 0.0], math.pi - 0.01)

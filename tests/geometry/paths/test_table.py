@@ -119,3 +119,23 @@ def test_breakpoints_that_differ_by_rounding_are_one() -> None:
     assert np.diff(table.breakpoints).min() > 1e-7
     table, _ = _table(Path(curve), 1)
     np.testing.assert_allclose(_rows(table, np.array([0.25]))[0, 1], 0.25, atol=1e-15)
+
+
+@pytest.mark.parametrize("order", [1, 4])
+@pytest.mark.parametrize("tilt_deg", [1, 5, 10, 20, 30, 37.5, 45, 50, 60, 70, 80, 89, 89.999])
+def test_tilted_circles_have_small_tables(tilt_deg: float, order: int) -> None:
+    """e_perp and the derivatives have components that are zero but for rounding errors."""
+    tilt = np.radians(tilt_deg)
+    axis = [-np.sin(tilt), 0.0, np.cos(tilt)]
+    path = Path(FourierCurve.circle([0.7, 0.2, 1.1], 0.15, [0.0, 1.0, 0.0], axis))
+    table, layout = _table(path, order)
+    assert len(table.rows) < 100
+    theta = np.linspace(0.0, 6.28, 200)
+    found = _rows(table, theta)
+    normal = [np.cos(tilt), 0.0, np.sin(tilt)]
+    e_perp = found[:, layout.normal]
+    np.testing.assert_allclose(np.abs(e_perp @ normal), 1.0, rtol=0.0, atol=1e-12)
+    expected = path.position.derivatives(theta, order + 1)
+    np.testing.assert_allclose(
+        found[:, layout.position].reshape(expected.shape), expected, rtol=0.0, atol=1e-12
+    )

@@ -91,6 +91,24 @@ def test_the_integral_of_the_error_accumulates(arm, path, make_law):
     assert np.allclose(bench.output("virtual_input") - before, expected, rtol=1e-9)
 
 
+def test_the_integral_does_not_wind_up_while_a_drive_is_at_its_limit(arm, path, make_law):
+    """A reference out of reach for a while: afterwards the law is as it was before."""
+    bench = Bench(arm, path, make_law(integral=500.0, limit=900.0))
+    before = bench.output("virtual_input")
+    near, far = bench.reference.copy(), bench.reference.copy()
+    far[0] += 5.0
+    assert bench.output("status")[2] == 0.0
+    bench.start()
+    bench.fix(reference=far)
+    assert bench.output("status")[2] > 0.0
+    bench.tick(50)
+    bench.fix(reference=near)
+    assert np.array_equal(bench.output("virtual_input"), before)
+    # drives that are free again take it up
+    bench.tick(10)
+    assert np.abs(bench.output("virtual_input") - before).min() > 1e-3
+
+
 def test_without_integral_part_nothing_accumulates(bench):
     before = bench.output("drive_torque")
     bench.start()

@@ -229,6 +229,19 @@ def test_a_saturated_or_loaded_sensor_is_not_tared(bias, fault):
     assert np.all(signals["compensation"][:, 7] == fault)
 
 
+def test_a_sensor_at_the_end_of_its_range_is_not_tared_though_its_reading_is_steady():
+    """It reads 12 N, little enough for a bias, whatever it bears; tared, a push would be lost."""
+    sensor = ForceTorqueParameters(
+        bias=np.array([30.0, 0, 0, 0, 0, 0]), noise=np.zeros(6), measurement_range=np.full(6, 12.0)
+    )
+    signals = run("comau_racer_1_4", sensor=sensor, duration=0.2)
+    assert np.abs(signals["raw"]).max() == 12.0
+    # the weight that it should read with it is not too much for a bias either
+    assert ToolCompensationParameters().taring_bias[0] > 40.0
+    assert not np.any(signals["tared"])
+    assert not np.any(signals["wrench"])
+
+
 class Alone:
     """The compensation of a resting robot with a prescribed measurement."""
 

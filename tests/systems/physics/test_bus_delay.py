@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
 from pfsc_drake.errors import InputError
@@ -21,6 +21,19 @@ class Clock(LeafSystem):
 
     def _calc(self, context, output):
         output.SetFromVector([7.0 + context.get_time(), -context.get_time()])
+
+
+class LateStarter(LeafSystem):
+    """Sends 0 until it is initialized, then 5, as a controller whose memory is filled then."""
+
+    def __init__(self):
+        super().__init__()
+        self.DeclareStateOutputPort("out", self.DeclareDiscreteState(1))
+        self.DeclareInitializationDiscreteUpdateEvent(self._start)
+
+    def _start(self, context, state):
+        state.set_value([5.0])
+        return EventStatus.Succeeded()
 
 
 def build(delay, period=T):
@@ -58,6 +71,18 @@ def test_delivers_the_present_input_from_the_start():
     simulator.AdvanceTo(3.0008)
     got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
     assert np.allclose(got, [10.0004, -3.0004], rtol=0, atol=1e-12)
+
+
+def test_what_a_sender_had_before_it_was_initialized_is_never_delivered():
+    builder = DiagramBuilder()
+    sender = builder.AddSystem(LateStarter())
+    bus = add_bus_delay(builder, sender.get_output_port(), 3 * T, T)
+    simulator = Simulator(builder.Build())
+    simulator.Initialize()
+    for k in range(6):
+        simulator.AdvanceTo((k + 0.4) * T)
+        context = bus.GetMyContextFromRoot(simulator.get_context())
+        assert bus.get_output_port().Eval(context)[0] == 5.0
 
 
 def test_no_direct_feedthrough():

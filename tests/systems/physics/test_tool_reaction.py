@@ -53,3 +53,20 @@ def test_the_reaction_is_that_of_the_plant(plant, pushed):
     assert np.abs(expected).max() > 10.0
     np.testing.assert_allclose(reaction, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
     assert RigidTransform(X_BT).translation().any()
+
+
+def test_contexts_do_not_share_what_pushes(plant):
+    """A port that is not connected is no push, whatever acted in another context."""
+    tool, joint = plant.GetFrameByName("tool_point"), plant.GetJointByName("weld_tool")
+    chain, _ = chain_from_plant(plant, tool)
+    system = ToolReaction(chain, tool_load_from_plant(plant, joint, tool))
+    reactions = []
+    for wrench in (None, np.full(6, 30.0), None):
+        context = system.CreateDefaultContext()
+        system.GetInputPort("joint_state").FixValue(context, np.full(24, 0.3))
+        system.GetInputPort("acceleration").FixValue(context, np.zeros(6))
+        if wrench is not None:
+            system.GetInputPort("wrench").FixValue(context, wrench)
+        reactions.append(system.GetOutputPort("reaction").Eval(context))
+    assert np.abs(reactions[1] - reactions[0]).max() > 10.0
+    np.testing.assert_array_equal(reactions[2], reactions[0])

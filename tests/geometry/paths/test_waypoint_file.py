@@ -1,5 +1,6 @@
 """Waypoint files."""
 
+import os
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
+    WaypointTable,
+    matrix_to_quaternion,
     path_from_waypoints,
     quaternion_to_matrix,
     read_waypoints,
@@ -71,6 +74,15 @@ MATRIX = ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
         ("x,y,z,qw,qx,qy,qz\n0,0,0,0,0,0,0\n", r"line 2, columns qw\.\.qz"),
         (f"x,y,z,{MATRIX}\n0,0,0,1,0,0,0,1,0,0,0,2\n", r"line 2, columns r11\.\.r33: .*identity"),
         (f"x,y,z,{MATRIX}\n0,0,0,1,0,0,0,1,0,0,0,-1\n", r"determinant -1"),
+        ("x,y,z\n1,2,1e300\n", r"line 2, column z: '1e300'"),
+        ("x,y,z\n1,2,-1e5\n", r"line 2, column z: -100000 m; at most 10000 m"),
+        ("x;y;z\n1;2;3\n", "column 'x;y;z' is unknown; .* separate columns by commas"),
+        (
+            "x,y,z,zyx_1,zyx_2,zyx_3\n0,0,0,0,0,180\n",
+            r"column zyx_3: 180 rad; at most 12\.57 is allowed; for degrees name the columns "
+            "zyx_deg_1, zyx_deg_2, zyx_deg_3",
+        ),
+        ("x,y,z,zyz_deg_1,zyz_deg_2,zyz_deg_3\n0,0,0,0,9e9,0\n", "zyz_deg_2: 9e.09 deg"),
     ],
 )
 def test_errors_name_the_place(tmp_path: FilePath, text: str, message: str) -> None:
@@ -78,6 +90,94 @@ def test_errors_name_the_place(tmp_path: FilePath, text: str, message: str) -> N
         read_waypoints(_write(tmp_path, text))
     assert "\n" not in str(error.value)
     assert "points.csv" in str(error.value)
+
+
+@pytest.mark.parametrize("kind", ["zyx", "zyz"])
+def test_euler_angles_in_degrees(tmp_path: FilePath, kind: str) -> None:
+    names = [f"x,y,z,{kind}{unit}_1,{kind}{unit}_2,{kind}{unit}_3" for unit in ("", "_deg")]
+    angles = np.array([[10.0, 20.0, -30.0], [170.0, 45.0, 190.0]])
+    tables = []
+    for header, values in zip(names, (np.deg2rad(angles), angles), strict=True):
+        rows = "\n".join("0,0,0," + ",".join(map(repr, row)) for row in values.tolist())
+        tables.append(read_waypoints(_write(tmp_path, f"{header}\n{rows}\n")).quaternions)
+    np.testing.assert_allclose(tables[1], tables[0], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("cell", "shown"),
+    [
+        ("1_0", "1_0"),
+        ("\u0661", "\u0661"),
+        ("infinity", "infinity"),
+        ("1e400", "1e400"),
+        ("0x10", "0x10"),
+        ("7" * 10**6, "7" * 20 + "..." + "7" * 20),
+        ("word" * 10**5, "word" * 5 + "..." + "word" * 5),
+    ],
+)
+def test_what_is_no_number(tmp_path: FilePath, cell: str, shown: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_waypoints(_write(tmp_path, f"x,y,z\n1,2,3\n1,{cell},3\n"))
+    assert f"line 3, column y: '{shown}'; a finite number" in str(caught.value)
+
+
+@pytest.mark.parametrize("cell", ["-5", "+.5", "5.", "1e-3", "1E+2", "007"])
+def test_what_is_a_number(tmp_path: FilePath, cell: str) -> None:
+    table = read_waypoints(_write(tmp_path, f"x,y,z\n1,{cell},3\n"))
+    assert table.positions[0, 1] == float(cell)
+
+
+def test_what_is_no_regular_file(tmp_path: FilePath) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for name, part in ((tmp_path / "pipe", "is a FIFO"), (FilePath("/dev/zero"), "is a device")):
+        with pytest.raises(InputError, match=f"{name}: {part}"):
+            read_waypoints(name)
+    with pytest.raises(InputError, match="a readable CSV file is required"):
+        read_waypoints("a\0b")
+
+
+def test_files_that_are_too_large(tmp_path: FilePath) -> None:
+    file = tmp_path / "points.csv"
+    with file.open("wb") as stream:
+        stream.truncate(300 << 20)  # sparse: it takes no room
+    with pytest.raises(InputError, match="300 MiB, at most 256 are read"):
+        read_waypoints(file)
+
+
+def test_waypoints_that_are_too_many_for_a_spline() -> None:
+    line = np.linspace(0.0, 1.0, 60_000)
+    table = WaypointTable(np.stack([line, line, line], axis=1))
+    with pytest.raises(InputError, match=r"60000; .* at most 50000: write path\.shape\.tolerance"):
+        path_from_waypoints(table, smoothness=3)
+
+
+def test_a_path_of_no_length() -> None:
+    table = WaypointTable(1e-300 * np.arange(30.0).reshape(10, 3))
+    with pytest.raises(InputError, match=r"waypoints: 0 m .* at least 0\.0001 m"):
+        path_from_waypoints(table, smoothness=3)
+
+
+def test_progress_of_reading(tmp_path: FilePath) -> None:
+    told: list[tuple[float, str]] = []
+    rows = "1,2,3\n" * 120_000
+    file = _write(tmp_path, f"x,y,z\n{rows}")
+    read_waypoints(file, lambda fraction, phase: told.append((fraction, phase)))
+    assert [phase for _, phase in told] == ["reading the waypoints"] * 2
+    np.testing.assert_allclose([part for part, _ in told], [5 / 12, 10 / 12], atol=1e-4)
+
+
+def test_a_small_closing_gap_counts(tmp_path: FilePath) -> None:
+    """The lap ends at the first point, where its orientation is, not at the last one."""
+    angle = np.linspace(0.0, 2.0 * np.pi - 1e-4, 40)
+    positions = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    quaternions = zyx_to_matrix(np.stack([0.3 * np.sin(angle), 0 * angle, 0 * angle], axis=1))
+    table = WaypointTable(positions, matrix_to_quaternion(quaternions))
+    path = path_from_waypoints(table, smoothness=3, closed=True)
+    assert path.orientation.period == pytest.approx(path.position.period, rel=1e-12)
+    theta = path.waypoints.parameters
+    np.testing.assert_allclose(path.position.derivatives(theta[-2], 0)[0], positions[-1], atol=1e-9)
+    reached = path.orientation.rotation_matrix(theta[[-2, -1]])
+    np.testing.assert_allclose(reached, quaternions[[-1, 0]], atol=1e-9)
 
 
 def test_missing_file(tmp_path: FilePath) -> None:

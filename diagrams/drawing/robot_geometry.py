@@ -1,0 +1,154 @@
+"""What a robot looks like: its model's visual geometry, or a stick figure."""
+
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+
+from pydrake.geometry import (
+    GeometryId,
+    Mesh,
+    Rgba,
+    Role,
+    SceneGraph,
+    SceneGraphInspector,
+)
+from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, RigidBody
+
+from diagrams.drawing.model_meshes import drawn_mesh
+from diagrams.drawing.model_text import NotDrawn, drawable_text
+from diagrams.drawing.stick_figure import stick_figure
+from diagrams.robots.model import locate_model
+from diagrams.scenario import RobotParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.packages import packages_for
+from pfsc_drake.systems.drawing.robot_visualizer import BodyPart
+
+# where the parser reads text, by the model's suffix; other kinds are read as they are
+_TEXTS = {".urdf": "urdf", ".sdf": "sdf"}
+_NO_COLOR = Rgba(0.9, 0.9, 0.9, 1.0)
+
+
+@dataclass(frozen=True)
+class RobotDrawing:
+    """What to draw of a robot.
+
+    Attributes:
+        plant: The plant whose bodies the parts move with.
+        parts: What to draw.
+        warnings: What cannot be drawn, one sentence each.
+    """
+
+    plant: MultibodyPlant
+    parts: list[BodyPart]
+    warnings: list[str] = field(default_factory=list)
+
+
+def draw_robot(
+    plant: MultibodyPlant, tool: Frame, parameters: RobotParameters, folder: FilePath
+) -> RobotDrawing:
+    """Return how to draw a robot, whatever can be drawn of its model.
+
+    Where something cannot be drawn, and where there is nothing to draw, the robot is drawn as a
+    stick figure, too.
+
+    Args:
+        plant: The robot as it is simulated, finalized, without geometry.
+        tool: The tool's frame.
+        parameters: Which robot.
+        folder: Where relative file names start.
+    """
+    try:
+        parts, missing = _visual_parts(plant, parameters, folder)
+        warnings = _sentences(missing)
+    except (InputError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        parts, warnings = [], [f"the model's geometry is not drawn: {reason}"]
+    if warnings or not parts:
+        parts = [*parts, *stick_figure(plant, tool)]
+    return RobotDrawing(plant, parts, [f"{line}; sticks are drawn instead" for line in warnings])
+
+
+def _sentences(missing: list[NotDrawn]) -> list[str]:
+    """One line per reason, with all links that it concerns."""
+    links: dict[str, list[str]] = {}
+    for entry in missing:
+        names = links.setdefault(entry.reason, [])
+        if entry.link not in names:
+            names.append(entry.link)
+    return [f"not drawn of the robot: {', '.join(links[reason])}: {reason}" for reason in links]
+
+
+def _visual_parts(
+    plant: MultibodyPlant, parameters: RobotParameters, folder: FilePath
+) -> tuple[list[BodyPart], list[NotDrawn]]:
+    """Read a model's geometry, and return it as parts of the bodies of another plant of it.
+
+    Raises:
+        InputError: If the model cannot be read.
+        RuntimeError: If Drake cannot read it.
+    """
+    # read by a plant of its own, so that the simulated one never depends on geometry
+    shown, scene_graph = MultibodyPlant(time_step=0.0), SceneGraph()
+    shown.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(shown)
+    file = locate_model(parameters, folder)
+    packages = packages_for(file, file.read_bytes(), parameters.options(folder).packages)
+    parser.package_map().AddMap(packages)
+    kind, missing = _TEXTS.get(file.suffix.lower()), list[NotDrawn]()
+    if kind is None:
+        parser.AddModels(str(file))
+    else:
+        text, missing = drawable_text(file, lambda address: _resolve(address, file, packages))
+        parser.AddModelsFromString(text, kind)
+    inspector = scene_graph.model_inspector()
+    parts = []
+    for geometry in inspector.GetAllGeometryIds(Role.kIllustration):
+        body = shown.GetBodyFromFrameId(inspector.GetFrameId(geometry))
+        assert body is not None  # every frame of this source is one of the plant's bodies
+        try:
+            parts.append(_part(inspector, geometry, _same_body(plant, shown, body)))
+        except InputError as error:
+            missing.append(NotDrawn(body.name(), str(error)))
+    return parts, missing
+
+
+def _same_body(plant: MultibodyPlant, shown: MultibodyPlant, body: RigidBody) -> RigidBody:
+    """Return the body of the same name in another plant of the same model.
+
+    Raises:
+        InputError: If there is none.
+    """
+    model = shown.GetModelInstanceName(body.model_instance())
+    if plant.HasModelInstanceNamed(model):
+        instance = plant.GetModelInstanceByName(model)
+        if plant.HasBodyNamed(body.name(), instance):
+            return plant.GetBodyByName(body.name(), instance)
+    raise InputError("the simulated robot has no such link")
+
+
+def _part(inspector: SceneGraphInspector, geometry: GeometryId, body: RigidBody) -> BodyPart:
+    shape = inspector.GetShape(geometry)
+    form = drawn_mesh(shape) if isinstance(shape, Mesh) else shape
+    properties = inspector.GetProperties(geometry, Role.kIllustration)
+    color = properties.GetPropertyOrDefault("phong", "diffuse", _NO_COLOR)
+    name = f"{inspector.GetName(geometry).split('::')[-1]}_{geometry.get_value()}"
+    return BodyPart(body, name, form, inspector.GetPoseInFrame(geometry), color)
+
+
+def _resolve(address: str, file: FilePath, packages: PackageMap) -> FilePath:
+    """Return the file that a model's mesh address means.
+
+    Raises:
+        InputError: If its package is not known.
+    """
+    for scheme in ("package://", "model://"):
+        if address.startswith(scheme):
+            package, _, rest = address.removeprefix(scheme).partition("/")
+            if not packages.Contains(package):
+                raise InputError(
+                    f"the package '{package}' is not known; allowed: one whose package.xml is "
+                    "above the model, or that ROS_PACKAGE_PATH leads to"
+                )
+            return FilePath(packages.GetPath(package)) / rest
+    return file.parent / address.removeprefix("file://")

@@ -1,0 +1,100 @@
+"""The posture in which an arm starts: given, looked for from there, and what is odd about it."""
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
+from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.robot.serial.chain import SerialChain
+
+# from where on a posture that was found is another one than the posture given
+_FAR_DEG = 60.0
+_FAR_SLIDE = 0.3  # m
+
+
+def describe_posture(chain: SerialChain, q: np.ndarray) -> str:
+    """Return a posture in one line, e.g. ``shoulder -12.5 deg, lift 0.2 m``.
+
+    Args:
+        chain: The robot.
+        q: Joint coordinates, shape (N,) [rad or m].
+    """
+    return ", ".join(
+        f"{link.name} {np.rad2deg(value):.4g} deg"
+        if link.is_revolute
+        else f"{link.name} {value:.4g} m"
+        for link, value in zip(chain.links, q, strict=True)
+    )
+
+
+def posture_warnings(
+    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
+) -> list[str]:
+    """Return what is odd about a given start posture, one sentence each.
+
+    Args:
+        posture_deg: As the scenario gives it; empty for none.
+        chain: The robot.
+        q_J: The start posture found from there, shape (N,) [rad or m].
+        oriented: Whether the pose that was looked for has an orientation.
+    """
+    if not posture_deg:
+        return []
+    is_angle = np.array([link.is_revolute for link in chain.links])
+    unit = np.where(is_angle, np.deg2rad(_FAR_DEG), _FAR_SLIDE)
+    distance = np.abs(q_J - posture_near(posture_deg, chain)) / unit
+    if distance.max() <= 1.0:
+        return []
+    found = describe_posture(chain, q_J)
+    if _fits_in_radians(posture_deg, chain, q_J, oriented):
+        in_degrees = np.where(is_angle, np.rad2deg(posture_deg), posture_deg)
+        written = ", ".join(f"{value:.4g}" for value in in_degrees)
+        return [
+            f"start.posture_deg: {posture_deg} looks like radians; the robot starts at {found}: "
+            f"write [{written}]"
+        ]
+    worst = chain.names[int(distance.argmax())]
+    return [
+        f"start.posture_deg: {posture_deg} is far from any solution, {worst} most; the robot "
+        f"starts at {found}, perhaps in another configuration than meant"
+    ]
+
+
+def _fits_in_radians(
+    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
+) -> bool:
+    """Return whether the same digits, as radians, are next to a solution of their own."""
+    angles = np.array([link.is_revolute for link in chain.links])
+    as_radians = np.array(posture_deg)
+    turns = np.abs(as_radians[angles]).max(initial=0.0)
+    if not 0.0 < turns <= 2.0 * np.pi:
+        return False
+    pose = np.array(pose_function(chain)(q_J)).ravel()
+    R_e = pose[3:].reshape(3, 3) if oriented else None
+    try:
+        solution = solve_pose(chain, pose[:3], R_e, as_radians, "start")
+    except InputError:
+        return False
+    return bool(np.all(np.abs(solution - as_radians)[angles] < np.deg2rad(_FAR_DEG)))
+
+
+def posture_near(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
+    """Return the posture from which the start is looked for, shape (N,) [rad or m].
+
+    Args:
+        posture_deg: As the scenario gives it; empty for the middle of the limits.
+        chain: The robot.
+
+    Raises:
+        InputError: If there are more or fewer joints.
+    """
+    if not posture_deg:
+        lower, upper = np.clip(chain.gather("position_limits"), -UNLIMITED, UNLIMITED).T
+        limited = np.maximum(-lower, upper) < UNLIMITED
+        return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
+    if len(posture_deg) != chain.dimension:
+        raise InputError(
+            f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"
+        )
+    is_angle = np.array([link.is_revolute for link in chain.links])
+    return np.where(is_angle, np.deg2rad(posture_deg), posture_deg)

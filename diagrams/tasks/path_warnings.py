@@ -1,0 +1,161 @@
+"""What may be wrong with a path, and what to write then."""
+
+import math
+
+import numpy as np
+
+from pfsc_drake.geometry import Path, PathWaypoints, ShapeReport, noise_level
+
+# m: robots' paths are shorter, and distances below count for nothing
+_LARGE, _SMALL = 20.0, 1e-4
+# of the distance of two waypoints: as on a circle through four, or less than on it
+_SWING, _NARROW = 0.2, 0.6
+# from one waypoint to the next: change of the curvature beside the curvature, and rad
+_JUMP, _TURN, _FEWEST = 0.7, 0.002, 10
+# rad, beyond which a turn is a corner, unless turns to and fro follow each other
+_CORNER, _TO_AND_FRO = 0.3, -0.3
+# what tolerance to try, beside the noise
+_TIMES_NOISE = 5.0
+# rad/m, and beside the orientations of neighbouring waypoints, or beside the curvature
+_FAST, _FASTER = 20.0, 3.0
+
+
+def path_warnings(path: Path, shape: ShapeReport) -> list[str]:
+    """Return what is out of proportion in a path, one sentence each.
+
+    Args:
+        path: The path.
+        shape: Its numbers, see :func:`shape_report`.
+    """
+    found = [_fast_turn(path, shape)]
+    if path.waypoints is not None:
+        found += [_large(path.waypoints), _nearly_closed(path, path.waypoints)]
+        if path.waypoints.manner == "interpolated":
+            found += [_noise(path, shape) or _swing(shape) or _narrow_bend(path, shape)]
+    return [sentence for sentence in found if sentence]
+
+
+def closing_gap(path: Path) -> float | None:
+    """Distance [m] of an open path's ends, if it is so short that the path looks closed.
+
+    Args:
+        path: The path.
+    """
+    waypoints = path.waypoints
+    if path.closed or waypoints is None:
+        return None
+    points = waypoints.positions
+    gap = float(np.linalg.norm(points[-1] - points[0]))
+    sides = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    near = gap <= 1.5 * max(sides[0], sides[-1]) and gap <= 0.1 * path.length
+    return gap if near and len(points) > 3 else None
+
+
+def _large(waypoints: PathWaypoints) -> str | None:
+    farthest = float(np.abs(waypoints.positions).max())
+    if farthest <= _LARGE:
+        return None
+    return f"waypoints lie up to {farthest:.4g} m from the origin; their unit is m, not mm"
+
+
+def _nearly_closed(path: Path, waypoints: PathWaypoints) -> str | None:
+    gap = closing_gap(path)
+    if gap is None:
+        return None
+    return (
+        f"the path is open, and its ends are {_length(gap)} apart: if it is to go round, write "
+        "path.shape.closed: true"
+    )
+
+
+def _noise(path: Path, shape: ShapeReport) -> str | None:
+    """Curvature that differs from waypoint to waypoint as much as it is large."""
+    waypoints = path.waypoints
+    if waypoints is None or len(waypoints.positions) < _FEWEST:
+        return None
+    inner = waypoints.parameters[1:-1]
+    _, slope, second = path.position.derivatives(inner, 2).transpose(1, 0, 2)
+    square = np.sum(slope**2, axis=1, keepdims=True)
+    along = np.sum(slope * second, axis=1, keepdims=True) / square
+    curvature = (second - along * slope) / square
+    sizes = np.linalg.norm(curvature, axis=1)
+    jumps = np.linalg.norm(np.diff(curvature, axis=0), axis=1)
+    sides = np.diff(waypoints.positions, axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    if np.median(sizes * lengths[:-1]) < _TURN or np.median(jumps) < _JUMP * np.median(sizes):
+        return None
+    if not np.all(lengths > 0.0):
+        return None
+    turns = np.diff(sides / lengths[:, None], axis=0)
+    similar = np.sum(turns[1:] * turns[:-1]) / np.sum(turns**2)
+    if np.linalg.norm(turns, axis=1).max() > _CORNER and similar > _TO_AND_FRO:
+        return None
+    noise = _TIMES_NOISE * noise_level(waypoints.parameters, waypoints.positions, across=True)
+    return (
+        f"the path bends to and fro from waypoint to waypoint, with a radius of down to "
+        f"{_length(shape.smallest_radius)} at eta = {shape.smallest_radius_at:.4g} m, as paths "
+        "through noisy points do: write path.shape.tolerance (m), perhaps "
+        f"{_round_up(noise):g}"
+    )
+
+
+def _swing(shape: ShapeReport) -> str | None:
+    off, chord = shape.distance_from_points, shape.chord_there
+    if off is None or chord is None or off <= max(_SMALL, _SWING * chord):
+        return None
+    return (
+        f"the path swings {_length(off)} beside the straight line between two waypoints "
+        f"{_length(chord)} apart, at eta = {shape.distance_from_points_at:.4g} m: add waypoints "
+        "there, or write path.shape.corner_distance (m) for straight lines with rounded corners"
+    )
+
+
+def _narrow_bend(path: Path, shape: ShapeReport) -> str | None:
+    waypoints = path.waypoints
+    if waypoints is None:
+        return None
+    theta = path.arc_length.parameter(shape.smallest_radius_at)
+    side = int(np.searchsorted(waypoints.parameters[1:-1], theta, side="right"))
+    near = waypoints.positions[side : side + 2]
+    chord = float(np.linalg.norm(near[-1] - near[0]))
+    if shape.smallest_radius >= _NARROW * chord:
+        return None
+    return (
+        f"the path bends with a radius of {_length(shape.smallest_radius)} at eta = "
+        f"{shape.smallest_radius_at:.4g} m, where waypoints are {_length(chord)} apart: add "
+        "waypoints there, write path.shape.tolerance (m) if they are noisy, or "
+        "path.shape.corner_distance (m) if they are corners"
+    )
+
+
+def _fast_turn(path: Path, shape: ShapeReport) -> str | None:
+    rate = shape.largest_angle_rate
+    if rate is None or path.orientation is None or rate < _FAST:
+        return None
+    usual, beside = 1.0 / shape.smallest_radius, "the path itself bends"
+    if path.waypoints is not None:
+        theta = path.waypoints.parameters
+        q = path.orientation.derivatives(theta, 0)[:, 0]
+        q = q / np.linalg.norm(q, axis=1, keepdims=True)
+        cosines = np.abs(np.sum(q[1:] * q[:-1], axis=1))
+        turns = 2.0 * np.arccos(np.minimum(1.0, cosines))
+        lengths = np.abs(np.diff(path.arc_length(theta)))
+        apart = lengths > 0.5 * np.median(lengths)
+        usual = float(np.max(turns[apart] / lengths[apart], initial=usual))
+        beside = "its waypoints ask for"
+    if rate < _FASTER * usual:
+        return None
+    return (
+        f"the orientation turns by {rate:.3g} rad/m at eta = {shape.largest_angle_rate_at:.4g} m, "
+        f"while {beside} at most {usual:.3g} rad/m: add orientations there"
+    )
+
+
+def _length(value: float) -> str:
+    return f"{value * 1e3:.3g} mm" if value > 1e-6 else "0 mm"
+
+
+def _round_up(value: float) -> float:
+    """One digit, upwards."""
+    unit = 10.0 ** math.floor(math.log10(value)) if value > 0.0 else 1.0
+    return math.ceil(value / unit) * unit

@@ -1,0 +1,130 @@
+"""Everything that is done before a run moves anything, so that wrong input is found out first."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydrake.common.yaml import yaml_dump_typed
+
+from diagrams.builder import build_station, draw_station
+from diagrams.drawing.robot_geometry import RobotDrawing
+from diagrams.integration import Integration
+from diagrams.scenario import PathFollowingScenario, Waypoints
+from diagrams.station import Station
+from experiments.catalog.scenario_file import ScenarioFile
+from experiments.integration import choose_integration
+from experiments.length import check_length
+from experiments.progress import ProgressListener
+from experiments.results.targets import check_targets
+from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.typed import load_typed
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A run that can start.
+
+    Attributes:
+        settings: The scenario as resolved.
+        text: The same as YAML.
+        folder: Where relative file names in the scenario started.
+        station: The station.
+        integration: How its plant is integrated.
+        drawing: What its robot looks like, if that had to be read.
+        warnings: What may not go as well as hoped, one sentence each.
+    """
+
+    settings: PathFollowingScenario
+    text: str
+    folder: Path
+    station: Station
+    integration: Integration
+    drawing: RobotDrawing | None
+    warnings: list[str]
+
+
+def prepare(
+    scenario: ScenarioFile,
+    duration: float | None,
+    *,
+    recording: bool,
+    progress: ProgressListener,
+) -> PreparedRun:
+    """Build a scenario's station and check everything that can be checked beforehand.
+
+    Args:
+        scenario: The scenario as read.
+        duration: Simulated time [s] instead of the scenario's.
+        recording: Whether the motion will be recorded.
+        progress: Told what goes on.
+
+    Raises:
+        InputError: If the scenario is wrong.
+    """
+    settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
+    folder = scenario.path.parent
+    with _naming(scenario.path):
+        station = _build(settings, folder, progress)
+        check_targets(settings, station)
+        settings.name = settings.name or scenario.name
+        settings.duration = duration or settings.duration or station.reference_duration
+        check_length(settings, station)
+        progress(0.0, "choosing the integration")
+        station, integration = _integrated(settings, folder, station, progress)
+        drawing = draw_station(settings, folder, station) if recording else None
+    _resolve_files(settings, folder)
+    warnings = station.warnings + (drawing.warnings if drawing else [])
+    text = yaml_dump_typed(settings)
+    return PreparedRun(settings, text, folder, station, integration, drawing, warnings)
+
+
+def _build(settings: PathFollowingScenario, folder: Path, progress: ProgressListener) -> Station:
+    def tell(fraction: float, phase: str) -> None:
+        progress(0.0, f"{phase}, {fraction:.0%}")
+
+    with compiled_when_bound():
+        return build_station(settings, folder, tell)
+
+
+def _integrated(
+    settings: PathFollowingScenario, folder: Path, station: Station, progress: ProgressListener
+) -> tuple[Station, Integration]:
+    """Settle the integration in the settings, and return it and a station that is made for it.
+
+    The settings name scheme and step then, so that the scenario as resolved gives this run again.
+    """
+    integration = choose_integration(station, settings.simulation, settings.reference.dwell)
+    longest = min(settings.simulation.max_step, station.controller.period)
+    settings.simulation = integration.applied_to(settings.simulation)
+    if integration.step < longest:  # friction is made for the step
+        station = _build(settings, folder, progress)
+    return station, integration
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Name the scenario's file in what is said against it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except OSError as error:  # of a file that the scenario names
+        name = shortened(str(error.filename), 100)
+        raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
+
+
+def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
+    """Make file names independent of the scenario's folder, so that the copy runs too."""
+    if settings.friction.file and Path(settings.friction.file).suffix:
+        settings.friction.file = str((folder / settings.friction.file).resolve())
+    if Path(settings.robot.rotor_coupling).suffix:
+        settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
+    for name, package in settings.robot.packages.items():
+        settings.robot.packages[name] = str((folder / package).resolve())
+    shape, model = settings.path.shape, settings.robot.model
+    if isinstance(shape, Waypoints):
+        shape.file = str((folder / shape.file).resolve())
+    if Path(model).suffix and not model.startswith("package://"):
+        settings.robot.model = str((folder / model).resolve())

@@ -1,0 +1,214 @@
+"""The folder that results are written into: taken by one process, never a user's own files."""
+
+import errno
+import fcntl
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from experiments.results.manifest import (
+    FIGURES,
+    MANIFEST,
+    UNFINISHED,
+    earlier_results,
+    find_obstacle,
+    manifest_text,
+)
+from pfsc_drake.errors import InputError
+
+# where a file system knows no locks on folders, nothing is locked
+_NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
+
+
+class ResultsFolder:
+    """A folder that this process alone writes results into; from :func:`open_results`.
+
+    Attributes:
+        path: The folder.
+    """
+
+    def __init__(self, path: Path, kind: str, handle: int) -> None:
+        """Takes over a folder that is empty of results.
+
+        Args:
+            path: Of the folder.
+            kind: Kind of results, e.g. ``run``.
+            handle: Descriptor of the open folder.
+        """
+        self.path = path
+        self._kind = kind
+        self._handle = handle
+        self._checksums: dict[str, str] = {}
+        self._elsewhere: Path | None = None
+        self._reasons: dict[str, str] = {}  # why a file could not be written here
+        self._lost: list[str] = []  # what could not be written elsewhere either
+        self._write_manifest()
+
+    def write(self, name: str, content: str | bytes) -> Path | None:
+        """Writes one result, whole or not at all.
+
+        What cannot be written here is written into a temporary folder instead, see
+        :meth:`explain_problems`.
+
+        Args:
+            name: See :mod:`experiments.results.manifest`: a result's, or ``figures/NAME.png``.
+            content: Of the file; text becomes UTF-8.
+
+        Returns:
+            The file; None if it could not be written anywhere.
+        """
+        if isinstance(content, str):
+            content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
+        try:
+            return self._write_here(name, content)
+        except OSError as error:
+            self._reasons[name] = _reason(error)
+        try:
+            if self._elsewhere is None:
+                self._elsewhere = Path(tempfile.mkdtemp(prefix=f"pfsc_drake_{self._kind}_"))
+            return _write_whole(self._elsewhere, name, content)
+        except OSError:
+            self._lost.append(name)
+            return None
+
+    def explain_problems(self) -> str | None:
+        """Returns what could not be written, why, and where it is instead; None if all was."""
+        if not self._reasons:
+            return None
+        reasons = " and ".join(dict.fromkeys(self._reasons.values()))
+        text = f"cannot write {_listed(self._reasons)} into {self.path}: {reasons}"
+        if len(self._lost) < len(self._reasons):
+            text += f"; kept in {self._elsewhere}"
+        return f"{text}; lost: {_listed(self._lost)}" if self._lost else text
+
+    def _write_here(self, name: str, content: bytes) -> Path:
+        if not os.path.samestat(os.fstat(self._handle), self.path.stat()):
+            raise FileExistsError(errno.EEXIST, "another folder has taken its place")
+        if _exists(self.path / name):
+            raise FileExistsError(errno.EEXIST, f"somebody else has made {name} meanwhile")
+        # listed first, so that a file is known as a result whenever the process ends
+        self._checksums[name] = hashlib.sha256(content).hexdigest()
+        self._write_manifest()
+        return _write_whole(self.path, name, content)
+
+    def _write_manifest(self) -> None:
+        text = manifest_text(self._kind, self._checksums)
+        _write_whole(self.path, MANIFEST, text.encode("utf-8"))
+
+
+@contextmanager
+def open_results(path: Path, kind: str, inputs: Sequence[Path] = ()) -> Iterator[ResultsFolder]:
+    """Takes a folder for results until the end of the context.
+
+    The folder is created if it is missing and locked against other processes; the lock ends with
+    the process, also if that crashes. Earlier results of the same kind are removed.
+
+    Args:
+        path: Of the folder.
+        kind: Kind of results, e.g. ``run``.
+        inputs: Files that the results are made from.
+
+    Raises:
+        InputError: If the folder cannot be written, is in use, or holds something else where
+            results belong; one line. Nothing in it has been changed then.
+    """
+    check_folder(path, kind, inputs)
+    with _naming(path):
+        path.mkdir(parents=True, exist_ok=True)
+        handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with _naming(path):
+            _lock(path, handle)
+            check_folder(path, kind, inputs)  # as it is now that nobody else writes
+            for name in earlier_results(path):
+                (path / name).unlink(missing_ok=True)
+            with suppress(FileNotFoundError):
+                (path / FIGURES).rmdir()
+            results = ResultsFolder(path, kind, handle)
+        yield results
+    finally:
+        os.close(handle)
+
+
+def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
+    """Refuses a folder that results must not be written into; changes nothing.
+
+    Args:
+        path: Of the folder, which may be missing.
+        kind: Kind of results.
+        inputs: Files that the results are made from.
+
+    Raises:
+        InputError: See :func:`open_results`.
+    """
+    with _naming(path):
+        exists = _exists(path)
+        if exists and not path.is_dir():
+            raise InputError(f"--out {path}: is no folder; allowed: a folder")
+        obstacle = find_obstacle(path, kind, inputs) if exists else None
+    if obstacle is not None:
+        raise InputError(f"--out {path}: {obstacle}; allowed: another folder")
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Turns what the system says against a folder into one line that names it."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = _reason(error) if isinstance(error, OSError) else "no name of a folder"
+        raise InputError(
+            f"--out {path}: cannot be written: {reason}; allowed: a folder to write in"
+        ) from None
+
+
+def _lock(path: Path, handle: int) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(
+            f"--out {path}: another run is writing into it; allowed: another folder"
+        ) from None
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+
+
+def _write_whole(folder: Path, name: str, content: bytes) -> Path:
+    """Writes a file under another name, which it changes for its own when it is complete."""
+    target, unfinished = folder / name, folder / UNFINISHED
+    try:
+        unfinished.write_bytes(content)
+        if target.parent != folder:
+            target.parent.mkdir(exist_ok=True)
+        unfinished.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            unfinished.unlink()
+        raise
+    return target
+
+
+def _exists(path: Path) -> bool:
+    """Whether something has this name, be it a link that leads nowhere."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _reason(error: OSError) -> str:
+    """What the system says, without the names of files."""
+    return error.strerror or type(error).__name__
+
+
+def _listed(names: Sequence[str] | dict[str, str]) -> str:
+    """Names for people, figures as one."""
+    shown = [FIGURES if name.startswith(f"{FIGURES}/") else name for name in names]
+    return ", ".join(dict.fromkeys(shown))

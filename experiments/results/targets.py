@@ -1,0 +1,40 @@
+"""Targets of metrics, checked before a run against the metrics that there will be."""
+
+from diagrams.scenario import PathFollowingScenario
+from diagrams.station import Station
+from experiments.results.joint_limits import JointLimits
+from experiments.results.path_metrics import metric_names
+from experiments.results.run_signals import optional_signals
+from experiments.results.shape_metrics import shape_metrics
+from pfsc_drake.errors import InputError
+
+# signals that another law may log on the same robot
+_OF_OTHER_LAWS = {"xi_M"}
+
+
+def check_targets(settings: PathFollowingScenario, station: Station) -> None:
+    """Refuse targets for metrics that a run with their law would not have.
+
+    Args:
+        settings: The scenario.
+        station: Its station.
+
+    Raises:
+        InputError: One line that names law, metric and the metrics that there are.
+    """
+    signals = optional_signals(station)
+    for law, targets in settings.targets.items():
+        other = set() if law == settings.controller.law else _OF_OTHER_LAWS
+        known = [
+            *metric_names(station.robot.dimension, signals | other),
+            *shape_metrics(station.task.shape),
+            *JointLimits.of(station.robot).metric_names(),
+            "real_time_factor",
+            "controller_tick_us",
+            "controller_tick_us_p99",
+        ]
+        for name in targets:
+            if name not in known:
+                raise InputError(
+                    f"targets.{law}.{name}: no such metric; allowed: {', '.join(known)}"
+                )

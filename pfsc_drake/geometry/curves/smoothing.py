@@ -1,0 +1,172 @@
+"""The smoothest spline within a tolerance of noisy points."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
+from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
+
+Deviation = Callable[[np.ndarray], np.ndarray]
+
+# Logarithms of the roughness: beyond them only the knots decide, or rounding errors do.
+_LEAST, _MOST, _STEP = -6.0, 10.0, 0.05
+_FEWEST_INTERVALS, _MOST_INTERVALS = 8, 20_000
+# What of the tolerance the knots alone may cost.
+_KNOT_SHARE = 0.1
+# Points out of the tolerance pull harder until they are in.
+_PULLS, _LEAST_PULL, _STRONGEST = 60, 1.5, 1e9
+_INSIDE = 0.999
+
+
+class SmoothFit(NamedTuple):
+    """A spline near points.
+
+    Attributes:
+        curve: The spline on [0, end].
+        deviations: Distance of each point from it, [n].
+        attainable: Largest deviation of a curve that follows no noise; the tolerance to ask
+            for where `deviations` exceed the one given.
+    """
+
+    curve: PiecewisePolynomialCurve
+    deviations: np.ndarray
+    attainable: float
+
+
+def smoothest_within(
+    parameters: np.ndarray,
+    points: np.ndarray,
+    end: float,
+    *,
+    degree: int,
+    closed: bool,
+    tolerance: float,
+    noise: float,
+    deviation: Deviation,
+) -> SmoothFit:
+    """The smoothest penalized spline near points, at most `tolerance` away from each.
+
+    The knots are twice as many as least squares need to come as near as the noise lets them.
+    The penalty is the strongest that either keeps all points within the tolerance, or leaves
+    deviations as large as the noise (V. A. Morozov's principle of discrepancy): fitting more
+    closely would follow the noise. Points that are still outside then get larger weights.
+
+    Args:
+        parameters: Of the points, [n], within [0, end].
+        points: [n, dimension].
+        end: End of the domain.
+        degree: Of the polynomials; the spline is of class C^(degree - 1).
+        closed: True for a periodic spline.
+        tolerance: Largest deviation allowed.
+        noise: Root mean square of the deviations that noise makes, see `noise_level`.
+        deviation: Maps values at all parameters [n, dimension] to deviations [n].
+
+    Returns:
+        The spline; some deviations exceed the tolerance where even as many knots as points
+        do not let it come near enough.
+    """
+    most = max(min(len(points), _MOST_INTERVALS), _FEWEST_INTERVALS)
+    allowed = noise + _KNOT_SHARE * tolerance
+
+    def on(intervals: int) -> PenalizedSpline:
+        return PenalizedSpline(parameters, points, end, intervals, degree, closed=closed)
+
+    intervals = _FEWEST_INTERVALS
+    while intervals < most:
+        spline = on(intervals)
+        values = spline.at_points(spline.fit(10.0**_LEAST))
+        if _rms(deviation(values)) <= allowed:
+            break
+        intervals *= 2
+    attainable = None
+    while True:
+        intervals = min(2 * intervals, most)
+        spline = on(intervals)
+        roughness = _roughness(spline, tolerance, noise, deviation)
+        coefficients = spline.fit(roughness)
+        deviations = deviation(spline.at_points(coefficients))
+        attainable = attainable or float(deviations.max())
+        if attainable > tolerance:
+            coefficients = _pull_in(spline, roughness, tolerance, deviation)
+            deviations = deviation(spline.at_points(coefficients))
+        if deviations.max() <= tolerance or intervals == most:
+            return SmoothFit(spline.curve(coefficients), deviations, attainable)
+
+
+def noise_level(parameters: np.ndarray, points: np.ndarray, *, across: bool) -> float:
+    """Root mean square of the noise of points, from how badly neighbours predict each other.
+
+    Each point is compared with the cubic polynomial through two neighbours on either side.
+    What the cubic misses of a smooth curve counts as noise too, where points are sparse.
+
+    Args:
+        parameters: [n], not decreasing.
+        points: [n, dimension].
+        across: True to leave out what lies along the curve.
+
+    Returns:
+        The noise; zero of less than five points.
+    """
+    if len(points) < 5:
+        return 0.0
+    offsets = [-2, -1, 1, 2]
+    inner = np.arange(2, len(points) - 2)
+    sites = np.stack([parameters[inner + k] - parameters[inner] for k in offsets], axis=1)
+    weights = np.ones_like(sites)
+    for j in range(4):
+        for k in range(4):
+            if j != k:
+                gap = sites[:, k] - sites[:, j]
+                weights[:, j] *= np.where(gap == 0.0, 1.0, sites[:, k] / np.where(gap, gap, 1.0))
+    error = points[inner] - sum(
+        weights[:, [j]] * points[inner + k] for j, k in enumerate(offsets)
+    )  # fmt: skip
+    error = error / np.sqrt(1.0 + np.sum(weights**2, axis=1, keepdims=True))
+    if across:
+        along = points[inner + 2] - points[inner - 2]
+        square = np.sum(along**2, axis=1, keepdims=True)
+        share = np.sum(error * along, axis=1, keepdims=True) / np.where(square, square, 1.0)
+        error = error - share * along
+    return _rms(np.linalg.norm(error, axis=1))
+
+
+def _roughness(
+    spline: PenalizedSpline, tolerance: float, noise: float, deviation: Deviation
+) -> float:
+    """The strongest penalty that the tolerance or the noise allows."""
+
+    def near(exponent: float) -> bool:
+        found = deviation(spline.at_points(spline.fit(10.0**exponent)))
+        return bool(found.max() <= _INSIDE * tolerance or _rms(found) <= noise)
+
+    low, high = _LEAST, _MOST
+    if near(high):
+        return 10.0**high
+    while high - low > _STEP:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if near(middle) else (low, middle)
+    return float(10.0**low)
+
+
+def _pull_in(
+    spline: PenalizedSpline, roughness: float, tolerance: float, deviation: Deviation
+) -> np.ndarray:
+    """Coefficients with larger weights of those points that would lie outside."""
+    coefficients = spline.fit(roughness)
+    deviations = deviation(spline.at_points(coefficients))
+    weights = np.ones(len(deviations))
+    for _ in range(_PULLS):
+        outside = deviations > _INSIDE * tolerance
+        if not np.any(outside):
+            break
+        pull = np.maximum(_LEAST_PULL, (deviations[outside] / tolerance) ** 2)
+        weights[outside] = np.minimum(weights[outside] * pull, _STRONGEST)
+        coefficients = spline.fit(roughness, weights)
+        deviations = deviation(spline.at_points(coefficients))
+    return coefficients
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,134 @@
+"""The numbers that tell whether a path is what its maker meant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pfsc_drake.geometry.paths.path import Path
+
+_SAMPLES_PER_SEGMENT = 16
+_FEWEST_SAMPLES = 2048
+# Samples that are evaluated at once.
+_CHUNK = 20_000
+
+
+@dataclass(frozen=True)
+class ShapeReport:
+    """Numbers of a path's shape.
+
+    Attributes:
+        length: Length (of one lap), m.
+        smallest_radius: Smallest radius of curvature, m; infinite on a straight line.
+        smallest_radius_at: eta there, m.
+        distance_from_points: Largest distance of the path from the polygon through its
+            waypoints, m; None without waypoints.
+        distance_from_points_at: eta there, m, or None.
+        chord_there: Length of the polygon's side there, m, or None.
+        largest_angle_rate: Largest angle the orientation turns by, rad/m; None without.
+        largest_angle_rate_at: eta there, m, or None.
+        largest_curvature_rate: Largest change of the curvature vector, 1/m^2.
+    """
+
+    length: float
+    smallest_radius: float
+    smallest_radius_at: float
+    distance_from_points: float | None
+    distance_from_points_at: float | None
+    chord_there: float | None
+    largest_angle_rate: float | None
+    largest_angle_rate_at: float | None
+    largest_curvature_rate: float
+
+
+def shape_report(path: Path) -> ShapeReport:
+    """Measure a path's shape at 16 samples on each of its segments, at least at 2048.
+
+    Args:
+        path: The path.
+
+    Returns:
+        The numbers.
+    """
+    breaks = path.position.breakpoints
+    count = max(_SAMPLES_PER_SEGMENT, -(-_FEWEST_SAMPLES // (len(breaks) - 1)))
+    # Inside of the segments: derivatives of high order may jump at their ends.
+    parts = (np.arange(count) + 0.5) / count
+    theta = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
+    chunks = np.array_split(theta, -(-len(theta) // _CHUNK))
+    curvature = np.concatenate([_curvatures(path, chunk) for chunk in chunks])
+    bend = int(np.argmax(curvature[:, 0]))
+    largest = float(curvature[bend, 0])
+    distance = distance_at = chord = rate = rate_at = None
+    if path.waypoints is not None:
+        off, chords = _distances_from_polygon(path, theta, chunks)
+        far = int(np.argmax(off))
+        distance, chord = float(off[far]), float(chords[far])
+        distance_at = path.arc_length(float(theta[far]))
+    if path.orientation is not None:
+        rates = np.concatenate([_angle_rates(path, chunk) for chunk in chunks])
+        fast = int(np.argmax(rates))
+        rate, rate_at = float(rates[fast]), path.arc_length(float(theta[fast]))
+    return ShapeReport(
+        path.length,
+        1.0 / largest if largest > 0.0 else np.inf,
+        path.arc_length(float(theta[bend])),
+        distance,
+        distance_at,
+        chord,
+        rate,
+        rate_at,
+        float(curvature[:, 1].max()),
+    )
+
+
+def _curvatures(path: Path, theta: np.ndarray) -> np.ndarray:
+    """Size of the curvature vector, 1/m, and of its derivative by arc length, 1/m^2: [n, 2]."""
+    _, d1, d2, d3 = path.position.derivatives(theta, 3).transpose(1, 0, 2)
+    square = np.sum(d1 * d1, axis=1, keepdims=True)
+    along = np.sum(d1 * d2, axis=1, keepdims=True)
+    # kappa = (d2 - along d1 / square) / square, and its derivative by theta
+    kappa = (d2 - along / square * d1) / square
+    along_rate = np.sum(d2 * d2 + d1 * d3, axis=1, keepdims=True)
+    ratio_rate = along_rate / square - 2.0 * (along / square) ** 2
+    rate = (d3 - ratio_rate * d1 - along / square * d2) / square - 2.0 * along / square * kappa
+    speed = np.sqrt(square)
+    return np.stack([np.linalg.norm(kappa, axis=1), np.linalg.norm(rate / speed, axis=1)], axis=1)
+
+
+def _distances_from_polygon(
+    path: Path, theta: np.ndarray, chunks: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of each sample from the nearest of three sides, m, and that side's length, m."""
+    waypoints = path.waypoints
+    assert waypoints is not None
+    order = np.argsort(waypoints.parameters, kind="stable")
+    corners, places = waypoints.positions[order], waypoints.parameters[order]
+    if path.closed and np.any(corners[-1] != corners[0]):
+        corners = np.vstack([corners, corners[:1]])
+        places = np.append(places, places[0] + path.position.period)
+    starts, sides = corners[:-1], np.diff(corners, axis=0)
+    squares = np.sum(sides**2, axis=1)
+    sigma = np.concatenate([path.position.derivatives(part, 0)[:, 0] for part in chunks])
+    own = np.searchsorted(places[1:-1], theta, side="right")
+    best, chord = np.full(len(theta), np.inf), np.zeros(len(theta))
+    for shift in (-1, 0, 1):
+        side = own + shift
+        side = side % len(sides) if path.closed else np.clip(side, 0, len(sides) - 1)
+        rest = sigma - starts[side]
+        along = np.sum(rest * sides[side], axis=1) / np.where(squares[side], squares[side], 1.0)
+        rest -= np.clip(along, 0.0, 1.0)[:, None] * sides[side]
+        best = np.minimum(best, np.linalg.norm(rest, axis=1))
+        if shift == 0:
+            chord = np.sqrt(squares[side])
+    return best, chord
+
+
+def _angle_rates(path: Path, theta: np.ndarray) -> np.ndarray:
+    """Angular velocity by arc length, rad/m: [n]."""
+    assert path.orientation is not None
+    q, dq = path.orientation.derivatives(theta, 1).transpose(1, 0, 2)
+    square = np.sum(q * q, axis=1, keepdims=True)
+    # Half of the angular velocity is the part of q' / |q| that is perpendicular to q.
+    across = dq - np.sum(q * dq, axis=1, keepdims=True) / square * q
+    turn = 2.0 * np.linalg.norm(across, axis=1) / np.sqrt(square[:, 0])
+    return np.asarray(turn / np.linalg.norm(path.position.derivatives(theta, 1)[:, 1], axis=1))

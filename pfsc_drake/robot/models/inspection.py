@@ -1,0 +1,217 @@
+"""What is wrong with the numbers of a robot model, found before Drake reads it.
+
+Drake takes a stand-in for an inertia that it does not like, ends the program at other numbers,
+and lets the rest through. Here each is refused in one line that names file, line, part and value.
+"""
+
+from dataclasses import dataclass, field
+
+from pfsc_drake.robot.models.model_parts import (
+    DRIVE_NUMBERS,
+    MOMENTS,
+    PRODUCTS,
+    ModelPart,
+    check_inertia,
+    check_joint,
+    refuse_loops,
+    refuse_mimic,
+)
+from pfsc_drake.robot.models.model_xml import Element, ModelXml
+
+
+@dataclass
+class ModelFacts:
+    """What a model file says that Drake's plant does not.
+
+    Attributes:
+        without_inertia: Where each link without ``<inertial>`` stands, by its name.
+        assumed_inertia: Links for whose moments of inertia SDF takes 1 kg m^2.
+        effort_limits: Effort limits of URDF joints, by name [Nm or N].
+        friction: Joints with dry friction.
+        springs: Stiffness of the sprung joints of the model itself, by name.
+        mimics: Number of joints that follow others; all of them are fixed.
+    """
+
+    without_inertia: dict[str, str] = field(default_factory=dict)
+    assumed_inertia: list[str] = field(default_factory=list)
+    effort_limits: dict[str, float] = field(default_factory=dict)
+    friction: list[str] = field(default_factory=list)
+    springs: dict[str, float] = field(default_factory=dict)
+    mimics: int = 0
+
+
+def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -> ModelFacts:
+    """Check the numbers and the joints of a model.
+
+    Args:
+        models: The model and what it includes.
+        fixed: Joints that will not move, whatever the model says.
+
+    Raises:
+        InputError: If a number is none or out of range, an inertia is not physical, joints close
+            a loop, or a joint mimics another; one line.
+    """
+    facts = ModelFacts()
+    for model in models:
+        inspect = _INSPECTORS.get(model.root.name)
+        if inspect is not None:
+            inspect(model, facts, fixed)
+    return facts
+
+
+def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> None:
+    for element in model.root.all("link"):
+        link = ModelPart(model, element, "link")
+        inertial = element.first("inertial")
+        if inertial is None:
+            facts.without_inertia[link.name] = model.place(element)
+            continue
+        _check_origin(link, inertial)
+        mass, inertia = inertial.first("mass"), inertial.first("inertia")
+        check_inertia(
+            link,
+            None if mass is None else mass.attributes.get("value"),
+            {} if inertia is None else inertia.attributes,
+            inertial,
+        )
+    edges = []
+    for element in model.root.all("joint"):
+        joint = ModelPart(model, element, "joint")
+        _check_origin(joint, element)
+        parent, child = (_attribute(element, end, "link") for end in ("parent", "child"))
+        edges.append((joint, parent, child))
+        values = {
+            key: (part.attributes[key], part)
+            for name, keys in _URDF_JOINT.items()
+            for part in element.all(name)
+            for key in keys
+            if key in part.attributes
+        }
+        numbers = check_joint(joint, values, fixed, negative_is_unlimited=False)
+        if "effort" in numbers:
+            facts.effort_limits[joint.name] = numbers["effort"]
+        if numbers.get("friction", 0.0) > 0.0:
+            facts.friction.append(joint.name)
+        for mimic in element.all("mimic"):
+            refuse_mimic(joint, mimic.attributes.get("joint"), fixed, mimic)
+            facts.mimics += 1
+    refuse_loops(edges, {})
+    for transmission in model.root.all("transmission"):
+        for actuator in transmission.all("actuator"):
+            drive = ModelPart(model, actuator, "actuator")
+            for key, allowed in DRIVE_NUMBERS.items():
+                for part in actuator.all(key):
+                    drive.number(key, part.attributes.get("value"), allowed, part)
+
+
+def _check_origin(part: ModelPart, holder: Element) -> None:
+    for name, keys in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
+        for element in holder.all(name):
+            for key in keys:
+                part.check_numbers(f"{name} {key}", element.attributes.get(key), element)
+
+
+def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> None:
+    for one in (element for element in model.root.within() if element.name == "model"):
+        for element in one.all("link"):
+            link = ModelPart(model, element, "link")
+            inertial = element.first("inertial")
+            if inertial is None:
+                facts.without_inertia[link.name] = model.place(element)
+                continue
+            if inertial.attributes.get("auto", "").strip() in ("true", "1"):
+                link.refuse("inertial auto", "true", "mass and inertia in numbers", inertial)
+            inertia = inertial.first("inertia")
+            moments = {} if inertia is None else {c.name: c.text for c in inertia.children}
+            if check_inertia(link, _text(inertial, "mass"), moments, inertial):
+                facts.assumed_inertia.append(link.name)
+        edges = []
+        for element in one.all("joint"):
+            joint = ModelPart(model, element, "joint")
+            parent, child = ((_text(element, end) or "").strip() for end in ("parent", "child"))
+            edges.append((joint, parent, child))
+            values = {
+                key: (part.text, part)
+                for path, keys in _SDF_JOINT.items()
+                for above in element.all(*path)
+                for key in keys
+                for part in above.all(key)
+            }
+            numbers = check_joint(joint, values, fixed, negative_is_unlimited=True)
+            if numbers.get("friction", 0.0) > 0.0:
+                facts.friction.append(joint.name)
+            if numbers.get("spring_stiffness", 0.0) > 0.0:
+                facts.springs[joint.name] = numbers["spring_stiffness"]
+            for key, allowed in DRIVE_NUMBERS.items():
+                for part in element.all(key):
+                    joint.number(key, part.text, allowed, part)
+            for mimic in element.all("axis", "mimic"):
+                refuse_mimic(joint, mimic.attributes.get("joint"), fixed, mimic)
+                facts.mimics += 1
+        _check_poses(model, one)
+        frames = {
+            frame.attributes.get("name", ""): frame.attributes.get("attached_to", "")
+            for frame in one.all("frame")
+        }
+        refuse_loops(edges, frames)
+
+
+def _check_poses(model: ModelXml, one: Element) -> None:
+    for kind in ("link", "joint", "frame"):
+        for element in one.all(kind):
+            part = ModelPart(model, element, kind)
+            for path in (("pose",), ("inertial", "pose"), ("axis", "xyz")):
+                for pose in element.all(*path):
+                    part.check_numbers(" ".join(path), pose.text, pose)
+
+
+def _inspect_mjcf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> None:
+    for element in (e for e in model.root.within() if e.name == "body"):
+        body = ModelPart(model, element, "body")
+        for key in ("pos", "quat", "euler", "axisangle"):
+            body.check_numbers(key, element.attributes.get(key), element)
+        for inertial in element.all("inertial"):
+            attributes = inertial.attributes
+            moments = attributes.get("fullinertia") or attributes.get("diaginertia", "")
+            named = dict(zip((*MOMENTS, *PRODUCTS), moments.split(), strict=False))
+            check_inertia(body, attributes.get("mass"), named, inertial)
+        for element_of_joint in element.all("joint"):
+            joint = ModelPart(model, element_of_joint, "joint")
+            given = element_of_joint.attributes
+            limits = dict(zip(("lower", "upper"), given.get("range", "").split(), strict=False))
+            values = limits | {k: given[k] for k in ("damping", "armature") if k in given}
+            check_joint(
+                joint, {key: (text, element_of_joint) for key, text in values.items()}, fixed, False
+            )
+    for equality in model.root.all("equality"):
+        for constraint in equality.children:
+            ModelPart(model, constraint, "equality").refuse(
+                "type", constraint.name, "an open chain without constraints", constraint
+            )
+
+
+_INSPECTORS = {
+    "robot": _inspect_urdf,
+    "sdf": _inspect_sdf,
+    "mujoco": _inspect_mjcf,
+    "mujocoinclude": _inspect_mjcf,
+}
+
+_URDF_JOINT = {
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "dynamics": ("damping", "friction"),
+}
+_SDF_JOINT = {
+    ("axis", "limit"): ("lower", "upper", "effort", "velocity"),
+    ("axis", "dynamics"): ("damping", "friction", "spring_stiffness", "spring_reference"),
+}
+
+
+def _text(element: Element, name: str) -> str | None:
+    part = element.first(name)
+    return None if part is None else part.text
+
+
+def _attribute(element: Element, part_name: str, name: str) -> str | None:
+    part = element.first(part_name)
+    return None if part is None else part.attributes.get(name)

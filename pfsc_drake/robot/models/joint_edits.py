@@ -1,0 +1,186 @@
+"""Joints of a parsed plant: their order, and how to take them out before ``Finalize``."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    BodyIndex,
+    ForceElementIndex,
+    Frame,
+    FrameIndex,
+    Joint,
+    JointActuator,
+    JointIndex,
+    PrismaticJoint,
+    PrismaticSpring,
+    RevoluteJoint,
+    RevoluteSpring,
+    RigidBody,
+    WeldJoint,
+)
+
+from pfsc_drake.errors import InputError
+
+
+def bodies_of(plant: MultibodyPlant) -> list[RigidBody]:
+    """Return the bodies of a plant, the world first."""
+    return [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
+
+
+def frame_named(plant: MultibodyPlant, name: str) -> Frame | None:
+    """Return the link or frame of a name, or None if there is none.
+
+    Args:
+        plant: A plant.
+        name: Its name, with as many of the models around it as are needed (``sub::tcp``).
+
+    Raises:
+        InputError: If several have that name.
+    """
+    frames = [plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())]
+    found = {
+        frame.scoped_name().get_full(): frame
+        for frame in frames
+        if f"::{frame.scoped_name().get_full()}".endswith(f"::{name}")
+    }
+    if len(found) > 1 and name not in found:
+        raise InputError(f"'{name}' names several frames; allowed: {', '.join(found)}")
+    return found.get(name) or next(iter(found.values()), None)
+
+
+def joints_of(plant: MultibodyPlant) -> list[Joint]:
+    """Return the joints of a plant, base first and by their index where that leaves a choice."""
+    joints = [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
+    inboard = inboard_joints(plant)
+
+    def depth(joint: Joint) -> int:
+        steps = 0
+        below = inboard.get(joint.parent_body().index())
+        while below is not None and steps <= len(joints):
+            steps, below = steps + 1, inboard.get(below.parent_body().index())
+        return steps
+
+    return sorted(joints, key=depth)
+
+
+def inboard_joints(plant: MultibodyPlant) -> dict[BodyIndex, Joint]:
+    """Return the joint that carries each body, by the body's index."""
+    joints = (plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices())
+    return {joint.child_body().index(): joint for joint in joints}
+
+
+def moving_joints(plant: MultibodyPlant) -> list[Joint]:
+    """Return the joints that are no welds, base first."""
+    return [joint for joint in joints_of(plant) if not isinstance(joint, WeldJoint)]
+
+
+def sprung_joints(plant: MultibodyPlant) -> list[Joint]:
+    """Return the joints that carry a spring, base first."""
+    elements = (
+        plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
+    )
+    sprung = {
+        element.joint().index()
+        for element in elements
+        if isinstance(element, RevoluteSpring | PrismaticSpring)
+    }
+    return [joint for joint in joints_of(plant) if joint.index() in sprung]
+
+
+def actuator_of(plant: MultibodyPlant, joint: Joint) -> JointActuator | None:
+    """Return the actuator of a joint, if it has one."""
+    for index in plant.GetJointActuatorIndices():
+        actuator = plant.get_joint_actuator(index)
+        if actuator.joint().index() == joint.index():
+            return actuator
+    return None
+
+
+def pose_at(joint: Joint, value: float) -> RigidTransform:
+    """Return the pose of a joint's moving frame in its fixed frame.
+
+    Args:
+        joint: A revolute or prismatic joint.
+        value: Its position [rad or m].
+    """
+    if isinstance(joint, RevoluteJoint):
+        return RigidTransform(RotationMatrix(AngleAxis(value, joint.revolute_axis())), np.zeros(3))
+    return RigidTransform(value * joint.translation_axis())
+
+
+@dataclass(frozen=True)
+class TakenJoint:
+    """A revolute or prismatic joint that was taken out of a plant, and its drive.
+
+    Attributes:
+        kind: Its class.
+        name: Its name.
+        axis: Unit vector of its axis in both frames, shape (3,).
+        frame_on_parent: Its fixed frame F.
+        frame_on_child: Its moving frame M.
+        damping: Viscous damping [Nm s/rad or N s/m].
+        limits: Lower and upper limits of position, velocity and acceleration.
+        drive: Name, effort limit, rotor inertia and gear ratio of its actuator, if it has one.
+    """
+
+    kind: type[Joint]
+    name: str
+    axis: np.ndarray
+    frame_on_parent: Frame
+    frame_on_child: Frame
+    damping: float
+    limits: tuple[tuple[np.ndarray, np.ndarray], ...]
+    drive: tuple[str, float, float, float] | None
+
+    def put(
+        self, plant: MultibodyPlant, frame_on_parent: Frame, frame_on_child: Frame
+    ) -> tuple[Joint, JointActuator | None]:
+        """Add the joint, with its drive, between other frames."""
+        joint = plant.AddJoint(
+            self.kind(self.name, frame_on_parent, frame_on_child, self.axis, damping=self.damping)
+        )
+        positions, velocities, accelerations = self.limits
+        joint.set_position_limits(*positions)
+        joint.set_velocity_limits(*velocities)
+        joint.set_acceleration_limits(*accelerations)
+        if self.drive is None:
+            return joint, None
+        name, effort_limit, rotor_inertia, gear_ratio = self.drive
+        actuator = plant.AddJointActuator(name, joint, effort_limit)
+        actuator.set_default_rotor_inertia(rotor_inertia)
+        actuator.set_default_gear_ratio(gear_ratio)
+        return joint, actuator
+
+
+def take_joint(plant: MultibodyPlant, joint: Joint) -> TakenJoint:
+    """Take a revolute or prismatic joint without spring out of a plant, with its drive."""
+    actuator = actuator_of(plant, joint)
+    revolute = isinstance(joint, RevoluteJoint)
+    taken = TakenJoint(
+        RevoluteJoint if revolute else PrismaticJoint,
+        joint.name(),
+        np.array(joint.revolute_axis() if revolute else joint.translation_axis()),
+        joint.frame_on_parent(),
+        joint.frame_on_child(),
+        float(joint.default_damping_vector()[0]),
+        (
+            (joint.position_lower_limits(), joint.position_upper_limits()),
+            (joint.velocity_lower_limits(), joint.velocity_upper_limits()),
+            (joint.acceleration_lower_limits(), joint.acceleration_upper_limits()),
+        ),
+        None
+        if actuator is None
+        else (
+            actuator.name(),
+            actuator.effort_limit(),
+            actuator.default_rotor_inertia(),
+            actuator.default_gear_ratio(),
+        ),
+    )
+    if actuator is not None:
+        plant.RemoveJointActuator(actuator)
+    plant.RemoveJoint(joint)
+    return taken

@@ -1,0 +1,80 @@
+"""The text of a model as Drake can use it, where the file itself will not do."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from xml.sax.saxutils import escape, quoteattr
+
+from pfsc_drake.robot.models.model_xml import Element, ModelXml
+
+
+def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None:
+    """Return a model in another text, or None if Drake can use the file as it is.
+
+    ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
+    that, so such materials are named apart. Springs can be left out, since Drake gives up no
+    joint of a plant with springs. Lines stay where they are. Relative file names become absolute,
+    since a text has no folder.
+
+    Args:
+        model: The model.
+        without_springs: Whether to set the stiffness of its joints to zero.
+    """
+    edits = list(_distinct_materials(model)) if model.root.name == "robot" else []
+    if without_springs:
+        edits += [
+            (element, f"<{element.name}>0</{element.name}>")
+            for element in model.root.within()
+            if element.name == "spring_stiffness"
+        ]
+    if not edits:
+        return None
+    edits += _absolute_names(model)
+    content = model.content
+    for element, text in sorted(edits, key=lambda edit: -edit[0].start):
+        # as many line breaks as before, so that messages name the right line
+        lost = content[element.start : element.end].count(b"\n")
+        content = content[: element.start] + text.encode() + b"\n" * lost + content[element.end :]
+    return content.decode("utf-8")
+
+
+def _distinct_materials(model: ModelXml) -> Iterator[tuple[Element, str]]:
+    known: dict[str, object] = {}
+    at_root = list(model.root.all("material"))
+    for material in [*at_root, *model.root.all("link", "visual", "material")]:
+        name, look = material.attributes.get("name", ""), _look(material)
+        if not name or not look:
+            continue
+        if name not in known:
+            known[name] = look
+        elif material in at_root:
+            yield material, ""
+        elif known[name] != look:
+            yield material, _tag(material, {"name": f"{name}_{material.start}"})
+
+
+def _look(material: Element) -> tuple[tuple[str, ...], ...]:
+    """Return what a material looks like: numbers of its colour, and its texture."""
+    return tuple(
+        (child.name, *(word for value in child.attributes.values() for word in value.split()))
+        for child in material.children
+    )
+
+
+def _absolute_names(model: ModelXml) -> Iterator[tuple[Element, str]]:
+    folder = model.file.parent
+    for element in model.root.within():
+        address = element.attributes.get("filename", "")
+        if element.name == "mesh" and address and "://" not in address:
+            yield element, _tag(element, {"filename": str((folder / address).resolve())})
+        if element.name == "uri" and "://" not in element.text:
+            path = Path(folder / element.text.strip()).resolve()
+            yield element, f"<uri>{escape(str(path))}</uri>"
+
+
+def _tag(element: Element, changed: dict[str, str]) -> str:
+    """Return an element as text in one line, with changed attributes."""
+    attributes = "".join(
+        f" {name}={quoteattr(value)}" for name, value in (element.attributes | changed).items()
+    )
+    inside = "".join(_tag(child, {}) for child in element.children)
+    return f"<{element.name}{attributes}>{inside}</{element.name}>"

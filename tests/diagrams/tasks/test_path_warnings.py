@@ -1,0 +1,103 @@
+"""What is said of paths that are not what their makers meant."""
+
+import numpy as np
+import pytest
+
+from diagrams.tasks.path_warnings import closing_gap, path_warnings
+from pfsc_drake.geometry import (
+    OrientationCurve,
+    Path,
+    PiecewisePolynomialCurve,
+    Tolerance,
+    WaypointTable,
+    interpolate_orientation,
+    path_from_waypoints,
+    shape_report,
+    zyx_to_quaternion,
+)
+
+ANGLE = np.linspace(0.0, 2.0, 241)
+WAVE = np.stack([0.3 * np.cos(ANGLE), 0.3 * np.sin(ANGLE), 0.1 * np.sin(2.0 * ANGLE)], axis=1)
+U_TURN = np.array(
+    [[0, k / 10, 0] for k in range(5)]
+    + [[0, 0.4, 0.1]]
+    + [[0, 0.4 - k / 10, 0.2] for k in range(5)]
+)
+
+
+def warnings(points, **options):
+    path = path_from_waypoints(WaypointTable(np.asarray(points, float)), **options)
+    return path_warnings(path, shape_report(path))
+
+
+@pytest.mark.parametrize("smoothness", [3, 5])
+def test_smooth_paths_pass_in_silence(smoothness):
+    assert warnings(WAVE, smoothness=smoothness) == []
+    assert warnings(WAVE[::16], smoothness=smoothness) == []
+    circle = np.stack([np.cos(ANGLE * np.pi), np.sin(ANGLE * np.pi), 0 * ANGLE], axis=1)
+    for step in (4, 30):
+        assert warnings(circle[:-1:step], smoothness=smoothness, closed=True) == []
+    line = PiecewisePolynomialCurve.line([0, 0, 0], [0, 0.5, 0])
+    path = Path(line, OrientationCurve.fixed([1, 0, 0, 0], line.domain))
+    assert path_warnings(path, shape_report(path)) == []
+
+
+@pytest.mark.parametrize("smoothness", [3, 5])
+@pytest.mark.parametrize("noise", [2e-5, 2e-4])
+def test_noise(smoothness, noise):
+    angle = np.linspace(0.0, 0.12, 40)  # 1 mm apart
+    points = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    points += noise * np.random.default_rng(0).normal(size=points.shape)
+    (sentence,) = warnings(points, smoothness=smoothness)
+    assert "bends to and fro" in sentence
+    # what is advised works, and leaves nothing to complain of
+    advice = float(sentence.rsplit(" ", 1)[1])
+    assert 3.0 * noise < advice < 20.0 * noise
+    tolerance = Tolerance(advice, 0.01)
+    assert warnings(points, smoothness=smoothness, tolerance=tolerance) == []
+
+
+def test_corners_that_swing():
+    (sentence,) = warnings(U_TURN, smoothness=5)
+    assert "swings" in sentence
+    assert "100 mm apart" in sentence
+    assert "path.shape.corner_distance" in sentence
+    assert warnings(U_TURN, smoothness=5, corner_distance=0.03) == []
+
+
+def test_a_corner_that_bends_narrowly():
+    points = [[0, k / 10, 0] for k in range(6)] + [[k / 10, 0.5, 0] for k in range(1, 6)]
+    (sentence,) = warnings(points, smoothness=3)
+    assert "bends with a radius of" in sentence
+    assert "where waypoints are 100 mm apart" in sentence
+
+
+def test_ends_that_meet():
+    angle = 2.0 * np.pi * np.arange(40) / 40
+    circle = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    for points in (circle, np.vstack([circle, circle[:1]])):
+        (sentence,) = warnings(points, smoothness=3)
+        assert sentence.endswith("write path.shape.closed: true")
+        assert warnings(points, smoothness=3, closed=True) == []
+    path = path_from_waypoints(WaypointTable(circle[:30]), smoothness=3)
+    assert closing_gap(path) is None
+
+
+def test_millimetres():
+    (sentence,) = warnings(1e3 * WAVE, smoothness=3)
+    assert "299.9" not in sentence
+    assert "up to 300 m from the origin; their unit is m, not mm" in sentence
+
+
+def test_orientation_that_turns_faster_than_was_asked_for():
+    """Keyframes on uneven places: the spline through them overshoots."""
+    line = PiecewisePolynomialCurve.line([0, 0, 0], [0, 1.0, 0])
+    theta = np.array([0.0, 0.3, 0.6, 0.62, 0.64, 0.9, 1.0])
+    angles = np.radians(
+        [[0, 0, 0], [0, 0, 0], [0, 0, 0], [60, 0, 0], [0, 0, 0], [0, 0, 0], [0] * 3]
+    )
+    curve = interpolate_orientation(zyx_to_quaternion(angles), theta, smoothness=3)
+    path = Path(line, curve)
+    (sentence,) = path_warnings(path, shape_report(path))
+    assert sentence.startswith("the orientation turns by")
+    assert sentence.endswith("add orientations there")

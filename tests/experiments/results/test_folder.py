@@ -1,0 +1,282 @@
+"""The folder of results: taken by one process, nothing of a user's is ever lost in it."""
+
+import errno
+import os
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.results.folder import check_folder, open_results
+from experiments.results.manifest import MANIFEST, RESULTS
+from experiments.results.provenance import PROJECT_ROOT, standard_attributes
+from experiments.results.run_log import RunLog
+from pfsc_drake import InputError
+
+
+@pytest.fixture(name="out")
+def fixture_out(tmp_path):
+    """A folder with the results of a run."""
+    folder = tmp_path / "out"
+    with open_results(folder, "run") as results:
+        for name in ("scenario.yaml", "log.h5", "metrics.json", "figures/path.png", "report.html"):
+            results.write(name, f"first {name}")
+    return folder
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Content of all files below a folder."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file() or path.is_symlink())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def assert_refused(folder, reason, kind="run", inputs=()):
+    """Refused with one line by check and by opening, and nothing has changed."""
+    before = content(folder)
+    for use in (check_folder, lambda *arguments: open_results(*arguments).__enter__()):
+        with pytest.raises(InputError) as caught:
+            use(folder, kind, inputs)
+        assert str(caught.value).startswith(f"--out {folder}: ")
+        assert reason in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert content(folder) == before
+
+
+def test_results_of_an_earlier_run_are_replaced_and_all_else_stays(out):
+    (out / "notes.txt").write_text("mine")
+    (out / "mine").mkdir()
+    (out / "mine" / "log.h5").write_text("mine")
+    with open_results(out, "run") as results:
+        assert set(content(out)) == {"notes.txt", "mine/log.h5", MANIFEST}
+        assert not (out / "figures").exists()
+        assert results.write("log.h5", b"second") == out / "log.h5"
+        assert results.explain_problems() is None
+    assert set(content(out)) == {"notes.txt", "mine/log.h5", MANIFEST, "log.h5"}
+    assert (out / "log.h5").read_bytes() == b"second"
+
+
+@pytest.mark.parametrize("name", [*RESULTS, MANIFEST, ".unfinished", "figures"])
+@pytest.mark.parametrize("kind_of_file", ["file", "link", "dead link", "folder"])
+def test_what_no_run_has_written_is_in_the_way(tmp_path, name, kind_of_file):
+    folder, target = tmp_path / "out", tmp_path / "target"
+    folder.mkdir()
+    target.write_text("mine")
+    if kind_of_file == "folder":
+        (folder / name).mkdir()
+        (folder / name / "mine.txt").write_text("mine")
+    elif kind_of_file == "file":
+        (folder / name).write_text("mine")
+    else:
+        (folder / name).symlink_to(target if kind_of_file == "link" else "nowhere")
+    expected = f"it holds {name}" + ("/mine.txt" if (name, kind_of_file) == DRAWN else "")
+    if kind_of_file == "dead link":
+        with pytest.raises(InputError, match=f"it holds {name}, which no run has written"):
+            check_folder(folder, "run")
+        assert (folder / name).is_symlink()
+    else:
+        assert_refused(folder, f"{expected}, which no run has written")
+    assert target.read_text() == "mine"
+
+
+DRAWN = ("figures", "folder")
+
+
+@pytest.mark.parametrize("name", ["scenario.yaml", "log.h5", "figures/path.png"])
+def test_what_was_changed_since_is_in_the_way(out, name):
+    with (out / name).open("a") as file:
+        file.write("edited")
+    assert_refused(out, f"its {name} was changed after the run that wrote it")
+
+
+def test_what_was_replaced_by_a_link_is_in_the_way(out, tmp_path):
+    (out / "log.h5").rename(tmp_path / "moved.h5")
+    (out / "log.h5").symlink_to(tmp_path / "moved.h5")  # the same content
+    assert_refused(out, "its log.h5 was changed")
+
+
+def test_pictures_of_the_user_among_the_figures_are_in_the_way(out):
+    (out / "figures" / "mine.png").write_text("mine")
+    assert_refused(out, "it holds figures/mine.png, which no run has written")
+
+
+def test_inputs_are_in_the_way_by_any_name(out, tmp_path):
+    (tmp_path / "link.yaml").symlink_to(out / "scenario.yaml")
+    for source in (out / "scenario.yaml", out / ".." / "out" / "scenario.yaml", "link.yaml"):
+        assert_refused(out, "its scenario.yaml is an input of this run", inputs=[tmp_path / source])
+    nowhere = [tmp_path / "none", tmp_path / ("n" * 300), Path("a\0b")]
+    check_folder(out, "run", nowhere)
+
+
+def test_results_of_another_kind_are_in_the_way(out):
+    assert_refused(out, "it holds the results of a run", kind="comparison")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "not JSON",
+        "[]",
+        '{"program": "other", "results": "run", "files": {"log.h5": ""}}',
+        '{"program": "pfsc_drake", "results": "run"}',
+        '{"program": "pfsc_drake", "results": "run", "files": 3}',
+    ],
+)
+def test_a_manifest_of_somebody_else_is_none(out, text):
+    (out / MANIFEST).write_text(text)
+    assert_refused(out, "which no run has written")
+
+
+def test_a_manifest_cannot_name_what_is_no_result(tmp_path):
+    folder, victim = tmp_path / "out", tmp_path / "victim.png"
+    folder.mkdir()
+    victim.write_text("")
+    (folder / "notes.txt").write_text("")
+    empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+    names = ("../victim.png", "notes.txt", "figures/../../victim.png", str(victim))
+    files = ", ".join(f'"{name}": "{empty}"' for name in names)
+    (folder / MANIFEST).write_text(
+        f'{{"program": "pfsc_drake", "results": "run", "files": {{{files}}}}}'
+    )
+    with open_results(folder, "run"):
+        pass
+    assert victim.exists()
+    assert (folder / "notes.txt").exists()
+
+
+def earlier_version(folder):
+    """A folder as version 0.1 left it."""
+    (folder / "figures").mkdir(parents=True)
+    for name in ("scenario.yaml", "metrics.json", "report.html", "figures/path.png"):
+        (folder / name).write_text("old")
+    RunLog([0.0], attributes=standard_attributes("old")).write(folder / "log.h5")
+    return folder
+
+
+def test_results_of_the_version_without_manifests_are_replaced(tmp_path):
+    folder = earlier_version(tmp_path / "out")
+    with open_results(folder, "run"):
+        assert set(content(folder)) == {MANIFEST}
+
+
+@pytest.mark.parametrize("change", ["notes.txt", "figures/mine.png", "log", "other log", "study"])
+def test_other_folders_without_manifest_are_not(tmp_path, change):
+    folder = earlier_version(tmp_path / "out")
+    if change == "log":
+        (folder / "log.h5").unlink()
+    elif change == "other log":
+        RunLog([0.0]).write(folder / "log.h5")
+    elif change != "study":
+        (folder / change).write_text("mine")
+    assert_refused(folder, "it holds", kind="study" if change == "study" else "run")
+
+
+def test_no_folder(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "dead").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("file", "dead", "pipe"):
+        with pytest.raises(InputError, match="is no folder; allowed: a folder"):
+            check_folder(tmp_path / name, "run")
+    with pytest.raises(InputError, match="cannot be written: Not a directory"):
+        check_folder(tmp_path / "file" / "out", "run")
+    with pytest.raises(InputError, match="cannot be written: File name too long"):
+        check_folder(tmp_path / ("n" * 300), "run")
+    with pytest.raises(InputError, match="cannot be written: no name of a folder"):
+        check_folder(tmp_path / "a\0b", "run")
+    with pytest.raises(InputError, match="/proc/nothing/out: cannot be written"):
+        open_results(Path("/proc/nothing/out"), "run").__enter__()
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_one_process_at_a_time(out):
+    code = (
+        "import sys; from pathlib import Path;"
+        "from experiments.results.folder import open_results\n"
+        "with open_results(Path(sys.argv[1]), 'run') as results:\n"
+        "    results.write('log.h5', 'of the other process'); print('taken', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    command = [sys.executable, "-c", code, str(out)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=PROJECT_ROOT, **pipes, text=True) as process:
+        assert process.stdout.readline() == "taken\n"
+        before = content(out)
+        with (
+            pytest.raises(InputError, match="another run is writing into it"),
+            open_results(out, "run"),
+        ):
+            pass
+        assert content(out) == before
+        process.kill()  # a crash leaves no lock
+        process.communicate()
+    with open_results(out, "run"):
+        assert set(content(out)) == {MANIFEST}
+
+
+def test_a_process_that_ends_while_it_writes_leaves_no_trap(out):
+    (out / ".unfinished").write_text("half a log")
+    with open_results(out, "run"):
+        assert set(content(out)) == {MANIFEST}
+
+
+@pytest.fixture(name="temporary")
+def fixture_temporary(tmp_path, monkeypatch):
+    """The folder for temporary files."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+def test_a_removed_folder(out, temporary):
+    with open_results(out, "run") as results:
+        results.write("scenario.yaml", "x")
+        shutil.rmtree(out)
+        kept = results.write("log.h5", b"the log")
+        picture = results.write("figures/path.png", b"a picture")
+    assert kept.read_bytes() == b"the log"
+    assert picture == kept.parent / "figures" / "path.png"
+    assert kept.is_relative_to(temporary)
+    assert results.explain_problems() == (
+        f"cannot write log.h5, figures into {out}: No such file or directory; kept in {kept.parent}"
+    )
+    assert not out.exists()
+
+
+def test_a_folder_that_somebody_else_has_made_in_its_place(out, temporary):
+    with open_results(out, "run") as results:
+        shutil.rmtree(out)
+        out.mkdir()
+        kept = results.write("log.h5", b"the log")
+    assert kept.is_relative_to(temporary)
+    assert "another folder has taken its place" in results.explain_problems()
+    assert content(out) == {}
+
+
+def test_a_file_that_somebody_else_has_made_meanwhile(out, temporary):
+    with open_results(out, "run") as results:
+        (out / "log.h5").write_text("mine")
+        kept = results.write("log.h5", b"the log")
+    assert (out / "log.h5").read_text() == "mine"
+    assert kept.is_relative_to(temporary)
+    assert "somebody else has made log.h5 meanwhile" in results.explain_problems()
+
+
+def test_files_that_grow_too_large_are_whole_or_not_there(out, temporary):
+    """As on a full disk; what still fits is written, what fits nowhere is said to be lost."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with open_results(out, "run") as results:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+        try:
+            lost = results.write("log.h5", b"x" * 10_001)
+            kept = results.write("metrics.json", b"x" * 10_000)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (lost, kept) == (None, out / "metrics.json")
+    assert set(content(out)) == {MANIFEST, "metrics.json"}
+    assert content(temporary) == {}
+    reason = os.strerror(errno.EFBIG)
+    assert results.explain_problems() == f"cannot write log.h5 into {out}: {reason}; lost: log.h5"

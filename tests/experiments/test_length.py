@@ -1,0 +1,33 @@
+"""How long the longest run is."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from experiments.length import MAX_TICKS, check_length
+from pfsc_drake import InputError
+
+STATION = SimpleNamespace(
+    controller=SimpleNamespace(period=1e-3),
+    log=SimpleNamespace(rows={"a": slice(0, 60), "b": slice(60, 100)}),
+)
+
+
+@pytest.mark.parametrize(
+    ("duration", "time", "memory"),
+    [
+        (1.1e3, "3.67 minutes", "3.52 GB"),
+        (1e5, "5.56 hours", "320 GB"),
+        (1e7, "23.1 days", "3.2e+04 GB"),
+        (float("inf"), "inf years", "inf GB"),
+    ],
+)
+def test_too_long(duration, time, memory):
+    with pytest.raises(InputError, match="sampling intervals") as caught:
+        check_length(SimpleNamespace(duration=duration), STATION)
+    for part in (time, memory, f"duration = {duration:g} s", "up to 1000 s"):
+        assert part in str(caught.value)
+
+
+def test_long_enough():
+    check_length(SimpleNamespace(duration=MAX_TICKS * 1e-3), STATION)
