@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
+from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
 from diagrams.tasks.task import Task
@@ -65,6 +66,11 @@ class Station:
         return self.task.path
 
     @property
+    def start_posture(self) -> np.ndarray:
+        """Joint coordinates at the start [rad or m], shape (N,)."""
+        return (self.part.coordinates.link_rows @ self.initial_state)[: self.robot.dimension]
+
+    @property
     def reference_duration(self) -> float:
         """Length of the reference motion [s]."""
         return self.task.motion.domain[1]
@@ -90,7 +96,9 @@ class Station:
         self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), state)
 
     def fault(self, root: Context) -> str | None:
-        """Return why a system of the station is in its safe state, or None if none is.
+        """Return why a system of the station is in its safe state, and where it came to be.
+
+        None if none is.
 
         Args:
             root: Context of the diagram.
@@ -98,10 +106,19 @@ class Station:
         for system in self.diagram.GetSystems():
             name, context = system.get_name(), system.GetMyContextFromRoot(root)
             fault = system.fault(context) if isinstance(system, CanFail) else Fault.NONE
-            if fault is not Fault.NONE:
-                prefix = "" if system is self.controller else f"{name}: "
-                return prefix + fault.explanation
+            if fault is Fault.NONE:
+                continue
+            if system is self.controller:
+                return self._describe(fault, root, "law", self.law.layout.status.start)
+            return f"{name}: {self._describe(fault, root, 'servo_fault', 0)}"
         return None
+
+    def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> str:
+        """Return a sentence on a fault that is logged in a column of a signal."""
+        now, before = first_instant(self.log, root, signal, column)
+        place = self.task.place
+        scene = FaultScene(self.law, self.robot, place, self.on_motors, now, before)
+        return describe(fault, scene)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
         """Return what else is worth a look in a run, by name, if anything is.

@@ -2,9 +2,10 @@
 
 Signals used, as in the log: ``xi`` [samples, 2] m, ``eta``, ``eta_p`` [samples, 1] m, ``eta_dot``
 m/s, ``phi`` [samples, 3] rad, ``tau_d`` [samples, axes] with attribute ``limits``,
-``manifold_force`` [samples, 3 or more], the first three in N along (eta, xi_1, xi_2), ``tared``
-[samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N and Nm, ``notch_position`` [samples, 2] m. Times
-are those of the log's time axis. A metric over an interval that holds no sample is NaN.
+``saturated_drives`` and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or more], the first
+three in N along (eta, xi_1, xi_2), ``tared`` [samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N
+and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A metric over an
+interval that holds no sample is NaN.
 """
 
 import math
@@ -14,6 +15,7 @@ import numpy as np
 
 from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.control.law.fault import Fault
 
 SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
 
@@ -153,19 +155,28 @@ def peak_torque(log: RunLog) -> FloatArray:
 
 
 def saturation_count(log: RunLog) -> int:
-    """Number of samples at which at least one drive is at its limit.
+    """Number of samples at which the law or a drive is at a limit.
+
+    That is, while there is no fault the law asks of a drive more than it may: torque, or with
+    velocity servos speed (``saturated_drives``); or the torque of a drive is at its limit,
+    whoever commands it: the law, a servo, or the safe state after a fault.
 
     Args:
-        log: With ``tau_d``; without ``limits`` nothing counts as saturated.
+        log: With ``tau_d`` and its ``limits``, or ``saturated_drives`` with ``fault``, or both;
+            nothing of the others counts.
 
     Returns:
         Between 0 and the number of samples.
     """
-    signal = log["tau_d"]
-    if signal.limits is None:
-        return 0
-    at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
-    return int(np.count_nonzero(np.any(at_limit, axis=1)))
+    saturated = np.zeros(log.time.size, dtype=bool)
+    if "tau_d" in log and (signal := log["tau_d"]).limits is not None:
+        at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
+        saturated |= np.any(at_limit, axis=1)
+    if "saturated_drives" in log:
+        asked = log["saturated_drives"].values[:, 0] > 0
+        # after a fault the drives do not follow the law
+        saturated |= asked & (log["fault"].values[:, 0] == Fault.NONE)
+    return int(np.count_nonzero(saturated))
 
 
 def max_manifold_force(log: RunLog) -> float:

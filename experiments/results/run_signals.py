@@ -130,12 +130,18 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
 
 def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
     angle, rate, _ = _joint_units(station)
+    limits = {
+        "q_J": station.robot.gather("position_limits"),
+        "v_J": station.robot.gather("velocity_limit"),
+    }
     names = ["q_J", "v_J"]
     if np.isfinite(station.robot.K_s).any():  # motors of rigid joints move as the links do
         names += ["q_M", "v_M"]
     for name, values in zip(names, np.hsplit(state, 4), strict=False):
         labels = [f"{name}{suffix}_{i + 1}" for i in range(station.robot.dimension)]
-        log.add(f"{name}{suffix}", values, angle if name.startswith("q") else rate, labels)
+        unit = angle if name.startswith("q") else rate
+        known = limits.get(name) if suffix == "" else None
+        log.add(f"{name}{suffix}", values, unit, labels, known)
 
 
 def _joint_units(station: Station) -> tuple[str, str, str]:
@@ -263,7 +269,7 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     """Add the torques that a velocity servo gives, and what friction takes."""
     effort = _joint_units(station)[2]
     if "drive_torque" in raw:
-        limits = station.robot.gather("effort_limit")
+        limits = station.diagram.GetSubsystemByName("velocity_servo").limits
         labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
         names = [fault.name.lower() for fault in Fault]

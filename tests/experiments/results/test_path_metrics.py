@@ -121,6 +121,18 @@ def test_torques_and_saturation():
     assert saturation_count(log) == 0
 
 
+def test_what_a_law_asks_too_much_of_servos_counts():
+    """Speeds that the law asks for, torques of the servos, and the safe state after a fault."""
+    log = RunLog(np.arange(6.0))
+    log.add("tau_d", np.array([1.0, 3.0, 1.0, 1.0, 1.0, -3.0]), "Nm", limits=3.0)
+    log.add("saturated_drives", np.array([0, 2, 1, 0, 6, 0]), "1")
+    log.add("fault", np.array([0, 0, 0, 0, 4, 4]), "1", ["none"])
+    # sample 4: the law asks in vain, for there is a fault; sample 5: the drives brake
+    assert saturation_count(log) == 3
+    del log.signals["tau_d"]
+    assert saturation_count(log) == 2
+
+
 def test_forces_count_once_the_sensor_is_tared():
     log = RunLog(np.arange(4.0))
     forces = [[90, 0, 0], [2, 3, 6], [-5, 0, 0], [0, 4, 0]]
