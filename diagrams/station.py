@@ -1,6 +1,7 @@
 """What running, logging and measuring need to know of a station."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
@@ -14,7 +15,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.can_fail import CanFail
+from pfsc_drake.systems.control.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 
@@ -103,15 +104,20 @@ class Station:
         Args:
             root: Context of the diagram.
         """
-        for system in self.diagram.GetSystems():
-            name, context = system.get_name(), system.GetMyContextFromRoot(root)
-            fault = system.fault(context) if isinstance(system, CanFail) else Fault.NONE
+        for name, system in self._can_fail.items():
+            fault = system.fault(system.GetMyContextFromRoot(root))
             if fault is Fault.NONE:
                 continue
             if system is self.controller:
                 return self._describe(fault, root, "law", self.law.layout.status.start)
             return f"{name}: {self._describe(fault, root, 'servo_fault', 0)}"
         return None
+
+    @cached_property
+    def _can_fail(self) -> dict[str, FailingSystem]:
+        """The systems with a safe state, by name; to look for them takes longer than to ask."""
+        systems = {system.get_name(): system for system in self.diagram.GetSystems()}
+        return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
 
     def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> str:
         """Return a sentence on a fault that is logged in a column of a signal."""
