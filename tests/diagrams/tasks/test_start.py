@@ -246,7 +246,7 @@ def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
     np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
     assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, False) == []
     (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, False)
-    assert "lift_joint most" in warning and f"rail_joint {0.8 * side:g} m" in warning
+    assert "lift_joint most" in warning and f"q_1 = {0.8 * side:g} m" in warning
 
 
 def test_a_posture_in_radians(load_scenario, start):
