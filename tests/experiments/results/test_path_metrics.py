@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from experiments.results.drive_metrics import peak_torque, saturation_count
 from experiments.results.path_metrics import (
     max_distance_from_notch_axis,
     max_external_force,
@@ -17,9 +18,7 @@ from experiments.results.path_metrics import (
     path_distance,
     path_following_metrics,
     peak_speed,
-    peak_torque,
     rms_path_deviation,
-    saturation_count,
     settling_time,
     static_path_deviation,
     tangential_error,
