@@ -90,7 +90,7 @@ def build_station(
         + part.start_warnings(
             scenario.start, link_state[: part.robot.dimension], start.R_e is not None
         )
-        + law_warnings(scenario, part.robot, link_state)
+        + law_warnings(scenario, part.robot, law, link_state)
         + sensor_warnings(scenario),
         workpiece,
     )

@@ -1,10 +1,12 @@
 """What running, logging and measuring need to know of a station."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
+from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
 from diagrams.tasks.task import Task
@@ -13,7 +15,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.can_fail import CanFail
+from pfsc_drake.systems.control.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 
@@ -65,6 +67,11 @@ class Station:
         return self.task.path
 
     @property
+    def start_posture(self) -> np.ndarray:
+        """Joint coordinates at the start [rad or m], shape (N,)."""
+        return (self.part.coordinates.link_rows @ self.initial_state)[: self.robot.dimension]
+
+    @property
     def reference_duration(self) -> float:
         """Length of the reference motion [s]."""
         return self.task.motion.domain[1]
@@ -90,18 +97,34 @@ class Station:
         self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), state)
 
     def fault(self, root: Context) -> str | None:
-        """Return why a system of the station is in its safe state, or None if none is.
+        """Return why a system of the station is in its safe state, and where it came to be.
+
+        None if none is.
 
         Args:
             root: Context of the diagram.
         """
-        for system in self.diagram.GetSystems():
-            name, context = system.get_name(), system.GetMyContextFromRoot(root)
-            fault = system.fault(context) if isinstance(system, CanFail) else Fault.NONE
-            if fault is not Fault.NONE:
-                prefix = "" if system is self.controller else f"{name}: "
-                return prefix + fault.explanation
+        for name, system in self._can_fail.items():
+            fault = system.fault(system.GetMyContextFromRoot(root))
+            if fault is Fault.NONE:
+                continue
+            if system is self.controller:
+                return self._describe(fault, root, "law", self.law.layout.status.start)
+            return f"{name}: {self._describe(fault, root, 'servo_fault', 0)}"
         return None
+
+    @cached_property
+    def _can_fail(self) -> dict[str, FailingSystem]:
+        """The systems with a safe state, by name; to look for them takes longer than to ask."""
+        systems = {system.get_name(): system for system in self.diagram.GetSystems()}
+        return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
+
+    def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> str:
+        """Return a sentence on a fault that is logged in a column of a signal."""
+        now, before = first_instant(self.log, root, signal, column)
+        place = self.task.place
+        scene = FaultScene(self.law, self.robot, place, self.on_motors, now, before)
+        return describe(fault, scene)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
         """Return what else is worth a look in a run, by name, if anything is.

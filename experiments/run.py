@@ -12,6 +12,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.wording import posture_text
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import render_figures
 from experiments.interruption import noticed_interruption
@@ -19,6 +20,7 @@ from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import PreparedRun, prepare
 from experiments.progress import ProgressListener
 from experiments.results.folder import ResultsFolder, check_folder, open_results
+from experiments.results.joint_limits import JointLimits
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.provenance import standard_attributes
@@ -61,6 +63,7 @@ class _Measured:
         log: All signals.
         motion: What a recording needs of them.
         metrics: Metrics with their targets.
+        warnings: What may not have gone as well as hoped, one sentence each.
         fault: Why the run was stopped, or None.
         end: When it ended [s].
     """
@@ -68,6 +71,7 @@ class _Measured:
     log: RunLog
     motion: RecordedMotion
     metrics: Metrics
+    warnings: list[str]
     fault: str | None
     end: float
 
@@ -114,7 +118,7 @@ def run_scenario(
             measured.fault,
             report.path,
             measured.metrics,
-            prepared.warnings,
+            measured.warnings,
             interrupted(),
             report.problem,
         )
@@ -134,7 +138,10 @@ def _measure(
         result = simulate(station, settings.simulation, settings.duration, progress, interrupted)
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
-        log.attributes = standard_attributes(name) | {"integration": str(prepared.integration)}
+        log.attributes = standard_attributes(name) | {
+            "integration": str(prepared.integration),
+            "start_posture": posture_text(station.robot, station.start_posture),
+        }
         if result.fault is not None:
             log.attributes["fault"] = result.fault
         if interrupted():
@@ -148,6 +155,8 @@ def _measure(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
     metrics.update(shape_metrics(station.task.shape))
+    limits = JointLimits.of(station.robot)
+    metrics.update(limits.metrics(log))
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")
@@ -155,7 +164,8 @@ def _measure(
     for metric, target in settings.targets.get(settings.controller.law, {}).items():
         metrics.set_target(metric, target.bound, target.source)
     results.write("metrics.json", metrics.to_json())
-    return _Measured(log, motion, metrics, result.fault, end)
+    warnings = [*prepared.warnings, *limits.warnings(log)]
+    return _Measured(log, motion, metrics, warnings, result.fault, end)
 
 
 def _report(
@@ -172,7 +182,7 @@ def _report(
     page = report_page(
         title=name,
         description=prepared.settings.description,
-        warnings=prepared.warnings,
+        warnings=measured.warnings,
         scenario_yaml_text=prepared.text,
         metrics=measured.metrics,
         figures=pictures,

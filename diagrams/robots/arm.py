@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from diagrams.robots.contact import add_scene, connect_scene
 from diagrams.robots.model import read_robot, tool_frame
-from diagrams.robots.part import Drives, RobotPart, SensorMount
+from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
     add_tool_reaction,
@@ -135,13 +135,7 @@ class MultibodyArm(Arm):
         """See :class:`RobotPart`."""
         self.model.SetPositionsAndVelocities(context, state)
 
-    def sensor_mount(
-        self,
-        builder: DiagramBuilder,
-        joint: str,
-        joint_state: OutputPort,
-        wrench: OutputPort | None,
-    ) -> SensorMount:
+    def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
         mount, load = self._tool_load(joint)
         return SensorMount(
@@ -188,17 +182,11 @@ class CoupledArm(Arm):
         rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         self.full.set_joint_state(context, rows @ state)
 
-    def sensor_mount(
-        self,
-        builder: DiagramBuilder,
-        joint: str,
-        joint_state: OutputPort,
-        wrench: OutputPort | None,
-    ) -> SensorMount:
+    def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
         _, load = self._tool_load(joint)
         acceleration = self.full.GetOutputPort("link_acceleration")
-        reaction = add_tool_reaction(builder, self.robot, load, joint_state, acceleration, wrench)
+        reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
         return SensorMount(load, reaction)
 
 

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
 from diagrams.robots.contact import add_scene, connect_scene
-from diagrams.robots.part import Drives, RobotPart, SensorMount
+from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
     add_tool_reaction,
@@ -125,19 +125,13 @@ class FreeDelta(DeltaPart):
         builder.Connect(wrench, force.get_input_port())
         builder.Connect(force.get_output_port(), self.analytic.GetInputPort("external_force"))
 
-    def sensor_mount(
-        self,
-        builder: DiagramBuilder,
-        joint: str,
-        joint_state: OutputPort,
-        wrench: OutputPort | None,
-    ) -> SensorMount:
+    def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """Return the sensor between end-effector and load, which is a point mass in E."""
         _require_joint(joint)
         mass, gravity = self.robot.parameters.masses.load, self.robot.gravity
         load = ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
         acceleration = self.analytic.GetOutputPort("acceleration")
-        reaction = add_tool_reaction(builder, self.robot, load, joint_state, acceleration, wrench)
+        reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
         return SensorMount(load, reaction)
 
     def place(self, context: Context, state: np.ndarray) -> None:
@@ -198,13 +192,7 @@ class TouchingDelta(DeltaPart):
         push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
         connect_push(builder, self.multibody, push)
 
-    def sensor_mount(
-        self,
-        builder: DiagramBuilder,
-        joint: str,
-        joint_state: OutputPort,
-        wrench: OutputPort | None,
-    ) -> SensorMount:
+    def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
         _require_joint(joint)
         plant = self.multibody

@@ -31,8 +31,7 @@ def add_sensor(
         InputError: If the sensor does not suit the robot or the sampling time.
     """
     parameters, period = scenario.sensor, scenario.controller.sampling_time
-    true_state, wrench = ports["true_joint_state"], ports.get("wrench_ext")
-    mount = part.sensor_mount(builder, parameters.joint, true_state, wrench)
+    mount = part.sensor_mount(builder, parameters.joint, ports)
     sensor = builder.AddNamedSystem(
         "force_torque_sensor", ForceTorqueSensor(parameters.transducer(), period, mount.index)
     )

@@ -12,6 +12,9 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 
+# output ports by what they carry
+Ports = dict[str, OutputPort]
+
 
 @dataclass(frozen=True)
 class Drives:
@@ -99,20 +102,14 @@ class RobotPart(ABC):
         """
 
     @abstractmethod
-    def sensor_mount(
-        self,
-        builder: DiagramBuilder,
-        joint: str,
-        joint_state: OutputPort,
-        wrench: OutputPort | None,
-    ) -> SensorMount:
+    def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """Return where a force/torque sensor sits.
 
         Args:
             builder: Builder of the diagram.
             joint: Fixed joint of the model with the sensor in it.
-            joint_state: The true one.
-            wrench: On the tool point, world axes, shape (6,), if anything acts there.
+            ports: ``true_joint_state``, and ``wrench_ext`` on the tool point, world axes, shape
+                (6,), if anything acts there.
 
         Raises:
             InputError: If the model has no such joint, or no tool behind it.

@@ -86,9 +86,8 @@ def add_tool_reaction(
     builder: DiagramBuilder,
     robot: RobotModel,
     load: ToolLoad,
-    joint_state: OutputPort,
     acceleration: OutputPort,
-    wrench: OutputPort | None,
+    ports: dict[str, OutputPort],
 ) -> OutputPort:
     """Return what a sensor in the flange bears, of a robot whose plant does not tell it.
 
@@ -96,15 +95,15 @@ def add_tool_reaction(
         builder: Builder of the diagram.
         robot: The robot.
         load: Everything behind the sensor.
-        joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         acceleration: Of the links, shape (N,).
-        wrench: On the tool point, world axes, shape (6,), if anything acts there.
+        ports: ``true_joint_state`` ``[q_J, v_J, q_M, v_M]``, shape (4N,), and ``wrench_ext`` on
+            the tool point, world axes, shape (6,), if anything acts there.
     """
     reaction = builder.AddNamedSystem("tool_reaction", ToolReaction(robot, load))
-    builder.Connect(joint_state, reaction.GetInputPort("joint_state"))
+    builder.Connect(ports["true_joint_state"], reaction.GetInputPort("joint_state"))
     builder.Connect(acceleration, reaction.GetInputPort("acceleration"))
-    if wrench is not None:
-        builder.Connect(wrench, reaction.GetInputPort("wrench"))
+    if "wrench_ext" in ports:
+        builder.Connect(ports["wrench_ext"], reaction.GetInputPort("wrench"))
     return reaction.GetOutputPort("reaction")
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
 from pfsc_drake.robot.robot_model import pose_function
@@ -10,21 +11,6 @@ from pfsc_drake.robot.serial.chain import SerialChain
 # from where on a posture that was found is another one than the posture given
 _FAR_DEG = 60.0
 _FAR_SLIDE = 0.3  # m
-
-
-def describe_posture(chain: SerialChain, q: np.ndarray) -> str:
-    """Return a posture in one line, e.g. ``shoulder -12.5 deg, lift 0.2 m``.
-
-    Args:
-        chain: The robot.
-        q: Joint coordinates, shape (N,) [rad or m].
-    """
-    return ", ".join(
-        f"{link.name} {np.rad2deg(value):.4g} deg"
-        if link.is_revolute
-        else f"{link.name} {value:.4g} m"
-        for link, value in zip(chain.links, q, strict=True)
-    )
 
 
 def posture_warnings(
@@ -45,7 +31,7 @@ def posture_warnings(
     distance = np.abs(q_J - posture_near(posture_deg, chain)) / unit
     if distance.max() <= 1.0:
         return []
-    found = describe_posture(chain, q_J)
+    found = posture_text(chain, q_J)
     if _fits_in_radians(posture_deg, chain, q_J, oriented):
         in_degrees = np.where(is_angle, np.rad2deg(posture_deg), posture_deg)
         written = ", ".join(f"{value:.4g}" for value in in_degrees)

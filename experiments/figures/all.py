@@ -10,7 +10,13 @@ from experiments.figures.coordinates import (
     draw_progress,
     draw_transversal,
 )
-from experiments.figures.drives import draw_deflection, draw_efforts, draw_friction, draw_velocities
+from experiments.figures.drives import (
+    draw_deflection,
+    draw_efforts,
+    draw_friction,
+    draw_positions,
+    draw_velocities,
+)
 from experiments.figures.forces import draw_forces, has_forces
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
@@ -58,6 +64,7 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("angles_e", "angles_d"), draw_angles),
     (has_forces, draw_forces),
     (_has("notch_position"), draw_notch_position),
+    (_has("q_J"), draw_positions),
     (_has("v_J"), draw_velocities),
     (_has("tau_d"), draw_efforts),
     (_has("tau_f", "v_J"), draw_friction),

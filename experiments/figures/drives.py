@@ -1,4 +1,4 @@
-"""The drives over time: velocities, torques or forces, friction, deflection.
+"""The drives over time: positions, velocities, torques or forces, friction, deflection.
 
 Rotary drives have joints, velocities in rad/s and torques in Nm; linear ones have slides, m/s and
 forces in N. The words follow the units of the signals.
@@ -20,7 +20,7 @@ from experiments.figures.style import (
     scale_to_late,
     shade,
 )
-from experiments.results.run_log import RunLog
+from experiments.results.run_log import RunLog, Signal
 
 MILLI = 1e3
 AT_REST = 0.01  # share of an axis' largest velocity, below which it counts as at rest
@@ -28,7 +28,35 @@ PEAK_RATIO = 4.0  # first peak to the rest of the run, from which on the rest is
 _EFFORTS = {"Nm": "torque", "N": "force"}
 _EFFORT_TITLES = {"Nm": "torques", "N": "forces"}
 _MOVERS = {"rad/s": "joint", "m/s": "slide"}
+_POSITION_UNITS = {"rad": (180.0 / np.pi, "deg")}
+_REACH = 0.1  # of the range of an axis, below which its distance from a limit matters
+_BEYOND = "#FECACA"
 _MILLI_UNITS = {"rad": "mrad", "m": "mm"}
+
+
+def draw_positions(log: RunLog) -> Drawing:
+    """Positions of joints or slides, with limits near enough to matter (dashed)."""
+    signal = log["q_J"]
+    mover = _MOVERS.get(f"{signal.unit}/s", "joint and slide")
+    factor, unit = _POSITION_UNITS.get(signal.unit, (1.0, signal.unit))
+    title = f"{mover.capitalize()} positions"
+    canvas, (panel,) = make_panels(1, height=3.2)
+    draw_components(panel, log.time, factor * signal.values, _axis_labels(signal.dim))
+    near = _position_limits_within_reach(signal)
+    for axis, level, is_passed in near:
+        colour = ALERT if is_passed else COLOURS[axis % len(COLOURS)]
+        panel.axhline(factor * level, linestyle="--", color=colour, linewidth=1.0)
+    panel.set(ylabel=f"position in {unit}", title=f"{title} $q_J$")
+    caption = f"Positions of the {_plural(mover)}"
+    if near:
+        caption += "; dashed lines are limits within reach"
+    if any(is_passed for _, _, is_passed in near):
+        q, ends = signal.values, np.asarray(signal.limits)
+        beyond = np.any((q < ends[:, 0]) | (q > ends[:, 1]), axis=1)
+        shade([panel], log.time, beyond, "beyond a limit", _BEYOND)
+        caption += ", red where they are passed"
+    place_legend(panel)
+    return Drawing("positions", title, f"{caption}.", canvas)
 
 
 def draw_velocities(log: RunLog) -> Drawing:
@@ -43,17 +71,22 @@ def draw_velocities(log: RunLog) -> Drawing:
     canvas, panels = make_panels(len(signals) + both)
     for panel, (name, signal) in zip(panels, signals.items(), strict=False):
         draw_components(panel, log.time, signal.values, _axis_labels(signal.dim))
+        for axis in range(signal.dim):
+            _draw_limit(panel, signal, axis)
         panel.set(ylabel=f"velocity in {signal.unit}", title=titles[name])
     place_legend(panels[0])
+    limited = any(_nears_limit(signals["v_J"], axis) for axis in range(signals["v_J"].dim))
+    limits = "; dashed lines are limits within reach" if limited else ""
     if not both:
         title = f"{mover.capitalize()} velocities"
-        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}.", canvas)
+        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}{limits}.", canvas)
     difference = log["v_M"].values - log["v_J"].values
     draw_components(panels[2], log.time, difference, _axis_labels(difference.shape[1]))
     title = r"Difference $\dot q_M - \dot q_J$"
     panels[2].set(ylabel=f"velocity in {log['v_M'].unit}", title=title)
-    caption = "They differ through the elastic transmissions, where the load on them changes."
-    return Drawing("velocities", f"{mover.capitalize()} and motor velocities", caption, canvas)
+    caption = "They differ through the elastic transmissions, where the load on them changes"
+    title = f"{mover.capitalize()} and motor velocities"
+    return Drawing("velocities", title, f"{caption}{limits}.", canvas)
 
 
 def draw_efforts(log: RunLog) -> Drawing:
@@ -83,7 +116,7 @@ def draw_efforts(log: RunLog) -> Drawing:
             enlarged = "The same, scaled to the last three quarters"
             panel.set(ylabel=_effort_label(signal.unit), title=enlarged)
     caption = f"{title.removeprefix('Drive ').capitalize()} of the drives"
-    limited = any(_nears_limit(log, axis) for axis in range(signal.dim))
+    limited = any(_nears_limit(signal, axis) for axis in range(signal.dim))
     caption += "; dashed lines are limits within reach." if limited else "."
     name = title.lower().replace(" ", "_")
     return Drawing(name, title, caption, canvas)
@@ -164,20 +197,38 @@ def _draw_group(panel: Axes, log: RunLog, group: range, labels: list[str]) -> No
     signal = log["tau_d"]
     for axis in group:
         colour = COLOURS[axis % len(COLOURS)]
-        effort = signal.values[:, axis]
-        panel.plot(log.time, effort, color=colour, label=labels[axis])
-        if signal.limits is not None and _nears_limit(log, axis):
-            limit = float(signal.limits[axis])
-            at_limit = largest(effort) >= limit * (1.0 - 1e-9)
-            for level in (-limit, limit):
-                panel.axhline(
-                    level, linestyle="--", color=ALERT if at_limit else colour, linewidth=1.0
-                )
+        panel.plot(log.time, signal.values[:, axis], color=colour, label=labels[axis])
+        _draw_limit(panel, signal, axis)
 
 
-def _nears_limit(log: RunLog, axis: int) -> bool:
-    """Whether a drive comes within a factor of two of its limit."""
-    signal = log["tau_d"]
+def _draw_limit(panel: Axes, signal: Signal, axis: int) -> None:
+    """The limit of an axis and its negative, if near enough to matter."""
+    if signal.limits is None or not _nears_limit(signal, axis):
+        return
+    limit = float(signal.limits[axis])
+    at_limit = largest(signal.values[:, axis]) >= limit * (1.0 - 1e-9)
+    colour = ALERT if at_limit else COLOURS[axis % len(COLOURS)]
+    for level in (-limit, limit):
+        panel.axhline(level, linestyle="--", color=colour, linewidth=1.0)
+
+
+def _position_limits_within_reach(signal: Signal) -> list[tuple[int, float, bool]]:
+    """Axis, limit and whether it is passed, for the limits that axes come near."""
+    if signal.limits is None:
+        return []
+    near = []
+    for axis, (lower, upper) in enumerate(signal.limits):
+        q = signal.values[np.isfinite(signal.values[:, axis]), axis]
+        reach = _REACH * (upper - lower) if np.isfinite(upper - lower) else 0.0
+        for limit, sign in ((lower, -1.0), (upper, 1.0)):
+            beyond = float(np.max(sign * (q - limit), initial=-np.inf))
+            if beyond > -reach:
+                near.append((axis, float(limit), beyond > 0.0))
+    return near
+
+
+def _nears_limit(signal: Signal, axis: int) -> bool:
+    """Whether an axis comes within a factor of two of its limit."""
     if signal.limits is None or not np.isfinite(signal.limits[axis]):
         return False
     return largest(signal.values[:, axis]) >= 0.5 * float(signal.limits[axis])

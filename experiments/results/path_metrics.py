@@ -2,9 +2,10 @@
 
 Signals used, as in the log: ``xi`` [samples, 2] m, ``eta``, ``eta_p`` [samples, 1] m, ``eta_dot``
 m/s, ``phi`` [samples, 3] rad, ``tau_d`` [samples, axes] with attribute ``limits``,
-``manifold_force`` [samples, 3 or more], the first three in N along (eta, xi_1, xi_2), ``tared``
-[samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N and Nm, ``notch_position`` [samples, 2] m. Times
-are those of the log's time axis. A metric over an interval that holds no sample is NaN.
+``saturated_drives`` and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or more], the first
+three in N along (eta, xi_1, xi_2), ``tared`` [samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N
+and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A metric over an
+interval that holds no sample is NaN.
 """
 
 import math
@@ -12,10 +13,9 @@ from collections.abc import Collection
 
 import numpy as np
 
+from experiments.results.drive_metrics import peak_torque, saturation_count
 from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
-
-SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
 
 
 def path_distance(log: RunLog) -> FloatArray:
@@ -137,35 +137,6 @@ def tangential_error(log: RunLog, t: float = -math.inf) -> float:
     """
     error = np.abs(log["eta"].values[:, 0] - log["eta_p"].values[:, 0])
     return _max(error[log.time >= t])
-
-
-def peak_torque(log: RunLog) -> FloatArray:
-    """Largest magnitude of the drive torque of each axis.
-
-    Args:
-        log: With ``tau_d``.
-
-    Returns:
-        [axes] in the unit of ``tau_d``.
-    """
-    values = np.abs(log["tau_d"].values)
-    return np.asarray(np.max(values, axis=0) if len(values) else np.full(values.shape[1], math.nan))
-
-
-def saturation_count(log: RunLog) -> int:
-    """Number of samples at which at least one drive is at its limit.
-
-    Args:
-        log: With ``tau_d``; without ``limits`` nothing counts as saturated.
-
-    Returns:
-        Between 0 and the number of samples.
-    """
-    signal = log["tau_d"]
-    if signal.limits is None:
-        return 0
-    at_limit = np.abs(signal.values) >= signal.limits * (1.0 - SATURATION_MARGIN)
-    return int(np.count_nonzero(np.any(at_limit, axis=1)))
 
 
 def max_manifold_force(log: RunLog) -> float:

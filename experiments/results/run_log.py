@@ -25,7 +25,8 @@ class Signal:
         unit: Unit of all components, e.g. ``"m"``; ``"1"`` without unit.
         labels: One name per column. A signal of names (``mode``) has one integer column
             and a label per *value* instead.
-        limits: Optional [dim], magnitude of the admissible range, in ``unit``.
+        limits: Optional [dim], magnitude of the admissible range, or [dim, 2], its lower and
+            upper end, in ``unit``.
     """
 
     values: FloatArray
@@ -36,9 +37,8 @@ class Signal:
     def __post_init__(self) -> None:
         self.values = _as_columns(self.values)
         if self.limits is not None:
-            self.limits = np.broadcast_to(
-                np.asarray(self.limits, dtype=float), (self.values.shape[1],)
-            ).copy()
+            given, dim = np.asarray(self.limits, dtype=float), self.values.shape[1]
+            self.limits = np.broadcast_to(given, (dim, 2)[: max(given.ndim, 1)]).copy()
 
     @property
     def dim(self) -> int:
@@ -93,7 +93,8 @@ class RunLog:
             values: [samples, dim] or [samples], in ``unit``.
             unit: Unit of all components.
             labels: One name per column; by default the name itself, numbered from 1 if dim > 1.
-            limits: [dim] or scalar, magnitude of the admissible range, in ``unit``.
+            limits: [dim] or scalar, magnitude of the admissible range, or [dim, 2], its lower
+                and upper end, in ``unit``.
 
         Returns:
             The signal that was added.

@@ -10,6 +10,7 @@ from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
+from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
 from pfsc_drake.robot.robot_model import pose_function
 
@@ -43,11 +44,13 @@ def collect_log(station: Station, root: Context) -> RunLog:
         if linearization.manifold.follows_time:
             log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
         else:
-            _add_seen(log, Y[:, 0], "M" if station.on_motors else "measured")
+            _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose, linearization.relative_degree)
         seen = _path_output(station, raw["joint_state"], points)
         # the orientation errors of trajectory tracking stay those from the moving reference
-        replaced = slice(0, 3) if linearization.manifold.follows_time else slice(None)
+        rotational = indices(station.task.place.coordinates, Kind.ROTATIONAL)
+        moving = linearization.manifold.follows_time and rotational.stop > 0
+        replaced = slice(0, rotational.start) if moving else slice(None)
         Y[:, :2, replaced] = seen[:, : Y.shape[1], replaced]
     log.add("theta", points[:, station.task.place.layout.theta], "1")
     log.add("alpha", points[:, station.task.place.layout.alpha], "1")
@@ -71,17 +74,17 @@ def optional_signals(station: Station) -> set[str]:
         names.add("xi_d")
     if station.on_motors:
         names.add("xi_M")
-    if station.law.linearization.num_outputs > 3:
-        names.add("phi")
+    names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
     return names
 
 
-def _add_seen(log: RunLog, y: np.ndarray, suffix: str) -> None:
-    """Add the path coordinates that the law acted on, shape (samples, m)."""
-    log.add(f"eta_{suffix}", y[:, 0], "m")
-    log.add(f"xi_{suffix}", y[:, 1:3], "m", [f"xi_{suffix}_1", f"xi_{suffix}_2"])
-    if y.shape[1] > 3 and suffix != "M":
-        log.add(f"phi_{suffix}", y[:, 3:], "rad", [f"phi_{suffix}_{axis}" for axis in "zyx"])
+def _add_seen(log: RunLog, station: Station, y: np.ndarray, suffix: str) -> None:
+    """Add the coordinates that the law acted on, shape (samples, m)."""
+    for kind, part, names in _kinds(station):
+        if kind is Kind.ROTATIONAL and suffix == "M":
+            continue
+        labels = [name.replace(kind.value, f"{kind.value}_{suffix}", 1) for name in names]
+        log.add(f"{kind.value}_{suffix}", y[:, part], kind.unit, labels)
 
 
 def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
@@ -123,19 +126,27 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
     if station.law.linearization.relative_degree > 1:
         labels = [f"tau_d_{axis}" for axis in axes]
         log.add("tau_d", drive, effort, labels, station.law.limits)
-    if chain.is_elastic:
-        tau_J = chain.K_s * (q_M - q_J) + chain.K_d * (v_M - v_J)
-        log.add("tau_J", tau_J, effort, [f"tau_J_{axis}" for axis in axes])
+    elastic = np.isfinite(chain.K_s)
+    if elastic.any():
+        K_s, K_d = chain.K_s[elastic], chain.K_d[elastic]
+        tau_J = K_s * (q_M - q_J)[:, elastic] + K_d * (v_M - v_J)[:, elastic]
+        log.add("tau_J", tau_J, effort, [f"tau_J_{i + 1}" for i in np.flatnonzero(elastic)])
 
 
 def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
     angle, rate, _ = _joint_units(station)
+    limits = {
+        "q_J": station.robot.gather("position_limits"),
+        "v_J": station.robot.gather("velocity_limit"),
+    }
     names = ["q_J", "v_J"]
     if np.isfinite(station.robot.K_s).any():  # motors of rigid joints move as the links do
         names += ["q_M", "v_M"]
     for name, values in zip(names, np.hsplit(state, 4), strict=False):
         labels = [f"{name}{suffix}_{i + 1}" for i in range(station.robot.dimension)]
-        log.add(f"{name}{suffix}", values, angle if name.startswith("q") else rate, labels)
+        unit = angle if name.startswith("q") else rate
+        known = limits.get(name) if suffix == "" else None
+        log.add(f"{name}{suffix}", values, unit, labels, known)
 
 
 def _joint_units(station: Station) -> tuple[str, str, str]:
@@ -151,22 +162,26 @@ def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: 
     law, layout, linearization = raw["law"], station.law.layout, station.law.linearization
     m = linearization.num_outputs
     Y_p = raw["reference"].reshape(len(law), -1, m)
-    parts = {"eta": slice(0, 1), "xi": slice(1, 3), "phi": slice(3, m)}
-    units = {"eta": "m", "xi": "m", "phi": "rad"}
-    labels = {"eta": ["eta"], "xi": ["xi_1", "xi_2"], "phi": ["phi_z", "phi_y", "phi_x"]}
-    for name, part in parts.items():
-        if part.start >= m:
-            continue
-        log.add(name, Y[:, 0, part], units[name], labels[name])
-        log.add(f"{name}_p", Y_p[:, 0, part], units[name], [f"{x}_p" for x in labels[name]])
+    for kind, part, labels in _kinds(station):
+        name = kind.value
+        log.add(name, Y[:, 0, part], kind.unit, labels)
+        log.add(f"{name}_p", Y_p[:, 0, part], kind.unit, [f"{x}_p" for x in labels])
         if linearization.relative_degree > 1:
-            rates = [f"{x}_dot" for x in labels[name]]
-            log.add(f"{name}_dot", Y[:, 1, part], f"{units[name]}/s", rates)
+            rates = [f"{x}_dot" for x in labels]
+            log.add(f"{name}_dot", Y[:, 1, part], f"{kind.unit}/s", rates)
     log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{linearization.relative_degree}")
     status = law[:, layout.status]
     log.add("fault", status[:, 0].astype(int), "1", [fault.name.lower() for fault in Fault])
     log.add("rcond", status[:, 1], "1")
     log.add("saturated_drives", status[:, 2].astype(int), "1")
+
+
+def _kinds(station: Station) -> list[tuple[Kind, slice, list[str]]]:
+    """Return the kinds of coordinates that there are, where they stand, and their names."""
+    coordinates = station.task.place.coordinates
+    parts = {kind: indices(coordinates, kind) for kind in Kind}
+    names = {kind: [c.name for c in coordinates[part]] for kind, part in parts.items()}
+    return [(kind, parts[kind], names[kind]) for kind in Kind if names[kind]]
 
 
 def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.ndarray:
@@ -229,7 +244,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     """Add what acts on the tool, what the sensor makes of it, and what the compliance asks for."""
     m, effort = station.law.linearization.num_outputs, _joint_units(station)[2]
     wrench = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
-    manifold = ["tau_par", "tau_perp", "tau_cross", "tau_z", "tau_y", "tau_x"][:m]
+    manifold = [coordinate.force for coordinate in station.task.place.coordinates]
     known = {
         "wrench_ext": ("N, Nm", wrench),
         "wrench_measured": ("N, Nm", wrench),
@@ -245,10 +260,9 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
     if "desired_reference" in raw:
         desired = raw["desired_reference"][:, :m]
-        log.add("eta_d", desired[:, 0], "m")
-        log.add("xi_d", desired[:, 1:3], "m", ["xi_d_1", "xi_d_2"])
-        if m > 3:
-            log.add("phi_d", desired[:, 3:], "rad", ["phi_d_z", "phi_d_y", "phi_d_x"])
+        for kind, part, names in _kinds(station):
+            labels = [name.replace(kind.value, f"{kind.value}_d", 1) for name in names]
+            log.add(f"{kind.value}_d", desired[:, part], kind.unit, labels)
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
@@ -263,7 +277,7 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     """Add the torques that a velocity servo gives, and what friction takes."""
     effort = _joint_units(station)[2]
     if "drive_torque" in raw:
-        limits = station.robot.gather("effort_limit")
+        limits = station.diagram.GetSubsystemByName("velocity_servo").limits
         labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
         names = [fault.name.lower() for fault in Fault]

@@ -2,6 +2,7 @@
 
 from diagrams.scenario import PathFollowingScenario
 from diagrams.station import Station
+from experiments.results.joint_limits import JointLimits
 from experiments.results.path_metrics import metric_names
 from experiments.results.run_signals import optional_signals
 from experiments.results.shape_metrics import shape_metrics
@@ -27,6 +28,7 @@ def check_targets(settings: PathFollowingScenario, station: Station) -> None:
         known = [
             *metric_names(station.robot.dimension, signals | other),
             *shape_metrics(station.task.shape),
+            *JointLimits.of(station.robot).metric_names(),
             "real_time_factor",
             "controller_tick_us",
             "controller_tick_us_p99",

@@ -8,7 +8,7 @@ from pfsc_drake.control.law.fault import Fault
 
 
 @runtime_checkable
-class CanFail(Protocol):
+class FailingSystem(Protocol):
     """A system that goes to a safe state after a fault, and stays there."""
 
     def fault(self, context: Context) -> Fault:
@@ -16,4 +16,11 @@ class CanFail(Protocol):
 
         Args:
             context: Context of the system.
+        """
+
+    def GetMyContextFromRoot(self, root: Context) -> Context:
+        """Return the system's part of a diagram's context, as every Drake system does.
+
+        Args:
+            root: Context of the diagram.
         """

@@ -79,6 +79,11 @@ class VelocityServo(LeafSystem):
         self._q, self._gravity = function.arguments["q"], function.results["tau"]
         self._evaluate = function.evaluate
 
+    @property
+    def limits(self) -> np.ndarray:
+        """Largest magnitudes of the drive torques [Nm or N], shape (N,)."""
+        return self._law.limits
+
     def fault(self, context: Context) -> Fault:
         """Return the fault that holds at the present instant."""
         return Fault(int(self._step.Eval(context)[2 * self._size]))

@@ -8,9 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
-from diagrams.robots.start_posture import describe_posture, posture_warnings
+from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
 from diagrams.tasks.path_following import make_task
+from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
@@ -245,7 +246,7 @@ def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
     np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
     assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, False) == []
     (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, False)
-    assert "lift_joint most" in warning and f"rail_joint {0.8 * side:g} m" in warning
+    assert "lift_joint most" in warning and f"q_1 = {0.8 * side:g} m" in warning
 
 
 def test_a_posture_in_radians(load_scenario, start):
@@ -257,10 +258,10 @@ def test_a_posture_in_radians(load_scenario, start):
     assert posture_warnings([], arm.chain, found, True) == []
     in_radians = np.deg2rad(given).round(2).tolist()
     (warning,) = posture_warnings(in_radians, arm.chain, found, True)
-    line = describe_posture(arm.chain, found)
+    line = posture_text(arm.chain, found)
     assert "radians" in warning and line in warning
     assert "write [25.21, 115.2, -40.11, -5.157, 95.11, -17.19]" in warning
-    assert line.startswith(f"motor_1 {np.rad2deg(found[0]):.4g} deg, motor_2 ")
+    assert line.startswith(f"q_1 = {np.rad2deg(found[0]):.1f} deg, q_2 = ")
 
 
 def test_a_posture_far_from_any_solution(load_scenario, start):

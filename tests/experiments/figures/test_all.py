@@ -18,6 +18,7 @@ NAMES = [
     "orientation",
     "angles",
     "forces",
+    "positions",
     "velocities",
     "drive_torques",
     "friction",

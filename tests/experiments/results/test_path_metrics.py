@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from experiments.results.drive_metrics import peak_torque, saturation_count
 from experiments.results.path_metrics import (
     max_distance_from_notch_axis,
     max_external_force,
@@ -17,9 +18,7 @@ from experiments.results.path_metrics import (
     path_distance,
     path_following_metrics,
     peak_speed,
-    peak_torque,
     rms_path_deviation,
-    saturation_count,
     settling_time,
     static_path_deviation,
     tangential_error,
@@ -119,6 +118,18 @@ def test_torques_and_saturation():
     assert saturation_count(log) == 3
     log.add("tau_d", torque, "Nm")
     assert saturation_count(log) == 0
+
+
+def test_what_a_law_asks_too_much_of_servos_counts():
+    """Speeds that the law asks for, torques of the servos, and the safe state after a fault."""
+    log = RunLog(np.arange(6.0))
+    log.add("tau_d", np.array([1.0, 3.0, 1.0, 1.0, 1.0, -3.0]), "Nm", limits=3.0)
+    log.add("saturated_drives", np.array([0, 2, 1, 0, 6, 0]), "1")
+    log.add("fault", np.array([0, 0, 0, 0, 4, 4]), "1", ["none"])
+    # sample 4: the law asks in vain, for there is a fault; sample 5: the drives brake
+    assert saturation_count(log) == 3
+    del log.signals["tau_d"]
+    assert saturation_count(log) == 2
 
 
 def test_forces_count_once_the_sensor_is_tared():

@@ -56,6 +56,13 @@ def test_one_limit_holds_for_all_columns():
     np.testing.assert_array_equal(limits, [7.0, 7.0, 7.0, 7.0])
 
 
+def test_limits_on_both_sides(tmp_path):
+    log, ends = RunLog(np.zeros(3)), [[-1.0, 2.0], [-np.inf, 0.5]]
+    log.add("q_J", np.zeros((3, 2)), "rad", limits=ends)
+    log.write(tmp_path / "log.h5")
+    np.testing.assert_array_equal(RunLog.read(tmp_path / "log.h5")["q_J"].limits, ends)
+
+
 def test_wrong_number_of_samples_is_refused():
     with pytest.raises(ValueError, match="'eta' has 4 samples, time has 5"):
         make_log().add("eta", np.zeros(4), "m")

@@ -13,6 +13,14 @@ THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 BARE = ("--no-figures", "--no-recording")
 
 
+SERVOS = (
+    "robot.model=comau_racer_1_4_3r",
+    "controller.law=velocity_servo",
+    "controller.gains.velocity_servo={eta: {poles: [-100]}, xi: {poles: [-100]}}",
+    "targets.velocity_servo.joint_limit_margin={bound: '> 0'}",
+)
+
+
 @pytest.fixture
 def fault(tmp_path, capfd, mine):
     """Run into a fault and return log, its attributes and metrics."""
@@ -50,7 +58,9 @@ def fault(tmp_path, capfd, mine):
 @pytest.mark.parametrize("component", [0, 5, 6, 11])
 def test_nan_on_the_way(fault, component):
     failure = f"simulation.sensor_failure={{time: 0.0305, component: {component}}}"
-    log, metrics = fault("not a finite number", failure)
+    name = f"{['q_J', 'v_J', 'q_M', 'v_M'][component // 3]}_{component % 3 + 1}"
+    place = f"{name} at eta = 0.96 m, t = 0.031 s"
+    log, metrics = fault(f"a measured value is not a finite number: {place}", failure)
     healthy = log["t"] < 0.0305
     assert set(log["fault"][healthy]) == {"none"}
     assert set(log["fault"][~healthy]) == {"input_not_finite"}
@@ -66,16 +76,17 @@ def test_nan_on_the_way(fault, component):
 
 @pytest.mark.parametrize("name", [THREE, SIX])
 def test_nan_from_the_beginning(fault, name):
-    log, metrics = fault("not a finite number", "simulation.sensor_failure.time=0", name=name)
+    place = "q_J_1 at t = 0.000 s"
+    log, metrics = fault(place, "simulation.sensor_failure.time=0", name=name)
     assert set(log["fault"]) == {"input_not_finite"}
     assert np.isfinite(log["tau_d"]).all()
     assert metrics["max_path_deviation"]["value"] is None
 
 
-def test_singularity_on_the_way(fault):
-    """A line leads beyond what the stretched arm reaches."""
-    log, _ = fault(
-        "singular",
+def test_singularity_on_the_way(fault, tmp_path):
+    """A line leads beyond what the stretched arm reaches, and axis 3 beyond its limit of 80 deg."""
+    log, metrics = fault(
+        "elbow singular at eta = ",
         "path.shape=!Line {start: [1.1, 0, 1], end: [2, 0, 1]}",
         "reference={points: [0, 0.8], velocity: 1, acceleration: 8, dwell: 0}",
         "start.offset=[0, 0]",
@@ -88,6 +99,12 @@ def test_singularity_on_the_way(fault):
     exact = np.cumsum(log["saturated_drives"][:, 0]) == 0
     assert np.abs(log["xi"][exact]).max() < 1e-3
     assert 0.2 < log["eta"][last_good, 0] < 0.8
+    beyond = log["q_J"][:, 2].max() - np.deg2rad(80.0)
+    assert beyond > 0.1
+    assert metrics["joint_limit_margin"]["value"] == pytest.approx(-beyond)
+    assert metrics["joint_velocity_share"]["value"] > 1.0
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "joint 3 &#x27;motor_3&#x27; passes its limit of 80.0 deg at t = " in report
 
 
 def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
@@ -128,3 +145,28 @@ def test_torque_saturation_is_counted_and_survived(mine, tmp_path, capfd):
     np.testing.assert_array_equal(saturated > 0, at_limit)
     assert metrics["saturated_samples"]["value"] == at_limit.sum()
     assert np.linalg.norm(xi[-1]) < 1e-4  # nevertheless on the path in the end
+
+
+@pytest.mark.parametrize("limited", ["speed", "torque"])
+def test_saturation_of_servos(run_scenario, tmp_path, limited):
+    """Beside the path by 50 mm the law asks slow servos for 5 m/s; or weak ones do not obey."""
+    too_much = {
+        "speed": ("start.offset=[0.05, 0]", "servo.bandwidth=15"),
+        "torque": ("start.offset=[0.005, 0]", "controller.effort_scale=0.1"),
+    }
+    changes = (*SERVOS, *too_much[limited])
+    options = [argument for change in changes for argument in ("--set", change)]
+    result = run_scenario(tmp_path / "out", "pfc_elastic_3r", "--duration", "0.2", *options)
+    assert result.status == 0
+    too_fast = result["saturated_drives"][:, 0] > 0
+    too_strong = np.any(np.abs(result["tau_d"]) == result.marks["tau_d"]["limits"], axis=1)
+    assert np.count_nonzero(too_fast & ~too_strong if limited == "speed" else too_strong) > 3
+    assert too_fast.any() == (limited == "speed")
+    saturated = np.count_nonzero(too_fast | too_strong)
+    assert result.metrics["saturated_samples"]["value"] == saturated < 100
+    margin = result.metrics["joint_limit_margin"]
+    lower, upper = result.marks["q_J"]["limits"].T
+    assert margin["value"] == np.minimum(result["q_J"] - lower, upper - result["q_J"]).min()
+    assert margin["target"] == "> 0"
+    share = np.abs(result["v_J"]) / result.marks["v_J"]["limits"]
+    assert result.metrics["joint_velocity_share"]["value"] == share.max()

@@ -102,6 +102,9 @@ def test_attributes_of_the_log(three_axes):
     attributes = three_axes().attributes
     assert attributes["scenario"] == "pfc_elastic_3r"
     assert "fault" not in attributes
+    q_J = np.rad2deg(three_axes()["q_J"][0])
+    posture = ", ".join(f"q_{i} = {q:.1f} deg" for i, q in enumerate(q_J, start=1))
+    assert attributes["start_posture"] == posture
     for name in ("git_revision", "drake_version", "casadi_version", "numpy_version"):
         assert attributes[name]
     assert attributes["numpy_version"] == np.__version__

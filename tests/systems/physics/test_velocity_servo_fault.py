@@ -10,7 +10,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.can_fail import CanFail
+from pfsc_drake.systems.control.can_fail import FailingSystem
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
 
 POSTURE = np.deg2rad([0.0, 96.0, -32.3, 0.0, 71.4, -5.7])
@@ -74,7 +74,7 @@ def spoiled(values, index, by=np.nan):
 
 
 def test_it_can_fail(bench):
-    assert isinstance(bench.servo, CanFail)
+    assert isinstance(bench.servo, FailingSystem)
     assert bench.fault is Fault.NONE
     assert np.abs(bench.torque - bench.safe()).min() > 1.0
 

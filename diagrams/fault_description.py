@@ -1,0 +1,217 @@
+"""Why a station stopped, and where: from what its log knows of that instant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.signal_log import SignalLog
+from diagrams.wording import listed, posture_text
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.singularity_name import singularity_name
+from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture
+
+_STATE = ("q_J", "v_J", "q_M", "v_M")
+# m, from which on a distance from the path is worth a word where an arm becomes singular
+_BESIDE = 1e-3
+
+
+@dataclass(frozen=True)
+class Instant:
+    """What a station's log knows of one instant.
+
+    Attributes:
+        time: When [s].
+        signals: By name, each of shape (size,), see :class:`~diagrams.station.Station`.
+    """
+
+    time: float
+    signals: dict[str, np.ndarray]
+
+    @property
+    def measured_state(self) -> np.ndarray:
+        """``[q_J, v_J, q_M, v_M]`` as the law is given it, shape (4N,)."""
+        return self.signals.get("joint_state_measured", self.signals["joint_state"])
+
+
+@dataclass(frozen=True)
+class FaultScene:
+    """Who was in a fault, and when.
+
+    Attributes:
+        law: The law that moved the robot.
+        robot: The robot as the law knows it.
+        place: Manifold of the log's ``manifold_point``.
+        on_motors: Whether the law acts on the tool pose of the motors.
+        now: The first instant with the fault.
+        before: The last one without, if there is any.
+    """
+
+    law: FollowingLaw
+    robot: RobotModel
+    place: PathManifold
+    on_motors: bool
+    now: Instant
+    before: Instant | None
+
+
+def first_instant(
+    log: SignalLog, root: Context, signal: str, column: int
+) -> tuple[Instant, Instant | None]:
+    """Return the first instant at which a logged fault was there, and the one before.
+
+    Args:
+        log: The log.
+        root: Context of the diagram, in which the fault holds.
+        signal: Logged signal with the fault.
+        column: Of the signal, where the fault is.
+    """
+    times, raw = log.read(root)
+    faults = np.flatnonzero(raw[signal][:, column])
+    k = int(faults[0]) if len(faults) else len(times)
+    instants = [
+        Instant(float(times[i]), {name: x[i] for name, x in raw.items()})
+        for i in (k - 1, k)
+        if 0 <= i < len(times)
+    ]
+    if k == len(times):
+        # it is so new that it has not been logged
+        row = log.sink.get_input_port().Eval(log.sink.GetMyContextFromRoot(root))
+        now = {name: row[rows] for name, rows in log.rows.items()}
+        instants.append(Instant(root.get_time(), now))
+    return instants[-1], instants[0] if len(instants) > 1 else None
+
+
+def describe(fault: Fault, scene: FaultScene) -> str:
+    """Return one sentence on a fault: what, where on the path, when, and through which joints.
+
+    Args:
+        fault: The fault.
+        scene: Where it happened.
+    """
+    descriptions = {
+        Fault.INPUT_NOT_FINITE: _not_finite,
+        Fault.PROJECTION_FAILED: _projection_failed,
+        Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: _outside,
+        Fault.SINGULAR: _singular,
+    }
+    return descriptions[fault](scene)
+
+
+def _not_finite(scene: FaultScene) -> str:
+    """Name the signals, those first that others follow from."""
+    n, signals = scene.robot.dimension, scene.now.signals
+    wrong = np.flatnonzero(~np.isfinite(scene.now.measured_state))
+    names = [f"{_STATE[i // n]}_{i % n + 1}" for i in wrong]
+    if names:
+        return f"a measured value is not a finite number: {listed(names)} {_place(scene)}"
+    known = {
+        "wrench_measured": "measured force",
+        "wrench_ext": "force on the tool",
+        "reference": "reference",
+    }
+    found = [
+        what
+        for name, what in known.items()
+        if name in signals and not np.isfinite(signals[name]).all()
+    ]
+    what = f": {found[0]}" if found else ""
+    return f"{Fault.INPUT_NOT_FINITE.explanation}{what} {_place(scene)}"
+
+
+def _projection_failed(scene: FaultScene) -> str:
+    y_t = np.round(scene.now.signals["tool_pose"][:3], 4).tolist()
+    return f"{Fault.PROJECTION_FAILED.explanation} {_place(scene)}: tool at {y_t} m"
+
+
+def _outside(scene: FaultScene) -> str:
+    alpha = scene.now.signals["manifold_point"][scene.place.layout.alpha].item()
+    xi = ", ".join(f"{1e3 * x:.1f}" for x in _beside(scene))
+    return (
+        f"{Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD.explanation} {_place(scene)}: "
+        f"xi = [{xi}] mm, alpha = {alpha:.3g}"
+    )
+
+
+def _singular(scene: FaultScene) -> str:
+    n, state = scene.robot.dimension, scene.now.measured_state
+    q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
+    oriented = bool(scene.place.layout.oriented)
+    posture = singular_posture(scene.robot, q, oriented=oriented)
+    A = _decoupling_matrix(scene)
+    distance = float(np.linalg.norm(_beside(scene)))
+    beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""
+    if _is_map_singular(A, posture):
+        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}"
+    name = None
+    if isinstance(scene.robot, SerialChain):
+        name = singularity_name(scene.robot, q, posture)
+    free = listed(f"q_{i + 1}" for i in posture.free_joints)
+    return (
+        f"{name or 'robot'} singular {_place(scene)}: "
+        f"{posture_text(scene.robot, q, posture.causing_joints)} "
+        f"({free} can move without the tool){beside}"
+    )
+
+
+def _decoupling_matrix(scene: FaultScene) -> np.ndarray:
+    """Return ``A = d yhat / dq``; what drives and reference do has no part in it."""
+    linearization, now = scene.law.linearization, scene.now
+    arguments = {
+        "state": now.measured_state,
+        "tau_ext": 0.0,
+        "manifold_point": now.signals["manifold_point"],
+    }
+    if linearization.manifold.follows_time:
+        m = linearization.num_outputs
+        arguments["progress"] = now.signals["reference"][::m]
+    return np.array(linearization.function(**arguments)["A"])
+
+
+def _is_map_singular(A: np.ndarray, posture: SingularPosture) -> bool:
+    """Return whether the manifold's coordinates are to blame rather than the arm's posture.
+
+    ``A = T J`` with the map T from the tool's velocity to the coordinates' rates; the condition
+    number of A is at most the product of the others.
+    """
+    scale = np.ones(len(A))
+    scale[:3] = 1.0 / posture.length
+    T = scale[:, None] * A @ np.linalg.pinv(scale[:, None] * posture.jacobian)
+    s = np.linalg.svd(T, compute_uv=False)
+    return bool(s[-1] / s[0] < posture.rcond)
+
+
+def _map_state(scene: FaultScene) -> str:
+    """Return the coordinates that may make a manifold's map singular."""
+    linearization, signals = scene.law.linearization, scene.now.signals
+    coordinates = linearization.manifold.coordinates
+    Y = signals["law"][scene.law.layout.manifold_state][: len(coordinates)]
+    rotational = indices(coordinates, Kind.ROTATIONAL)
+    words = [
+        f"{coordinates[i].name} = {np.rad2deg(Y[i]):.1f} deg"
+        for i in range(rotational.start, rotational.stop)
+    ]
+    alpha = signals["manifold_point"][scene.place.layout.alpha].item()
+    return ", ".join([*words, f"alpha = {alpha:.3g}"])
+
+
+def _beside(scene: FaultScene) -> np.ndarray:
+    """Return the transversal coordinates of the tool [m], shape (2,)."""
+    point, layout = scene.now.signals["manifold_point"], scene.place.layout
+    offset = scene.now.signals["tool_pose"][:3] - point[layout.position][:3]
+    return scene.place.axes(point)[:, 1:].T @ offset
+
+
+def _place(scene: FaultScene) -> str:
+    """Return ``at eta = 0.43 m, t = 0.93 s``, with the last eta that is known."""
+    layout, known = scene.place.layout, None
+    for instant in (scene.before, scene.now):
+        eta = np.nan if instant is None else instant.signals["manifold_point"][layout.eta].item()
+        known = eta if np.isfinite(eta) else known
+    where = "" if known is None else f"eta = {known:.4g} m, "
+    return f"at {where}t = {scene.now.time:.3f} s"

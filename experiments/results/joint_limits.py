@@ -1,0 +1,143 @@
+"""Limits of position and velocity of the joints: how near a run came to them, and which it passed.
+
+A simulated joint goes on beyond its limits, a real one does not.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.wording import coordinate_text
+from experiments.results.metrics import Metrics
+from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.robot.robot_model import RobotModel
+
+# relative; a limit that is missed by rounding is not passed
+_ROUNDING = 1e-9
+# names of the position metric by whether a joint turns, and its unit
+_MARGIN = {True: ("joint_limit_margin", "rad"), False: ("slide_limit_margin", "m")}
+_SHARE = "joint_velocity_share"
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of N joints; infinite where there are none.
+
+    Attributes:
+        names: Names of the joints.
+        revolute: Whether they turn (else they slide), shape (N,).
+        position: Lower and upper limits [rad or m], shape (N, 2).
+        velocity: Largest speeds [rad/s or m/s], shape (N,).
+    """
+
+    names: list[str]
+    revolute: NDArray[np.bool_]
+    position: FloatArray
+    velocity: FloatArray
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> "JointLimits":
+        """Return the limits of a robot.
+
+        Args:
+            robot: The robot.
+        """
+        speed = robot.gather("velocity_limit")
+        return cls(
+            list(robot.names),
+            robot.gather("is_revolute"),
+            robot.gather("position_limits"),
+            # zero is what models say that know none
+            np.where(speed > 0.0, speed, np.inf),
+        )
+
+    def metric_names(self) -> list[str]:
+        """Return the names of the metrics that :meth:`metrics` gives."""
+        bounded = np.isfinite(self.position).any(axis=1)
+        names = [name for kind, (name, _) in _MARGIN.items() if (bounded & self._turns(kind)).any()]
+        return [*names, *([_SHARE] if np.isfinite(self.velocity).any() else [])]
+
+    def metrics(self, log: RunLog) -> Metrics:
+        """Return how near a run came to the limits, with joint and time as the source.
+
+        ``joint_limit_margin`` [rad] is the least distance of a turning joint from a limit of its
+        position, negative if it passed it; ``slide_limit_margin`` [m] that of a sliding one.
+        ``joint_velocity_share`` is the largest ratio of a joint's speed to its limit. Each is
+        there if a joint has such a limit. What is not a number does not count.
+
+        Args:
+            log: With ``q_J`` and ``v_J``.
+        """
+        metrics, known, q = Metrics(), self.metric_names(), log["q_J"].values
+        margin = np.minimum(q - self.position[:, 0], self.position[:, 1] - q)
+        for kind, (name, unit) in _MARGIN.items():
+            if name in known:
+                least = _least(np.where(self._turns(kind), margin, np.inf), log)
+                metrics.add(name, least[0], unit, source=least[1])
+        if _SHARE in known:
+            least = _least(-self._share(log), log)
+            metrics.add(_SHARE, -least[0], "1", source=least[1])
+        return metrics
+
+    def warnings(self, log: RunLog) -> list[str]:
+        """Return one sentence for each limit that a run passed.
+
+        Args:
+            log: With ``q_J`` and ``v_J``.
+        """
+        return [*self._passed_positions(log), *self._passed_velocities(log)]
+
+    def _passed_positions(self, log: RunLog) -> Iterator[str]:
+        q, rounding = log["q_J"].values, _ROUNDING * np.maximum(1.0, np.abs(self.position))
+        for i, name in enumerate(self.names):
+            for side, sign in enumerate((-1.0, 1.0)):
+                beyond = sign * (q[:, i] - self.position[i, side])
+                passed = np.flatnonzero(beyond > rounding[i, side])
+                if not passed.size:
+                    continue
+                farthest = int(np.nanargmax(beyond))
+                limit, reached = (
+                    coordinate_text(value, revolute=bool(self.revolute[i]))
+                    for value in (self.position[i, side], q[farthest, i])
+                )
+                yield (
+                    f"joint {i + 1} '{name}' passes its limit of {limit} at "
+                    f"t = {log.time[passed[0]]:.3f} s and reaches {reached} at "
+                    f"t = {log.time[farthest]:.3f} s; the simulation lets it pass"
+                )
+
+    def _passed_velocities(self, log: RunLog) -> Iterator[str]:
+        share, v = self._share(log), log["v_J"].values
+        for i, name in enumerate(self.names):
+            passed = np.flatnonzero(share[:, i] > 1.0 + _ROUNDING)
+            if not passed.size:
+                continue
+            fastest = int(np.nanargmax(share[:, i]))
+            limit, reached = (
+                coordinate_text(value, revolute=bool(self.revolute[i]))
+                for value in (self.velocity[i], abs(v[fastest, i]))
+            )
+            yield (
+                f"joint {i + 1} '{name}' passes its speed limit of {limit}/s at "
+                f"t = {log.time[passed[0]]:.3f} s and reaches {reached}/s at "
+                f"t = {log.time[fastest]:.3f} s; the simulation lets it pass"
+            )
+
+    def _turns(self, kind: object) -> NDArray[np.bool_]:
+        """Return which joints turn, or which do not, shape (N,)."""
+        return np.asarray(self.revolute == kind)
+
+    def _share(self, log: RunLog) -> FloatArray:
+        """Return the ratios of the speeds to their limits, shape (samples, N)."""
+        return np.abs(log["v_J"].values) / self.velocity
+
+
+def _least(values: FloatArray, log: RunLog) -> tuple[float, str | None]:
+    """Return the least of some joints' values, shape (samples, N), and where it is."""
+    known = np.where(np.isnan(values), np.inf, values)
+    if not np.isfinite(known).any():
+        return np.nan, None
+    k, i = np.unravel_index(np.argmin(known), known.shape)
+    return float(known[k, i]), f"q_{i + 1} at t = {log.time[k]:.3f} s"
