@@ -128,6 +128,7 @@ def draw_orientation(log: RunLog) -> Drawing:
 def draw_angles(log: RunLog) -> Drawing:
     """ZYX angles of the tool over those of the reference orientation, a panel for each."""
     tool, path = (np.rad2deg(log[name].values) for name in ("angles_e", "angles_d"))
+    tool = tool + _whole_turns(path - tool)
     canvas, panels = make_panels(tool.shape[1], height=1.9)
     for column, (panel, axis) in enumerate(zip(panels, log["angles_e"].labels, strict=True)):
         panel.plot(log.time, path[:, column], label=r"reference $R_d$", **BROAD)
@@ -146,6 +147,17 @@ def draw_angles(log: RunLog) -> Drawing:
         " tool on the path and waits where the tool waits."
     )
     return Drawing("angles", "Orientation of tool and reference", caption, canvas)
+
+
+def _whole_turns(difference: FloatArray) -> FloatArray:
+    """Whole turns [deg] in each column of a difference of angles, shape (columns,).
+
+    A tool that points down is at 180 deg as well as at -180 deg.
+    """
+    known = difference[np.isfinite(difference).all(axis=1)]
+    if not len(known):
+        return np.zeros(difference.shape[1])
+    return 360.0 * np.round(np.median(known, axis=0) / 360.0)
 
 
 def _is_used(log: RunLog, reference: str) -> bool:

@@ -132,12 +132,14 @@ def test_the_sensor_of_the_full_model_reads_what_a_joint_bears(settings, tmp_pat
     np.testing.assert_allclose(got["wrench_measured"].values, force, rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("joint", ["nowhere", "motor_2"])
-def test_a_sensor_needs_its_joint(coupled, joint):
+@pytest.mark.parametrize(
+    ("joint", "said"), [("nowhere", r"'nowhere'; allowed: .*motor_2"), ("motor_2", "motor_2")]
+)
+def test_a_sensor_needs_its_joint(coupled, joint, said):
     coupled.controller.external_torque.source = "measured"
     coupled.sensor.joint = joint
     coupled.forces = [ForcePulse(0.05, 0.2, np.array([30.0, -40.0, 50.0]), ramp=0.02)]
-    with pytest.raises(InputError, match=joint):
+    with pytest.raises(InputError, match=said):
         build_station(coupled, Path())
 
 

@@ -145,6 +145,18 @@ def test_angles_in_degrees(drawn_log):
     assert "runs on" in draw_angles(drawn_log).caption
 
 
+def test_angles_a_turn_apart_are_the_same(drawn_log):
+    """A tool that points down, once at 180 deg and once at -180 deg; unknown at the end."""
+    down = np.tile([0.0, 0.0, np.pi], (201, 1))
+    drawn_log["angles_d"].values, drawn_log["angles_e"].values = down, -down + 1e-3
+    drawn_log["angles_e"].values[-1] = np.nan
+    drawn = lines(draw_angles(drawn_log).canvas.axes[2])
+    expected = 180.0 + np.rad2deg(1e-3)
+    np.testing.assert_allclose(drawn["tool, about x"][:-1], expected)
+    drawn_log["angles_e"].values[:] = np.nan
+    assert np.isnan(lines(draw_angles(drawn_log).canvas.axes[2])["tool, about x"]).all()
+
+
 def test_constant_angles_are_not_blown_up(drawn_log):
     drawn_log["angles_e"].values = np.tile([1.0, 2.0, 3.0], (201, 1)) + 1e-9
     drawn_log["angles_d"].values = np.tile([1.0, 2.0, 3.0], (201, 1))

@@ -85,7 +85,7 @@ def test_a_gantry_on_the_ceiling(write, read, urdf_parts):
 
 def test_bases_that_are_none(write, read, refused, urdf_text):
     file = write(urdf_text)
-    refused(lambda: read(file, base="nope"), "base: 'nope'", "allowed")
+    refused(lambda: read(file, base="nope"), "base: 'nope'", "allowed", "as base_link, ")
     refused(lambda: read(file, base="tcp"), "base: 'tcp' moves with joint 'elbow'", "allowed")
 
 
