@@ -4,18 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.builder import build_station, build_station_replay
-from diagrams.drawing.replay import RecordedMotion
+from diagrams.builder import build_station
 from diagrams.scenario import PathFollowingScenario
 from diagrams.surroundings.notch import notch_surface
 from diagrams.surroundings.notch_motion import place_in_notch
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.delta.shapes import PLATE
 from pfsc_drake.yaml.typed import load_typed
 
 FILE = SCENARIO_DIRECTORY / "pfc_delta_notch.yaml"
@@ -150,18 +147,6 @@ def test_the_gripper_hangs_from_the_plate_down_to_the_ball(settings, station):
     """Its middle is half way down, z_0 points down; so much torque is on the sensor."""
     com = station.part.plant.GetBodyByName("tool").default_com()
     np.testing.assert_allclose(com, [0.0, 0.0, settings.notch.ball.distance / 2.0], atol=1e-12)
-
-
-def test_the_recording_shows_workpiece_and_ball(settings, station):
-    y_t = station.robot.tool_position(station.initial_state[:3])
-    point = station.path.evaluator(2)(y_t.tolist(), station.initial_theta)
-    pose = np.concatenate([y_t, np.eye(3).ravel()])
-    rows = (np.tile(row, (2, 1)) for row in (station.initial_state[:3], pose, point))
-    motion = RecordedMotion(np.array([0.0, 0.04]), *rows)
-    meshcat = Meshcat(MeshcatParams(host="localhost"))
-    build_station_replay(settings, SCENARIO_DIRECTORY, station, motion, meshcat)
-    assert meshcat.HasPath("/drake/workpiece")
-    assert meshcat.HasPath(f"/drake/delta_robot/{PLATE}/ball")
 
 
 @pytest.mark.parametrize(

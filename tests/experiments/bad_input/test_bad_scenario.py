@@ -69,9 +69,12 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("path.shape=!Circle {center: [1, 2]}", ("center", "[1.0, 2.0]", "3")),
         ("path.shape=!Circle {axis_u: [0, 1]}", ("axis_u", "[0.0, 1.0]", "3")),
         # paths that are none
-        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "positive")),
-        ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("axes", "independent")),
-        ("path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}", ("line", "two different")),
+        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "0.0001 m to 10000 m")),
+        ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("axes", "0 deg between", "at least 0.1 deg")),
+        (
+            "path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}",
+            ("distance of start and end = 0", "0.0001 m"),
+        ),
         # references
         ("reference.points=[0.96]", ("points", "[0.96]", "two or more")),
         ("reference.points=[]", ("points", "[]", "two or more")),
