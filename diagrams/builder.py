@@ -33,7 +33,10 @@ from pfsc_drake.geometry.paths.smoothing import Progress
 
 
 def build_station(
-    scenario: PathFollowingScenario, folder: FilePath, progress: Progress | None = None
+    scenario: PathFollowingScenario,
+    folder: FilePath,
+    progress: Progress | None = None,
+    task: Task | None = None,
 ) -> Station:
     """Build the station of a scenario.
 
@@ -41,6 +44,7 @@ def build_station(
         scenario: The scenario.
         folder: Where the scenario's relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
+        task: The scenario's task, if it has been made before.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -48,7 +52,7 @@ def build_station(
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder, task = DiagramBuilder(), make_task(scenario, folder, progress)
+    builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
     require_orientation(task.path, part.robot.dimension)

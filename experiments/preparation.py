@@ -72,7 +72,7 @@ def prepare(
         settings.duration = duration or settings.duration or station.reference_duration
         check_length(settings, station)
         progress(0.0, "choosing the integration")
-        station, integration = _integrated(settings, folder, station, progress)
+        station, integration = _integrated(settings, folder, station)
         drawing = draw_station(settings, folder, station) if recording else None
     _resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
@@ -89,7 +89,7 @@ def _build(settings: PathFollowingScenario, folder: Path, progress: ProgressList
 
 
 def _integrated(
-    settings: PathFollowingScenario, folder: Path, station: Station, progress: ProgressListener
+    settings: PathFollowingScenario, folder: Path, station: Station
 ) -> tuple[Station, Integration]:
     """Settle the integration in the settings, and return it and a station that is made for it.
 
@@ -99,7 +99,8 @@ def _integrated(
     longest = min(settings.simulation.max_step, station.controller.period)
     settings.simulation = integration.applied_to(settings.simulation)
     if integration.step < longest:  # friction is made for the step
-        station = _build(settings, folder, progress)
+        with compiled_when_bound():
+            station = build_station(settings, folder, task=station.task)
     return station, integration
 
 

@@ -33,17 +33,21 @@ def posture_warnings(
         return []
     found = posture_text(chain, q_J)
     if _fits_in_radians(posture_deg, chain, q_J, oriented):
-        in_degrees = np.where(is_angle, np.rad2deg(posture_deg), posture_deg)
-        written = ", ".join(f"{value:.4g}" for value in in_degrees)
         return [
             f"start.posture_deg: {posture_deg} looks like radians; the robot starts at {found}: "
-            f"write [{written}]"
+            f"write [{_written(is_angle, np.array(posture_deg))}]"
         ]
     worst = chain.names[int(distance.argmax())]
     return [
         f"start.posture_deg: {posture_deg} is far from any solution, {worst} most; the robot "
-        f"starts at {found}, perhaps in another configuration than meant"
+        f"starts at {found}, perhaps in another configuration than meant; if it is the one, "
+        f"write [{_written(is_angle, q_J)}]"
     ]
+
+
+def _written(is_angle: np.ndarray, q: np.ndarray) -> str:
+    """Return joint coordinates [rad or m] as they stand in a scenario, in degrees or m."""
+    return ", ".join(f"{value:.4g}" for value in np.where(is_angle, np.rad2deg(q), q))
 
 
 def _fits_in_radians(
