@@ -35,6 +35,11 @@ def require_not_negative(key: str, value: float) -> None:
     require(bool(np.isfinite(value)) and value >= 0.0, key, value, "zero or a positive number")
 
 
+def require_between(key: str, value: float, least: float, most: float, unit: str) -> None:
+    """Refuse a value outside a range, both ends being allowed."""
+    require(least <= value <= most, key, value, f"{least:g} to {most:g} {unit}")
+
+
 def require_numbers(key: str, values: Sequence[float], count: int) -> None:
     """Refuse a list of another length, or with values that are not finite."""
     valid = len(values) == count and bool(np.isfinite(values).all())

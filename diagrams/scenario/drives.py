@@ -17,7 +17,7 @@ class ServoParameters:
             negative for a quarter of the bandwidth.
         period: Sampling time [s], a whole fraction of the controller's; 0 for the same.
         bus_delay: Delay between law and servo [s], a multiple of the controller's
-            sampling time; 0 for none.
+            sampling time, at most 10,000 of it; 0 for none.
     """
 
     bandwidth: float = 200.0
