@@ -6,6 +6,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 
+LARGEST_ANGLE = 3600.0  # deg; ten turns
 _ROUNDING = 1e-6
 
 

@@ -5,6 +5,7 @@ import dataclasses as dc
 import numpy as np
 
 from diagrams.scenario.checks import (
+    LARGEST_ANGLE,
     require,
     require_between,
     require_numbers,
@@ -66,5 +67,8 @@ class StartParameters:
     def __post_init__(self) -> None:
         require_numbers("offset", self.offset, 2)
         require_numbers("rotation_deg", self.rotation_deg, 3)
-        finite = bool(np.isfinite(self.posture_deg).all())
-        require(finite, "posture_deg", self.posture_deg, "finite numbers")
+        allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
+        for key in ("rotation_deg", "posture_deg"):
+            values = getattr(self, key)
+            good = all(abs(value) <= LARGEST_ANGLE for value in values)
+            require(good, key, values, f"finite {allowed}")

@@ -69,9 +69,12 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("path.shape=!Circle {center: [1, 2]}", ("center", "[1.0, 2.0]", "3")),
         ("path.shape=!Circle {axis_u: [0, 1]}", ("axis_u", "[0.0, 1.0]", "3")),
         # paths that are none
-        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "positive")),
-        ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("axes", "independent")),
-        ("path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}", ("line", "two different")),
+        ("path.shape=!Circle {radius: -1}", ("radius", "-1", "0.0001 m to 10000 m")),
+        ("path.shape=!Circle {axis_u: [0, 0, 1]}", ("circle axes", "0 deg between", "0.1 deg")),
+        (
+            "path.shape=!Line {start: [1, 0, 0], end: [1, 0, 0]}",
+            ("start and end", "0.0001 m to 10000 m"),
+        ),
         # references
         ("reference.points=[0.96]", ("points", "[0.96]", "two or more")),
         ("reference.points=[]", ("points", "[]", "two or more")),
@@ -83,6 +86,9 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("controller.sampling_time=0", ("sampling_time", "0", "positive")),
         ("simulation.integrator=magic", ("integrator", "magic", "runge_kutta3")),
         ("simulation.frame_period=0", ("frame_period", "0", "positive")),
+        ("hand={reaction_delay: 1e5}", ("hand.reaction_delay", "multiple", "up to 10 s")),
+        # beyond every posture, so that none has to be tried
+        ("robot.base_pose.position=[1e5, 0, 0]", ("start", "unreachable", "robot reaches")),
         # sensors and targets that are not there
         ("simulation.sensor_failure={time: 1, component: 12}", ("component", "12", "0 to 11")),
         ("targets.elastic.magic={bound: '< 1'}", ("magic", "max_path_deviation")),
