@@ -1,14 +1,16 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+FUZZ_SECONDS ?= 600
 DEMO_OUT := out/demo
 
-.PHONY: help setup demo test lint types unit benchmark models clean
+.PHONY: help setup demo test lint types unit fuzz benchmark models clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
 	@echo "make test       linters, types and the whole test suite"
+	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
 	@echo "make models     write the robot models anew from their parameters"
 
@@ -36,6 +38,18 @@ types: setup
 
 unit: setup
 	$(BIN)/python -m pytest
+
+# rounds with a seed each; memory is bounded, so that what devours it fails instead
+fuzz: setup
+	@end=$$(( $$(date +%s) + $(FUZZ_SECONDS) )); round=0; seed=$${SEED:-$$(date +%s)}; \
+	ulimit -v 8000000 2>/dev/null || echo "memory cannot be bounded here"; \
+	while [ $$(date +%s) -lt $$end ]; do \
+		round=$$((round + 1)); \
+		echo "round $$round, $$((end - $$(date +%s))) s left; again with: make fuzz SEED=$$seed"; \
+		$(BIN)/python -m pytest -q -x -m fuzz --hypothesis-profile=fuzz \
+			--hypothesis-seed=$$seed tests || exit 1; \
+		seed=$$((seed + 1)); \
+	done; echo "nothing found in $$round rounds"
 
 benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max

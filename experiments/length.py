@@ -5,6 +5,7 @@ from diagrams.station import Station
 from pfsc_drake.errors import InputError
 
 MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz
+MAX_FRAMES = 50_000  # of a recording; almost half an hour at the default of 32 ms
 
 # of six elastic axes on one core: wall clock time of a tick with its integration [s]
 _SECONDS_PER_TICK = 2e-4
@@ -34,6 +35,25 @@ def check_length(settings: PathFollowingScenario, station: Station) -> None:
         f"{_time(ticks * _SECONDS_PER_TICK)} and {memory / 1e9:.3g} GB of memory; "
         f"allowed: up to {MAX_TICKS * period:g} s (--duration, or duration: in the scenario)"
     )
+
+
+def check_frames(duration: float, frame_period: float) -> None:
+    """Refuse a recording of more than MAX_FRAMES frames.
+
+    Args:
+        duration: Simulated time [s].
+        frame_period: Time between two frames [s].
+
+    Raises:
+        InputError: One line that says which period would do.
+    """
+    frames = duration / frame_period
+    if frames > MAX_FRAMES:
+        raise InputError(
+            f"simulation.frame_period = {frame_period:g} s: {frames:.3g} frames in "
+            f"{duration:g} s; allowed: up to {MAX_FRAMES} (frame_period from "
+            f"{duration / MAX_FRAMES:.3g} s on, or --no-recording)"
+        )
 
 
 def _time(seconds: float) -> str:

@@ -14,7 +14,7 @@ from diagrams.scenario import PathFollowingScenario, Waypoints
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
-from experiments.length import check_length
+from experiments.length import check_frames, check_length
 from experiments.progress import ProgressListener
 from experiments.results.targets import check_targets
 from pfsc_drake.compiled.bound_function import compiled_when_bound
@@ -71,6 +71,8 @@ def prepare(
         settings.name = settings.name or scenario.name
         settings.duration = duration or settings.duration or station.reference_duration
         check_length(settings, station)
+        if recording:
+            check_frames(settings.duration, settings.simulation.frame_period)
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
         drawing = draw_station(settings, folder, station) if recording else None

@@ -37,6 +37,8 @@ from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 
+_ROUNDING = 1e-6  # m
+
 
 @dataclass(frozen=True)
 class Arm(RobotPart):
@@ -70,8 +72,20 @@ class Arm(RobotPart):
         self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
     ) -> np.ndarray:
         """See :class:`RobotPart`."""
+        self.check_reach(y_t, "start")
         near = posture_near(start.posture_deg, self.robot)
         return solve_pose(self.robot, y_t, R_e, near, "start")
+
+    def check_reach(self, position: np.ndarray, where: str) -> None:
+        """See :class:`RobotPart`; what is out of reach for other reasons has to be tried."""
+        base, reach = self.robot.links[0].p_PF, self.robot.reach
+        distance = float(np.linalg.norm(position - base))
+        if distance > reach + _ROUNDING:
+            raise InputError(
+                f"{where}: tool point {np.round(position, 4).tolist()} m is unreachable, "
+                f"{distance:.4g} m from the first joint at {np.round(base, 4).tolist()} m; the "
+                f"robot reaches {reach:.4g} m at most"
+            )
 
     def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
         """See :class:`RobotPart`."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 
+LARGEST_ANGLE = 3600.0  # deg; ten turns
 _ROUNDING = 1e-6
 
 
@@ -33,6 +34,11 @@ def require_positive(key: str, value: float) -> None:
 def require_not_negative(key: str, value: float) -> None:
     """Refuse a value that is negative or not finite."""
     require(bool(np.isfinite(value)) and value >= 0.0, key, value, "zero or a positive number")
+
+
+def require_between(key: str, value: float, least: float, most: float, unit: str) -> None:
+    """Refuse a value outside a range, both ends being allowed."""
+    require(least <= value <= most, key, value, f"{least:g} to {most:g} {unit}")
 
 
 def require_numbers(key: str, values: Sequence[float], count: int) -> None:

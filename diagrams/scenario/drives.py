@@ -6,6 +6,9 @@ import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 
+_SHORTEST_PERIOD = 1e-6  # s
+_LARGEST = 1e9  # of friction; what it multiplies stays within a float
+
 
 @dc.dataclass
 class ServoParameters:
@@ -15,9 +18,10 @@ class ServoParameters:
         bandwidth: ``omega`` [rad/s], see :func:`~pfsc_drake.physics.velocity_servo.servo_gains`.
         integral_rate: Rate at which loads are removed [rad/s]; 0 for no integral part,
             negative for a quarter of the bandwidth.
-        period: Sampling time [s], a whole fraction of the controller's; 0 for the same.
+        period: Sampling time [s], from 1e-6 on, a whole fraction of the controller's; 0 for the
+            same.
         bus_delay: Delay between law and servo [s], a multiple of the controller's
-            sampling time; 0 for none.
+            sampling time, at most 10,000 of it; 0 for none.
     """
 
     bandwidth: float = 200.0
@@ -33,7 +37,9 @@ class ServoParameters:
             self.integral_rate,
             "a finite number",
         )
-        require_not_negative("period", self.period)
+        good = self.period == 0.0 or _SHORTEST_PERIOD <= self.period <= 0.1
+        allowed = f"zero or a positive number, {_SHORTEST_PERIOD:g} to 0.1 s"
+        require(good, "period", self.period, allowed)
         require_not_negative("bus_delay", self.bus_delay)
 
 
@@ -55,8 +61,8 @@ class JointFrictionParameters:
     def __post_init__(self) -> None:
         for key in ("f_c", "f_v"):
             values = getattr(self, key)
-            valid = all(np.isfinite(value) and value >= 0.0 for value in values)
-            require(valid, key, values, "finite numbers, none negative")
+            valid = all(0.0 <= value <= _LARGEST for value in values)
+            require(valid, key, values, f"finite numbers, none negative, at most {_LARGEST:g}")
         given = bool(self.f_c or self.f_v)
         require(not (self.file and given), "file", self.file, "either file, or f_c and f_v")
 

@@ -5,11 +5,18 @@ import dataclasses as dc
 import numpy as np
 
 from diagrams.scenario.checks import (
+    LARGEST_ANGLE,
     require,
-    require_not_negative,
+    require_between,
     require_numbers,
-    require_positive,
 )
+
+# beyond, durations have no digits left, or none at all
+_VELOCITIES = (1e-6, 1e3)  # m/s
+_ACCELERATIONS = (1e-6, 1e6)  # m/s^2
+_FARTHEST = 1e6  # m, many rounds of a closed path
+_LONGEST_REST = 1e6  # s
+_SHORTEST_REST = 1e-6  # s
 
 
 @dc.dataclass
@@ -17,10 +24,10 @@ class ReferenceParameters:
     """Motion along the path, resting at every point.
 
     Attributes:
-        points: Arc lengths to visit [m]; the first is the start.
-        velocity: Largest velocity [m/s].
-        acceleration: Largest acceleration [m/s^2].
-        dwell: Rest before, between and after the moves [s].
+        points: Arc lengths to visit [m], at most 1e6; the first is the start.
+        velocity: Largest velocity, 1e-6 to 1e3 [m/s].
+        acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
+        dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
     """
 
     points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
@@ -31,9 +38,15 @@ class ReferenceParameters:
     def __post_init__(self) -> None:
         enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
         require(enough, "points", self.points, "two or more finite numbers")
-        require_positive("velocity", self.velocity)
-        require_positive("acceleration", self.acceleration)
-        require_not_negative("dwell", self.dwell)
+        near = max(map(abs, self.points)) <= _FARTHEST
+        require(near, "points", self.points, f"numbers of at most {_FARTHEST:g} m")
+        require_between("velocity", self.velocity, *_VELOCITIES, "m/s, a positive number")
+        require_between(
+            "acceleration", self.acceleration, *_ACCELERATIONS, "m/s^2, a positive number"
+        )
+        good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
+        allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
+        require(good, "dwell", self.dwell, allowed)
 
 
 @dc.dataclass
@@ -54,5 +67,8 @@ class StartParameters:
     def __post_init__(self) -> None:
         require_numbers("offset", self.offset, 2)
         require_numbers("rotation_deg", self.rotation_deg, 3)
-        finite = bool(np.isfinite(self.posture_deg).all())
-        require(finite, "posture_deg", self.posture_deg, "finite numbers")
+        allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
+        for key in ("rotation_deg", "posture_deg"):
+            values = getattr(self, key)
+            good = all(abs(value) <= LARGEST_ANGLE for value in values)
+            require(good, key, values, f"finite {allowed}")

@@ -4,10 +4,11 @@ import dataclasses as dc
 
 from diagrams.scenario.checks import (
     require,
-    require_not_negative,
+    require_between,
     require_numbers,
-    require_positive,
 )
+
+_SMALLEST, _LARGEST = 1e-4, 10.0  # m, of workpiece and ball
 
 _STEPS = (1e-5, 1e-3)
 
@@ -20,13 +21,13 @@ class BallParameters:
     the robot's parameters.
 
     Attributes:
-        radius: Radius [m].
+        radius: Radius, 1e-4 to 10 [m].
         distance: From the tool point down to the ball's centre [m]; 0 on robots that turn
             their tool.
         modulus: Elasticity of the shell, pressure per relative depth [Pa].
         dissipation: Of Hunt and Crossley [s/m].
         friction: Coulomb coefficient between ball and notch.
-        resolution: Edge length of the mesh that contact is computed with [m].
+        resolution: Edge length of the mesh that contact is computed with, 1e-4 m or more.
     """
 
     radius: float = 0.02
@@ -37,10 +38,12 @@ class BallParameters:
     resolution: float = 6e-3
 
     def __post_init__(self) -> None:
-        for key in ("radius", "modulus", "resolution"):
-            require_positive(key, getattr(self, key))
-        for key in ("distance", "dissipation", "friction"):
-            require_not_negative(key, getattr(self, key))
+        for key in ("radius", "resolution"):
+            require_between(key, getattr(self, key), _SMALLEST, _LARGEST, "m, a positive number")
+        require_between("modulus", self.modulus, 1.0, 1e12, "Pa, a positive number")
+        for key, most in {"distance": _LARGEST, "dissipation": 1e6, "friction": 1e3}.items():
+            allowed = f"zero or a positive number, at most {most:g}"
+            require(0.0 <= getattr(self, key) <= most, key, getattr(self, key), allowed)
 
 
 @dc.dataclass
@@ -68,7 +71,10 @@ class NotchParameters:
 
     def __post_init__(self) -> None:
         require_numbers("displacement", self.displacement, 3)
-        require_positive("radius", self.radius)
+        near = max(map(abs, self.displacement)) <= _LARGEST
+        require(near, "displacement", self.displacement, f"3 numbers of at most {_LARGEST:g} m")
+        for key in ("radius", "depth", "width"):
+            require_between(key, getattr(self, key), _SMALLEST, _LARGEST, "m, a positive number")
         require(self.radius > self.ball.radius, "radius", self.radius, "more than ball.radius")
         require(self.depth >= self.radius, "depth", self.depth, "radius or more")
         require(self.width > 2.0 * self.radius, "width", self.width, "more than twice the radius")

@@ -4,10 +4,9 @@ import dataclasses as dc
 import math
 from typing import Union
 
-from diagrams.scenario.checks import require, require_numbers
+from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 
-_LARGEST_ANGLE = 3600.0  # deg
 _SHORTEST_TOLERANCE = 1e-7  # m
 
 
@@ -155,8 +154,8 @@ class OrientationParameters:
         for i, keyframe in enumerate(self.keyframes):
             key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
             require_numbers(key, angles, 3)
-            good = max(map(abs, angles)) <= _LARGEST_ANGLE
-            require(good, key, angles, f"3 numbers of at most {_LARGEST_ANGLE:g} deg")
+            good = max(map(abs, angles)) <= LARGEST_ANGLE
+            require(good, key, angles, f"3 numbers of at most {LARGEST_ANGLE:g} deg")
             good = 0.0 <= keyframe.theta <= 1.0
             require(good, f"keyframes[{i}].theta", keyframe.theta, "0 to 1, a fraction")
 

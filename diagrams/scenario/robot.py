@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.scenario.checks import (
+    LARGEST_ANGLE,
     require,
     require_numbers,
 )
@@ -37,6 +38,8 @@ class PoseParameters:
         near = all(abs(coordinate) <= _FARTHEST for coordinate in self.position)
         require(near, "position", self.position, f"up to {_FARTHEST:g} m")
         require_numbers("zyx_deg", self.zyx_deg, 3)
+        good = max(map(abs, self.zyx_deg)) <= LARGEST_ANGLE
+        require(good, "zyx_deg", self.zyx_deg, f"3 numbers of at most {LARGEST_ANGLE:g} deg")
 
     def transform(self) -> RigidTransform:
         """Return the pose."""

@@ -6,8 +6,7 @@ from pydrake.systems.analysis import GetIntegrationSchemes
 
 from diagrams.scenario.checks import (
     require,
-    require_not_negative,
-    require_positive,
+    require_between,
 )
 
 # the integrator that is chosen for a robot before it runs
@@ -36,8 +35,8 @@ class SimulationParameters:
             stable and whose error over the first tenths of a second, against a step five times
             shorter, stays below 1e-6 (rad, m).
         max_step: Largest step [s].
-        accuracy: Accuracy of error control; 0 for fixed steps.
-        frame_period: Time between the frames of the recording [s].
+        accuracy: Accuracy of error control, 1e-10 to 0.1; 0 for fixed steps.
+        frame_period: Time between the frames of the recording, 1e-3 to 1e3 [s].
         sensor_failure: A sensor that fails on the way.
     """
 
@@ -51,8 +50,9 @@ class SimulationParameters:
         schemes = [AUTO, *GetIntegrationSchemes()]
         require(self.integrator in schemes, "integrator", self.integrator, ", ".join(schemes))
         require(1e-6 <= self.max_step <= 0.1, "max_step", self.max_step, "1e-6 to 0.1 s")
-        require_positive("frame_period", self.frame_period)
-        require_not_negative("accuracy", self.accuracy)
+        require_between("frame_period", self.frame_period, 1e-3, 1e3, "s, a positive number")
+        good = self.accuracy == 0.0 or 1e-10 <= self.accuracy <= 0.1
+        require(good, "accuracy", self.accuracy, "0, or a positive number from 1e-10 to 0.1")
         # their error control works on stale values after a rejected step
         stale = ("runge_kutta5", "bogacki_shampine3")
         require(

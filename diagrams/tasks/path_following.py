@@ -118,6 +118,8 @@ class PathTask(Task):
         """See :class:`Task`."""
         points = self._scenario.reference.points
         begin, end = min(points), max(points)
+        if self.path.closed:  # every round is the same
+            end = min(end, begin + self.path.length)
         for eta in np.linspace(begin, end, 2 + int((end - begin) / _SPACING)):
             theta = np.array([self.path.arc_length.parameter(eta)])
             yield self.path.position.derivatives(theta, 0)[0, 0], f"path at eta = {eta:.4g} m"

@@ -11,6 +11,8 @@ from pfsc_drake.physics.force_profile import FRAMES, smooth_step, smooth_step_sl
 # from coordinates and their rates, shape (3,) each, to position and velocity in the world
 Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
+_FARTHEST = 1e4  # m
+_LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
 # sinusoids per axis, enough for an irregular tremor
 _TREMOR_LINES = 16
 
@@ -29,8 +31,11 @@ class HandWaypoint:
 
     def __post_init__(self) -> None:
         self.position = np.asarray(self.position, dtype=float)
-        if self.position.shape != (3,) or not np.all(np.isfinite(self.position)):
-            raise InputError(f"position = {self.position.tolist()}: must be 3 finite numbers")
+        if self.position.shape != (3,) or not np.all(np.abs(self.position) <= _FARTHEST):
+            raise InputError(
+                f"position = {self.position.tolist()}: must be 3 finite numbers of at most "
+                f"{_FARTHEST:g} m"
+            )
 
 
 @dataclass
@@ -46,7 +51,8 @@ class HandParameters:
         rotational_damping: D_r [Nm s/rad], by which the grip resists turning.
         force_limit: Largest magnitude of the force [N].
         torque_limit: Largest magnitude of the torque [Nm].
-        reaction_delay: From seeing to pushing [s]; a multiple of the sampling time.
+        reaction_delay: From seeing to pushing [s]; a multiple of the sampling time, at most
+            10,000 of it.
         tremor: Standard deviation of the trembling force per axis [N].
         tremor_band: Lowest and highest frequency of the tremor [Hz], shape (2,).
         grip_ramp: Time in which the hand takes hold and lets go [s].
@@ -72,10 +78,12 @@ class HandParameters:
 
     def __post_init__(self) -> None:
         for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
-            _require(0.0 < getattr(self, key) < np.inf, key, getattr(self, key), "positive")
-        for key in ("damping", "rotational_damping", "reaction_delay", "tremor", "seed"):
-            value = getattr(self, key)
-            _require(0.0 <= value < np.inf, key, value, "zero or positive")
+            value, allowed = getattr(self, key), f"positive, at most {_LARGEST:g}"
+            _require(0.0 < value <= _LARGEST, key, value, allowed)
+        for key in ("damping", "rotational_damping", "reaction_delay", "tremor"):
+            value, allowed = getattr(self, key), f"zero or positive, at most {_LARGEST:g}"
+            _require(0.0 <= value <= _LARGEST, key, value, allowed)
+        _require(self.seed >= 0, "seed", self.seed, "zero or positive")
         _require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)

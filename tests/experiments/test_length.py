@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments.length import MAX_TICKS, check_length
+from experiments.length import MAX_FRAMES, MAX_TICKS, check_frames, check_length
 from pfsc_drake import InputError
 
 STATION = SimpleNamespace(
@@ -31,3 +31,12 @@ def test_too_long(duration, time, memory):
 
 def test_long_enough():
     check_length(SimpleNamespace(duration=MAX_TICKS * 1e-3), STATION)
+
+
+def test_too_many_frames():
+    check_frames(MAX_FRAMES * 0.032, 0.032)
+    with pytest.raises(
+        InputError, match=r"frame_period = 0\.001 s: 1e\+06 frames in 1000 s"
+    ) as caught:
+        check_frames(1000.0, 1e-3)
+    assert "frame_period from 0.02 s on" in str(caught.value)

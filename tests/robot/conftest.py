@@ -1,14 +1,10 @@
-"""Small serial arms of our own; and how properties are tested: without looking at the clock."""
+"""Small serial arms of our own."""
 
 import numpy as np
 import pytest
-from hypothesis import settings
 
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
-
-settings.register_profile("without_clock", deadline=None)
-settings.load_profile("without_clock")
 
 X, Y, Z = np.eye(3)
 UPPER_ARM, FOREARM = 0.7, 0.6  # m

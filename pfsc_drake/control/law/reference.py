@@ -31,7 +31,8 @@ def rest_to_rest(
         A curve of dimension 1 over time [s], starting at t = 0.
 
     Raises:
-        InputError: If there are fewer than two points, or a limit is not positive.
+        InputError: If there are fewer than two points, a limit is not positive, or a part of the
+            motion is too short beside the whole for its time to be told.
     """
     for name, value in {"velocity": velocity, "acceleration": acceleration}.items():
         if not (np.isfinite(value) and value > 0.0):
@@ -47,6 +48,12 @@ def rest_to_rest(
         if duration > 0.0:
             pieces.append(np.pad(polynomial.coef, (0, 9 - len(polynomial.coef))))
             times.append(times[-1] + duration)
+            if not times[-2] < times[-1] < np.inf:
+                raise InputError(
+                    f"reference: a part of the motion takes {duration:.3g} s from "
+                    f"t = {times[-2]:.6g} s on, which no clock can tell; allowed: velocity, "
+                    "acceleration and dwell closer to the length of the motion"
+                )
 
     position = float(points[0])
     add(dwell, np.polynomial.Polynomial([position]))

@@ -21,6 +21,13 @@ class SerialChain(Linkage, RobotModel):
         """Number of joints N."""
         return len(self.links)
 
+    @property
+    def reach(self) -> float:
+        """How far the tool point can be from the origin of the first joint at most [m]."""
+        offsets = [np.linalg.norm(link.p_PF) for link in self.links[1:]]
+        slides = [np.abs(link.position_limits).max() for link in self.links if not link.is_revolute]
+        return float(sum(offsets) + np.linalg.norm(self.p_LT) + sum(slides))
+
     def gather(self, attribute: str) -> np.ndarray:
         """Return one attribute of all links as an array, shape (N,) or (N, ...)."""
         return np.array([getattr(link, attribute) for link in self.links])

@@ -13,6 +13,7 @@ from pydrake.systems.framework import (
 
 from pfsc_drake.errors import InputError
 
+MAX_PERIODS = 10_000  # in a delay; every sample of it is moved at every tick
 # how far the number of periods in a delay may be from a whole number
 _ROUNDING = 1e-6
 
@@ -38,7 +39,7 @@ class BusDelay(LeafSystem):
 
     Args:
         size: Size of the vector.
-        delay: Delay [s], a whole number k >= 1 of periods.
+        delay: Delay [s], a whole number k of periods, 1 to MAX_PERIODS.
         period: Sampling time T of the bus [s].
 
     Raises:
@@ -112,8 +113,9 @@ def _whole_periods(delay: float, period: float) -> int:
     if not 0.0 < period < np.inf:
         raise InputError(f"bus: period = {period!r} s; must be positive and finite")
     ratio = delay / period
-    if not 0.5 < ratio < np.inf or abs(ratio - round(ratio)) > _ROUNDING:
+    if not 0.5 < ratio < MAX_PERIODS + 0.5 or abs(ratio - round(ratio)) > _ROUNDING:
         raise InputError(
-            f"bus: delay = {delay!r} s; must be a positive multiple of the period {period!r} s"
+            f"bus: delay = {delay!r} s; must be a positive multiple of the period {period!r} s, "
+            f"up to {MAX_PERIODS * period:g} s"
         )
     return round(ratio)

@@ -5,6 +5,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, Place, observed_twist
+from pfsc_drake.systems.physics.bus_delay import MAX_PERIODS
 
 
 class OperatorHand(LeafSystem):
@@ -30,7 +31,8 @@ class OperatorHand(LeafSystem):
         place: Where coordinates of the frame ``manifold`` are in the world, if needed.
 
     Raises:
-        InputError: If the reaction delay is not a multiple of the period, or a path is missing.
+        InputError: If the reaction delay is not a multiple of the period, up to MAX_PERIODS of
+            it, or a path is missing.
     """
 
     def __init__(
@@ -38,11 +40,11 @@ class OperatorHand(LeafSystem):
     ) -> None:
         super().__init__()
         self._hand, self._period = HandModel(parameters, place), period
-        delay = round(parameters.reaction_delay / period)
+        delay = round(min(parameters.reaction_delay / period, MAX_PERIODS))
         if abs(delay * period - parameters.reaction_delay) > 1e-9:
             raise InputError(
                 f"reaction_delay = {parameters.reaction_delay} s: must be a multiple of the "
-                f"sampling time {period:g} s"
+                f"sampling time {period:g} s, up to {MAX_PERIODS * period:g} s"
             )
         self._wrench = self.DeclareDiscreteState(6)
         self._last_pose = self.DeclareDiscreteState(np.full(12, np.nan))

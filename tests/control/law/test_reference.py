@@ -128,3 +128,8 @@ def test_dwell_must_not_be_negative(dwell):
 def test_points_must_be_two_different_numbers(points):
     with pytest.raises(InputError, match="reference points"):
         rest_to_rest(points, velocity=1.0, acceleration=1.0)
+
+
+def test_no_part_is_too_short_for_its_time_to_be_told():
+    with pytest.raises(InputError, match=r"reference: .* takes 2.19e-12 s from t = 1e\+06 s on"):
+        rest_to_rest([0.0, 1.0], velocity=1e-6, acceleration=1e6, dwell=1e6)

@@ -182,8 +182,10 @@ def test_start_beyond_the_centre_of_curvature(load_scenario, start):
 
 def test_unreachable_start(on_line, start):
     settings = on_line()
-    settings.path.shape = Line([2.0, 0.0, 1.0], [2.0, 0.4, 1.0])
-    refused(start, settings, "start", "2.0", "unreachable", "joint limits")
+    settings.path.shape = Line([0.2, 0.0, 0.1], [0.2, 0.4, 0.1])  # inside the robot
+    refused(start, settings, "start", "0.2", "unreachable", "joint limits")
+    settings.path.shape = Line([5.0, 0.0, 1.0], [5.0, 0.4, 1.0])
+    refused(start, settings, "start", "5.0", "unreachable", "robot reaches")
 
 
 @pytest.mark.parametrize("points", [[-0.01, 0.1], [0.0, 0.41], [0.0, math.inf]])
@@ -297,3 +299,32 @@ def test_without_a_posture_half_limited_joints_start_where_they_can(on_rails, st
     on_rails.start.posture_deg = []
     _, _, arm, _ = start(on_rails)
     np.testing.assert_allclose(arm.tool_pose()[0], [0.0, 0.6, 0.2], atol=1e-8)
+
+
+def test_a_closed_path_is_looked_at_once_however_many_rounds_there_are(load_scenario):
+    settings = load_scenario(THREE)
+    settings.reference.points = [0.1, 1e4]
+    task = make_task(settings, None)
+    points = np.array([position for position, _ in task.way()])
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(task.path.length, rel=1e-4)
+
+
+def test_what_is_beyond_reach_is_refused(load_arm):
+    arm = load_arm("comau_racer_1_4_3r")
+    part = MultibodyArm(arm.plant, arm.chain, arm.coordinates, arm.tool)
+    base, reach = arm.chain.links[0].p_PF, arm.chain.reach * np.array([1.0, 0.0, 0.0])
+    part.check_reach(base + 0.999 * reach, "here")
+    with pytest.raises(InputError, match=r"^here: .* unreachable, .* robot reaches"):
+        part.check_reach(base + 1.001 * reach, "here")
+
+
+def test_no_posture_is_beyond_the_reach(load_arm):
+    random = np.random.default_rng(1)
+    arm = load_arm("comau_racer_1_4_3r")
+    base = arm.chain.links[0].p_PF
+    farthest = 0.0
+    for q in random.uniform(-np.pi, np.pi, (300, 3)):
+        arm.plant.SetPositions(arm.context, q)
+        farthest = max(farthest, float(np.linalg.norm(arm.tool_pose()[0] - base)))
+    assert 0.8 * arm.chain.reach < farthest <= arm.chain.reach

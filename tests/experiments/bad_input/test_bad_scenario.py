@@ -86,6 +86,9 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("controller.sampling_time=0", ("sampling_time", "0", "positive")),
         ("simulation.integrator=magic", ("integrator", "magic", "runge_kutta3")),
         ("simulation.frame_period=0", ("frame_period", "0", "positive")),
+        ("hand={reaction_delay: 1e5}", ("hand.reaction_delay", "multiple", "up to 10 s")),
+        # beyond every posture, so that none has to be tried
+        ("robot.base_pose.position=[1e5, 0, 0]", ("start", "unreachable", "robot reaches")),
         # sensors and targets that are not there
         ("simulation.sensor_failure={time: 1, component: 12}", ("component", "12", "0 to 11")),
         ("targets.elastic.magic={bound: '< 1'}", ("magic", "max_path_deviation")),

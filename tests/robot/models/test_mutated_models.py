@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.multibody.plant import MultibodyPlant
 
@@ -35,13 +35,14 @@ def chain_or_line(file, tool):
     return chain
 
 
+@pytest.mark.fuzz
 @pytest.mark.parametrize(("kind", "tool"), [("urdf", "tcp"), ("sdf", "arm")])
-def test_one_word_changed(tmp_path, urdf_text, sdf_text, kind, tool):
+def test_one_word_changed(examples, tmp_path, urdf_text, sdf_text, kind, tool):
     text = urdf_text if kind == "urdf" else sdf_text
     words = list(_WORD.finditer(text))
     file = tmp_path / f"arm.{kind}"
 
-    @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+    @examples(60)
     @given(st.sampled_from(words), st.sampled_from(_OTHERS))
     def check(word, other):
         changed = text[: word.start()] + other + text[word.end() :]

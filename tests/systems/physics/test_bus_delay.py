@@ -102,10 +102,18 @@ def test_contexts_do_not_share_samples():
 
 @pytest.mark.parametrize(
     ("delay", "period"),
-    [(1.5e-3, 1e-3), (0.0, 1e-3), (-2e-3, 1e-3), (np.nan, 1e-3), (np.inf, 1e-3), (1e-4, 1e-3)],
+    [
+        (1.5e-3, 1e-3),
+        (0.0, 1e-3),
+        (-2e-3, 1e-3),
+        (np.nan, 1e-3),
+        (np.inf, 1e-3),
+        (1e-4, 1e-3),
+        (1e300, 1e-3),
+    ],
 )
 def test_delay_must_be_whole_periods(delay, period):
-    with pytest.raises(InputError, match=r"must be a positive multiple of the period 0.001 s"):
+    with pytest.raises(InputError, match=r"a positive multiple of the period 0.001 s, up to 10 s"):
         BusDelay(1, delay, period)
 
 

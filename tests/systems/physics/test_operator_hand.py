@@ -106,7 +106,9 @@ def test_the_delay_is_the_given_number_of_samples(samples):
 
 
 def test_a_delay_between_samples_is_refused():
-    message = r"^reaction_delay = 0.0105 s: must be a multiple of the sampling time 0.001 s$"
+    message = (
+        r"^reaction_delay = 0.0105 s: must be a multiple of the sampling time 0.001 s, up to 10 s$"
+    )
     with pytest.raises(InputError, match=message):
         OperatorHand(hand(reaction_delay=0.0105), PERIOD)
 
