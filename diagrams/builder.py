@@ -15,7 +15,7 @@ from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require_whole_fraction
 from diagrams.signal_log import add_log
 from diagrams.station import Station
@@ -33,7 +33,7 @@ from pfsc_drake.geometry.paths.smoothing import Progress
 
 
 def build_station(
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     folder: FilePath,
     progress: Progress | None = None,
     task: Task | None = None,
@@ -100,7 +100,7 @@ def build_station(
     )
 
 
-def _workpiece(scenario: PathFollowingScenario, task: Task) -> Workpiece | None:
+def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
     if scenario.notch is None:
         return None
     step = scenario.notch.time_step
@@ -110,7 +110,7 @@ def _workpiece(scenario: PathFollowingScenario, task: Task) -> Workpiece | None:
 
 def _add_robot(
     builder: DiagramBuilder,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     folder: FilePath,
     workpiece: Workpiece | None,
 ) -> RobotPart:
@@ -120,7 +120,7 @@ def _add_robot(
 
 
 def _start(
-    scenario: PathFollowingScenario, task: Task, part: RobotPart, workpiece: Workpiece | None
+    scenario: Scenario, task: Task, part: RobotPart, workpiece: Workpiece | None
 ) -> tuple[StartPoint, np.ndarray]:
     """Return where the tool starts, and the state of the plant there, at rest.
 
@@ -137,9 +137,7 @@ def _start(
     return start, part.state_at_rest(q_J)
 
 
-def draw_station(
-    settings: PathFollowingScenario, folder: FilePath, station: Station
-) -> RobotDrawing | None:
+def draw_station(settings: Scenario, folder: FilePath, station: Station) -> RobotDrawing | None:
     """Read what a station's robot looks like, or return None if that is known without files.
 
     Args:
@@ -153,7 +151,7 @@ def draw_station(
 
 
 def build_station_replay(
-    settings: PathFollowingScenario,
+    settings: Scenario,
     folder: FilePath,
     station: Station,
     drawing: RobotDrawing | None,

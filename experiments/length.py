@@ -1,6 +1,6 @@
 """How long a run may be."""
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.station import Station
 from pfsc_drake.errors import InputError
 
@@ -14,7 +14,7 @@ _COPIES = 4
 _UNITS = (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0))
 
 
-def check_length(settings: PathFollowingScenario, station: Station) -> None:
+def check_length(settings: Scenario, station: Station) -> None:
     """Refuse a run of more than MAX_TICKS sampling intervals of the controller.
 
     Args:

@@ -10,7 +10,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
-from diagrams.scenario import PathFollowingScenario, Waypoints
+from diagrams.scenario import Scenario, Waypoints
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
@@ -36,7 +36,7 @@ class PreparedRun:
         warnings: What may not go as well as hoped, one sentence each.
     """
 
-    settings: PathFollowingScenario
+    settings: Scenario
     text: str
     folder: Path
     station: Station
@@ -63,7 +63,7 @@ def prepare(
     Raises:
         InputError: If the scenario is wrong.
     """
-    settings = load_typed(PathFollowingScenario, scenario.data, str(scenario.path))
+    settings = load_typed(Scenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
     with _naming(scenario.path):
         station = _build(settings, folder, progress)
@@ -82,7 +82,7 @@ def prepare(
     return PreparedRun(settings, text, folder, station, integration, drawing, warnings)
 
 
-def _build(settings: PathFollowingScenario, folder: Path, progress: ProgressListener) -> Station:
+def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:
     def tell(fraction: float, phase: str) -> None:
         progress(0.0, f"{phase}, {fraction:.0%}")
 
@@ -90,9 +90,7 @@ def _build(settings: PathFollowingScenario, folder: Path, progress: ProgressList
         return build_station(settings, folder, tell)
 
 
-def _integrated(
-    settings: PathFollowingScenario, folder: Path, station: Station
-) -> tuple[Station, Integration]:
+def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Station, Integration]:
     """Settle the integration in the settings, and return it and a station that is made for it.
 
     The settings name scheme and step then, so that the scenario as resolved gives this run again.
@@ -118,7 +116,7 @@ def _naming(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
 
 
-def _resolve_files(settings: PathFollowingScenario, folder: Path) -> None:
+def _resolve_files(settings: Scenario, folder: Path) -> None:
     """Make file names independent of the scenario's folder, so that the copy runs too."""
     if settings.friction.file and Path(settings.friction.file).suffix:
         settings.friction.file = str((folder / settings.friction.file).resolve())

@@ -20,7 +20,7 @@ from diagrams.robots.plant_wiring import (
     connect_resistance,
     joint_state_of,
 )
-from diagrams.scenario import PathFollowingScenario, RobotParameters, StartParameters
+from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.compliance.tool_load import ToolLoad
@@ -233,7 +233,7 @@ def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobo
 
 def add_delta(
     builder: DiagramBuilder,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     folder: FilePath,
     workpiece: Workpiece | None,
 ) -> DeltaPart:
@@ -262,7 +262,7 @@ def add_delta(
     return TouchingDelta(robot, plant, model, tool, contact)
 
 
-def _check(scenario: PathFollowingScenario) -> None:
+def _check(scenario: Scenario) -> None:
     """Refuse what is said of robots that turn their tool or bend."""
     start, robot, law = scenario.start, scenario.robot, scenario.controller.law
     drives = "the drives of a DELTA robot are stiff and take forces"

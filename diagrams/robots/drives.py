@@ -7,7 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
 
 from diagrams.robots.part import Drives, RobotPart
-from diagrams.scenario import JointFrictionParameters, PathFollowingScenario
+from diagrams.scenario import JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
 from pfsc_drake.errors import InputError
@@ -28,7 +28,7 @@ _BRISTLES_PER_STEP = 0.5
 def add_drives(
     builder: DiagramBuilder,
     part: RobotPart,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
 ) -> dict[str, OutputPort]:
@@ -64,7 +64,7 @@ def add_drives(
 def _add_servo(
     builder: DiagramBuilder,
     chain: RobotModel,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     ports: dict[str, OutputPort],
     q_J: np.ndarray,
 ) -> tuple[VelocityServo, float]:
@@ -96,7 +96,7 @@ def add_friction(
     builder: DiagramBuilder,
     part: RobotPart,
     joint_state: OutputPort,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     folder: FilePath,
 ) -> dict[str, OutputPort]:
     """Add the scenario's friction, and return its signal for the log.
@@ -135,7 +135,7 @@ def add_friction(
 
 
 def _bristles(
-    scenario: PathFollowingScenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+    scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
     """Return friction whose bristles suit how the plant is integrated."""
     if drives.step is not None:
@@ -155,7 +155,7 @@ def _bristles(
 
 
 def _coefficients(
-    scenario: PathFollowingScenario, part: RobotPart, folder: FilePath
+    scenario: Scenario, part: RobotPart, folder: FilePath
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the friction of the scenario, else of the robot's parameters, else None."""
     own, wanted = part.drives.own_friction, scenario.drive_friction

@@ -2,7 +2,7 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.physics.joint_encoders import EncoderOptions, JointEncoders
@@ -13,7 +13,7 @@ def add_joint_state(
     builder: DiagramBuilder,
     joint_state: OutputPort,
     robot: RobotModel,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
 ) -> OutputPort:
     """Add what encoders make of the joint state, and return ``[q_J, v_J, q_M, v_M]`` as measured.
 
@@ -44,7 +44,7 @@ def add_joint_state(
 
 
 def states_to_log(
-    scenario: PathFollowingScenario, joint_state: OutputPort, measured: OutputPort
+    scenario: Scenario, joint_state: OutputPort, measured: OutputPort
 ) -> dict[str, OutputPort]:
     """Return ``joint_state`` for the log, and ``joint_state_measured`` with imperfect encoders.
 
@@ -64,7 +64,7 @@ def _add_imperfection(
     builder: DiagramBuilder,
     joint_state: OutputPort,
     robot: RobotModel,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
 ) -> OutputPort:
     """Add increments and difference quotients, if there are any."""
     options = scenario.encoders

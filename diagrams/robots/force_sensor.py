@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Demultiplexer
 
 from diagrams.robots.part import RobotPart
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
 
@@ -12,7 +12,7 @@ from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
 def add_sensor(
     builder: DiagramBuilder,
     part: RobotPart,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Add a force/torque sensor with taring and compensation of the tool behind it.
@@ -64,7 +64,7 @@ def _split(
     return [split.get_output_port(i) for i in range(len(sizes))]
 
 
-def sensor_warnings(scenario: PathFollowingScenario) -> list[str]:
+def sensor_warnings(scenario: Scenario) -> list[str]:
     """Return what may keep a scenario's sensor from being tared, or make it too late."""
     if not scenario.compliance.is_given:
         return []

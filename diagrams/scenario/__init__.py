@@ -15,7 +15,7 @@ from diagrams.scenario.path import (
     Waypoints,
 )
 from diagrams.scenario.robot import RobotParameters
-from diagrams.scenario.schema import PathFollowingScenario, Target
+from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
@@ -37,10 +37,10 @@ __all__ = [
     "LawGains",
     "Line",
     "OrientationParameters",
-    "PathFollowingScenario",
     "PathParameters",
     "ReferenceParameters",
     "RobotParameters",
+    "Scenario",
     "SensorFailureParameters",
     "SensorParameters",
     "ServoParameters",

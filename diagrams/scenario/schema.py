@@ -39,7 +39,7 @@ class Target:
 
 
 @dc.dataclass
-class PathFollowingScenario:
+class Scenario:
     """A path following run.
 
     Attributes:

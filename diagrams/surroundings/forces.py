@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, ZeroOrderHold
 
 from diagrams.robots.part import RobotPart
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
 from diagrams.tasks.task import Task
@@ -18,7 +18,7 @@ def add_surroundings(
     builder: DiagramBuilder,
     part: RobotPart,
     task: Task,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Add the scenario's forces on the tool, and return their signals for the log.
@@ -61,7 +61,7 @@ def _scripted(
     builder: DiagramBuilder,
     part: RobotPart,
     task: Task,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     ports: dict[str, OutputPort],
 ) -> list[OutputPort]:
     """Add the forces that are written down beforehand."""

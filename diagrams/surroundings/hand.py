@@ -2,7 +2,7 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -14,7 +14,7 @@ def add_hand(
     builder: DiagramBuilder,
     robot: RobotModel,
     task: Task,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     joint_state: OutputPort,
 ) -> list[OutputPort]:
     """Add the scenario's hand, which sees where the tool really is.

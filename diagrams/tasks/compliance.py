@@ -2,7 +2,7 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.errors import InputError
@@ -13,7 +13,7 @@ from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTra
 _DESIRED_ORDER = 4
 
 
-def reference_order(scenario: PathFollowingScenario, linearization: Linearization) -> int:
+def reference_order(scenario: Scenario, linearization: Linearization) -> int:
     """Return the highest derivative of the external reference that is needed.
 
     Args:
@@ -35,7 +35,7 @@ def reference_order(scenario: PathFollowingScenario, linearization: Linearizatio
 
 def add_compliance(
     builder: DiagramBuilder,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     linearization: Linearization,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:

@@ -2,14 +2,14 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.external_torque import ExternalTorque
 from pfsc_drake.systems.control.following_controller import FollowingController
 
 
-def needs_sensor(scenario: PathFollowingScenario) -> bool:
+def needs_sensor(scenario: Scenario) -> bool:
     """Return whether something in the scenario acts on measured forces."""
     measured = scenario.controller.external_torque.source == "measured"
     return measured or scenario.compliance.is_given
@@ -18,7 +18,7 @@ def needs_sensor(scenario: PathFollowingScenario) -> bool:
 def add_external_torque(
     builder: DiagramBuilder,
     robot: RobotModel,
-    scenario: PathFollowingScenario,
+    scenario: Scenario,
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.task import Task
@@ -28,7 +28,7 @@ class Following:
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
     """
 
-    scenario: PathFollowingScenario
+    scenario: Scenario
     robot: RobotModel
     task: Task
     law: FollowingLaw

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagrams.scenario import ControllerParameters, PathFollowingScenario
+from diagrams.scenario import ControllerParameters, Scenario
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -21,7 +21,7 @@ _LARGEST_SOFTNESS = 1e-3
 
 
 def law_warnings(
-    scenario: PathFollowingScenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
+    scenario: Scenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
 ) -> list[str]:
     """Return what a scenario's sampled law will not do well, one sentence each.
 
@@ -114,9 +114,7 @@ def _transversal_gains(law: FollowingLaw) -> np.ndarray:
     return gains
 
 
-def _fast_servo(
-    scenario: PathFollowingScenario, robot: RobotModel, link_state: np.ndarray
-) -> list[str]:
+def _fast_servo(scenario: Scenario, robot: RobotModel, link_state: np.ndarray) -> list[str]:
     """Warn of servos that are faster than the joints behind them.
 
     They hold the motors against the links' oscillation, which nothing damps then.
@@ -134,7 +132,7 @@ def _fast_servo(
     ]
 
 
-def _unknown_forces(scenario: PathFollowingScenario, robot: RobotModel) -> list[str]:
+def _unknown_forces(scenario: Scenario, robot: RobotModel) -> list[str]:
     parameters = scenario.controller
     scripted = bool(scenario.forces) or scenario.hold_back.force != 0.0
     pushed = scripted or scenario.hand is not None

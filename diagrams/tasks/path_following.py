@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.path import make_path
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
@@ -41,7 +41,7 @@ class PathTask(Task):
 
     def __init__(
         self,
-        scenario: PathFollowingScenario,
+        scenario: Scenario,
         folder: FilePath,
         progress: Progress | None = None,
     ) -> None:
@@ -139,7 +139,7 @@ class TrajectoryTask(PathTask):
 
     def __init__(
         self,
-        scenario: PathFollowingScenario,
+        scenario: Scenario,
         folder: FilePath,
         progress: Progress | None = None,
     ) -> None:
@@ -167,9 +167,7 @@ class TrajectoryTask(PathTask):
 TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}
 
 
-def make_task(
-    scenario: PathFollowingScenario, folder: FilePath, progress: Progress | None = None
-) -> Task:
+def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
     """Return what a scenario's tool is to do.
 
     Args:

@@ -1,6 +1,6 @@
 """Targets of metrics, checked before a run against the metrics that there will be."""
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.results.joint_limits import JointLimits
 from experiments.results.path_metrics import metric_names
@@ -12,7 +12,7 @@ from pfsc_drake.errors import InputError
 _OF_OTHER_LAWS = {"xi_M"}
 
 
-def check_targets(settings: PathFollowingScenario, station: Station) -> None:
+def check_targets(settings: Scenario, station: Station) -> None:
     """Refuse targets for metrics that a run with their law would not have.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 from experiments.pages.report import Report, report_page, write_report
@@ -170,7 +170,7 @@ def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:
 
 def _resonance(scenario: ScenarioFile) -> float:
     """Return the fastest joint resonance at the start [rad/s]."""
-    settings = load_typed(PathFollowingScenario, scenario.data, _SCENARIO)
+    settings = load_typed(Scenario, scenario.data, _SCENARIO)
     station = build_station(settings, scenario.path.parent)
     q_J = (station.part.coordinates.link_rows @ station.initial_state)[: station.robot.dimension]
     return float(joint_resonances(station.robot, q_J)[-1])

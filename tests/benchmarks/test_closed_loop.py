@@ -6,7 +6,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
 from pfsc_drake.compiled.bound_function import compiled_when_bound
@@ -18,7 +18,7 @@ SPAN = 0.2
 
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
 def test_closed_loop(benchmark, name):
-    scenario = load_file(PathFollowingScenario, SCENARIOS / f"{name}.yaml")
+    scenario = load_file(Scenario, SCENARIOS / f"{name}.yaml")
     with compiled_when_bound():
         station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)

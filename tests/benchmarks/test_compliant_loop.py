@@ -13,7 +13,7 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
 
@@ -41,7 +41,7 @@ class Loop:
 
     def __init__(self):
         file = SCENARIOS / "pfc_compliant_6r.yaml"
-        self.scenario = load_file(PathFollowingScenario, file)
+        self.scenario = load_file(Scenario, file)
         for pulse in self.scenario.forces:
             pulse.begin, pulse.end = 0.1, 10.0
         with compiled_when_bound():

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 
 from diagrams.robots.model import read_robot, tool_frame
-from diagrams.scenario import PathFollowingScenario, RobotParameters
+from diagrams.scenario import RobotParameters, Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.yaml.typed import load_file
@@ -63,7 +63,7 @@ def load_arm():
 def load_scenario():
     """Return a fresh copy of a shipped scenario, to be changed."""
 
-    def load(name: str) -> PathFollowingScenario:
-        return load_file(PathFollowingScenario, find_scenario(name))
+    def load(name: str) -> Scenario:
+        return load_file(Scenario, find_scenario(name))
 
     return load

@@ -15,7 +15,7 @@ from diagrams.scenario import (
     HandWaypoint,
     Keyframe,
     Line,
-    PathFollowingScenario,
+    Scenario,
 )
 from diagrams.scenario.notch import BallParameters, NotchParameters
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
@@ -34,7 +34,7 @@ def soft():
     return ComplianceParameters(transversal=spring)
 
 
-def run(settings: PathFollowingScenario, duration: float, folder=SCENARIO_DIRECTORY):
+def run(settings: Scenario, duration: float, folder=SCENARIO_DIRECTORY):
     """Return the station and its log."""
     station = build_station(settings, folder)
     simulator = Simulator(station.diagram)

@@ -7,7 +7,7 @@ import yaml
 
 from diagrams.builder import build_station
 from diagrams.integration import is_stable
-from diagrams.scenario import PathFollowingScenario, SimulationParameters
+from diagrams.scenario import Scenario, SimulationParameters
 from experiments import integration
 from experiments.catalog.scenario_file import read_scenario
 from experiments.integration import choose_integration
@@ -35,7 +35,7 @@ class Quiet:
 
 def build(name, *changes):
     scenario = read_scenario(name, ["simulation.integrator=auto", *changes])
-    settings = load_typed(PathFollowingScenario, scenario.data, name)
+    settings = load_typed(Scenario, scenario.data, name)
     return settings, build_station(settings, scenario.path.parent)
 
 

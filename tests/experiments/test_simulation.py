@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments import simulation
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.run_signals import collect_log, collect_motion
@@ -29,7 +29,7 @@ class Listener:
 
 @pytest.fixture
 def settings():
-    return load_file(PathFollowingScenario, find_scenario("pfc_elastic_3r"))
+    return load_file(Scenario, find_scenario("pfc_elastic_3r"))
 
 
 @pytest.fixture

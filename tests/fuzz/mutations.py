@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import strategies as st
 from pydrake.common.yaml import yaml_dump_typed
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import read_scenario
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
 from pfsc_drake.yaml.typed import load_typed
@@ -35,7 +35,7 @@ FACTORS = [0.0, -1.0, 1e-12, 1e-6, 1e-3, 0.1, 0.5, 0.999, 1.001, 2.0, 10.0, 1e3,
 def full_scenario(name: str, *overrides: str) -> dict[str, Any]:
     """Return a shipped scenario with all keys of its schema, defaults included."""
     file = read_scenario(name, list(overrides))
-    settings = load_typed(PathFollowingScenario, file.data, name)
+    settings = load_typed(Scenario, file.data, name)
     return parse_yaml(yaml_dump_typed(settings), name)
 
 

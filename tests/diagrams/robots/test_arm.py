@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import JointFrictionParameters, PathFollowingScenario, RobotParameters
+from diagrams.scenario import JointFrictionParameters, RobotParameters, Scenario
 from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
@@ -18,7 +18,7 @@ COMAU = "comau_racer_1_4"
 
 
 @pytest.fixture
-def settings(load_scenario) -> PathFollowingScenario:
+def settings(load_scenario) -> Scenario:
     """Three elastic axes; a law that is compiled fast."""
     settings = load_scenario("pfc_elastic_3r")
     settings.controller.law = "singular_perturbation"

@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, record
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
@@ -19,7 +19,7 @@ PERIOD = 0.04
 
 
 def load(*changes):
-    return load_typed(PathFollowingScenario, load_scenario_data(FILE, list(changes)), str(FILE))
+    return load_typed(Scenario, load_scenario_data(FILE, list(changes)), str(FILE))
 
 
 def build(*changes):

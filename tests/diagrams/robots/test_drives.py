@@ -8,7 +8,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import ForcePulse, GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory, resolve_model
 from pfsc_drake.robot.models.parameters import load_parameters
@@ -18,7 +18,7 @@ TICK = 1e-3
 
 
 @pytest.fixture
-def settings(load_scenario) -> PathFollowingScenario:
+def settings(load_scenario) -> Scenario:
     """Three rigid axes, at rest on the path."""
     settings = load_scenario("pfc_elastic_3r")
     settings.robot.model = "comau_racer_1_4_3r"

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from diagrams.scenario.schema import PathFollowingScenario
+from diagrams.scenario.schema import Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 
@@ -12,7 +12,7 @@ INFINITE = math.inf
 
 
 def load(**data):
-    return load_typed(PathFollowingScenario, data, "mine.yaml")
+    return load_typed(Scenario, data, "mine.yaml")
 
 
 def test_everything_has_a_default():

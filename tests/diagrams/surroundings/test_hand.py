@@ -11,7 +11,7 @@ from diagrams.scenario import (
     HandParameters,
     HandWaypoint,
     Line,
-    PathFollowingScenario,
+    Scenario,
 )
 from diagrams.tasks.path_following import make_task
 from experiments.results.run_signals import collect_log
@@ -31,7 +31,7 @@ def steady_hand(target, **changes):
 
 
 @pytest.fixture
-def settings(load_scenario) -> PathFollowingScenario:
+def settings(load_scenario) -> Scenario:
     """Three rigid axes that rest on the path."""
     settings = load_scenario("operator_hand_6r")
     settings.robot.model = "comau_racer_1_4_3r"
@@ -184,7 +184,7 @@ def test_a_closed_path_counts_on(settings):
 )
 def test_values_out_of_range(data, part):
     with pytest.raises(InputError, match=part) as caught:
-        load_typed(PathFollowingScenario, {"hand": data}, "mine.yaml")
+        load_typed(Scenario, {"hand": data}, "mine.yaml")
     assert "\n" not in str(caught.value)
 
 

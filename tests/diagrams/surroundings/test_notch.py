@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.surroundings.notch import notch_surface
 from diagrams.surroundings.notch_motion import place_in_notch
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
@@ -21,7 +21,7 @@ UP = np.array([0.0, 0.0, -1.0])  # z_0 points down
 
 
 def load(*changes):
-    return load_typed(PathFollowingScenario, load_scenario_data(FILE, list(changes)), str(FILE))
+    return load_typed(Scenario, load_scenario_data(FILE, list(changes)), str(FILE))
 
 
 @pytest.fixture(name="settings", scope="module")

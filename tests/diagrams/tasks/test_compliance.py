@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import GainParameters, LawGains, Scenario
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
@@ -23,7 +23,7 @@ def soft(stiffness=STIFFNESS):
 
 
 @pytest.fixture
-def settings(load_scenario) -> PathFollowingScenario:
+def settings(load_scenario) -> Scenario:
     """Three rigid axes that rest on the path and yield transversally."""
     settings = load_scenario("pfc_elastic_3r")
     settings.robot.model = "comau_racer_1_4_3r"
@@ -51,8 +51,8 @@ def run(settings, duration):
 
 
 def test_rigid_everywhere_is_no_compliance():
-    assert not PathFollowingScenario().compliance.is_given
-    settings = PathFollowingScenario()
+    assert not Scenario().compliance.is_given
+    settings = Scenario()
     settings.compliance.rotational = soft()
     assert settings.compliance.is_given
     settings.compliance.rotational = CoordinateImpedance(
@@ -171,4 +171,4 @@ def test_differentiated_encoders_are_warned_of(settings):
 )
 def test_values_out_of_range(data, part):
     with pytest.raises(InputError, match=part):
-        load_typed(PathFollowingScenario, data, "mine.yaml")
+        load_typed(Scenario, data, "mine.yaml")

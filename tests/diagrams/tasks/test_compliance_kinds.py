@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.builder import build_station
-from diagrams.scenario import ForcePulse, PathFollowingScenario
+from diagrams.scenario import ForcePulse, Scenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
@@ -22,7 +22,7 @@ def impedance(mass, damping, stiffness):
 
 
 @pytest.fixture
-def settings(load_scenario) -> PathFollowingScenario:
+def settings(load_scenario) -> Scenario:
     """Six rigid axes that rest on the path; nothing yields, and the sensor is exact."""
     settings = load_scenario("pfc_compliant_6r")
     settings.compliance.transversal = CoordinateImpedance()
@@ -36,7 +36,7 @@ def settings(load_scenario) -> PathFollowingScenario:
 def arm(settings):
     """The same with three axes on the lemniscate, which is compiled and run faster."""
 
-    def three_axes(lemniscate: PathFollowingScenario):
+    def three_axes(lemniscate: Scenario):
         settings.robot.model = "comau_racer_1_4_3r"
         settings.path = lemniscate.path
         settings.start.posture_deg = [15, 115, -10]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import ForcePulse, GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.yaml.typed import load_file
@@ -15,7 +15,7 @@ SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
 
 @pytest.fixture(name="scenario")
 def fixture_scenario():
-    return load_file(PathFollowingScenario, SCENARIOS / "pfc_elastic_3r.yaml")
+    return load_file(Scenario, SCENARIOS / "pfc_elastic_3r.yaml")
 
 
 def warnings(scenario):
@@ -48,7 +48,7 @@ def test_joints_so_soft_that_the_law_is_unstable(scenario):
 
 def test_stiff_joints_suit_both_laws():
     """Deviations of 0.1 mm and less at 0.3 m/s; with the printed damping 0.4 mm."""
-    scenario = load_file(PathFollowingScenario, SCENARIOS / "pfc_comau_6r.yaml")
+    scenario = load_file(Scenario, SCENARIOS / "pfc_comau_6r.yaml")
     assert warnings(scenario) == []
     tuned = scenario.controller.boundary_layer_damping
     scenario.controller.boundary_layer_damping = [0.022, 0.022, 0.0088, 0.0024, 0.0044, 0.0022]

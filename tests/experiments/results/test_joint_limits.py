@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.joint_limits import JointLimits
 from experiments.results.run_log import RunLog
@@ -110,7 +110,7 @@ def test_what_is_no_number_does_not_count(log):
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_delta"])
 def test_limits_of_a_robot(name):
     path = find_scenario(name)
-    robot = build_station(load_file(PathFollowingScenario, path), path.parent).robot
+    robot = build_station(load_file(Scenario, path), path.parent).robot
     own = JointLimits.of(robot)
     margin = "joint_limit_margin" if name == "pfc_elastic_3r" else "slide_limit_margin"
     assert own.metric_names() == [margin, "joint_velocity_share"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import EncoderOptions, GainParameters, LawGains, PathFollowingScenario
+from diagrams.scenario import EncoderOptions, GainParameters, LawGains, Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.run_signals import collect_log, collect_motion
 from experiments.simulation import simulate
@@ -18,7 +18,7 @@ COARSE = 2000.0
 
 @pytest.fixture
 def settings():
-    settings = load_file(PathFollowingScenario, find_scenario("pfc_elastic_3r"))
+    settings = load_file(Scenario, find_scenario("pfc_elastic_3r"))
     settings.robot.model = "comau_racer_1_4_3r"
     settings.controller.law = "rigid"
     poles = GainParameters(poles=[-30.0, -30.0])

@@ -11,7 +11,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from diagrams.tasks.path import make_path
 from pfsc_drake.geometry import FourierCurve
 from pfsc_drake.geometry import Path as GeometricPath
@@ -129,7 +129,7 @@ def test_signals_of_the_tool(three_axes, arm, law):
 def test_orientation_of_the_tool(six_axes, six_axes_rigid, law):
     """The angles away from the path's orientation, from the logged pose and path parameter."""
     result = six_axes if law == "elastic" else six_axes_rigid
-    settings = load_file(PathFollowingScenario, result.folder / "scenario.yaml")
+    settings = load_file(Scenario, result.folder / "scenario.yaml")
     R_d = make_path(settings.path, law, None).orientation.rotation_matrix(result["theta"][:, 0])
     R_e = result["R_e"].reshape(-1, 3, 3)
     phi = Rotation.from_matrix(R_d.transpose(0, 2, 1) @ R_e).as_euler("ZYX")

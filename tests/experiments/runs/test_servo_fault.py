@@ -6,7 +6,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.scenario import PathFollowingScenario
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
 from experiments.simulation import simulate
@@ -20,7 +20,7 @@ V_M_2 = 3 * 6 + 1
 
 @pytest.fixture
 def settings():
-    settings = load_file(PathFollowingScenario, SCENARIO)
+    settings = load_file(Scenario, SCENARIO)
     settings.controller.law = "velocity_servo"
     settings.reference.dwell = 0.05
     settings.simulation.sensor_failure.time = FAILS_AT
