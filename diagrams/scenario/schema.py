@@ -40,7 +40,7 @@ class Target:
 
 @dc.dataclass
 class Scenario:
-    """A path following run.
+    """A run: a robot, a task and surroundings.
 
     Attributes:
         name: Name of the scenario.
