@@ -65,14 +65,17 @@ def test_binary_and_empty_waypoints(refused, mine, tmp_path):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("number", ["1e300", "1e-300", "1e999"])
-def test_lengths_that_no_path_has(refused, mine, tmp_path, number):
+@pytest.mark.parametrize(
+    ("number", "allowed"),
+    [("1e300", "10000 m"), ("1e-300", "10000 m"), ("1e999", "magnitude up to 1.8e+308")],
+)
+def test_lengths_that_no_path_has(refused, mine, tmp_path, number, allowed):
     points = POINTS.astype(object)
     points[:, 1] = [f"{k}e{number.partition('e')[2]}" for k in range(1, 10)]
     points[:, [0, 2]] = 0
     csv(tmp_path, points)
     refused(mine(), "required", changes=spline())
-    refused(mine(), "radius", "10000 m", changes=[f"path.shape=!Circle {{radius: {number}}}"])
+    refused(mine(), "radius", allowed, changes=[f"path.shape=!Circle {{radius: {number}}}"])
 
 
 def test_a_pipe_and_a_device_instead_of_waypoints(refused, mine, tmp_path):
