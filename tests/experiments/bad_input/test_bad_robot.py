@@ -128,7 +128,7 @@ def test_start_outside_the_feasible_neighbourhood(refused, mine):
 
 def test_unreachable_start(refused, mine):
     changes = ["path.shape=!Line {start: [3, 0, 1], end: [3, 1, 1]}", "reference.points=[0, 0.5]"]
-    refused(mine(), "start", "3.0", "unreachable", "joint limits", changes=changes)
+    refused(mine(), "start", "3.0", "unreachable", "the robot reaches", changes=changes)
     # the place is in reach, the orientation is not
     # with the tool pointing away from the robot the place is in reach, but not back towards it
     changes = [
