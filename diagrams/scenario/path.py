@@ -88,7 +88,8 @@ class Waypoints:
             [m]; zero goes through all of them.
         tolerance_deg: The same of the orientation [deg], where ``tolerance`` is given.
         corner_distance: For sparse corners: straight lines from point to point, blended up
-            to this distance from each corner [m], at most over half a line; zero for none.
+            to this distance from each corner [m], 1e-4 or more and at most over half a line;
+            zero for none.
     """
 
     file: str = ""
@@ -108,11 +109,11 @@ class Waypoints:
             ", ".join(allowed),
         )
         require(0 <= self.smoothness <= 6, "smoothness", self.smoothness, "0 to 6")
-        for key in ("tolerance", "corner_distance"):
+        # a blend shorter than any path is no motion, and takes long to be tabulated
+        for key, least in {"tolerance": _SHORTEST_TOLERANCE, "corner_distance": SHORTEST}.items():
             value = getattr(self, key)
-            good = value == 0.0 or _SHORTEST_TOLERANCE <= value <= FARTHEST
-            allowed_lengths = f"0, or {_SHORTEST_TOLERANCE:g} m to {FARTHEST:g} m"
-            require(good, key, value, allowed_lengths)
+            good = value == 0.0 or least <= value <= FARTHEST
+            require(good, key, value, f"0, or {least:g} m to {FARTHEST:g} m")
         both = self.tolerance > 0.0 and self.corner_distance > 0.0
         require(not both, "corner_distance", self.corner_distance, "0 where tolerance is given")
         good = 0.001 <= self.tolerance_deg <= 90.0

@@ -45,7 +45,7 @@ def test_scenarios_are_prepared_or_refused_in_one_line(guarded, examples, base):
     data = full_scenario(*BASES[base])
     assert prepared_or_line(data)
 
-    @examples(10)
+    @examples(6)
     @given(edits(data))
     def check(changes):
         with guarded():
@@ -61,7 +61,7 @@ def test_tables_are_paths_or_refused_in_one_line(guarded, examples, tmp_path, ke
     text = (SCENARIO_DIRECTORY / shape["file"]).read_text(encoding="utf-8")
     shape |= {"file": "points.csv", **keys}
 
-    @examples(12)
+    @examples(8)
     @given(tables(text))
     def check(table):
         (tmp_path / "points.csv").write_bytes(table)

@@ -36,6 +36,7 @@ def test_everything_has_a_default():
         ({"path": {"shape": {"_tag": "!Circle", "axis_v": [1.0, 0.0]}}}, "axis_v"),
         ({"path": {"shape": {"_tag": "!Waypoints", "smoothness": 7}}}, "smoothness"),
         ({"path": {"shape": {"_tag": "!Waypoints", "parametrization": "x"}}}, "parametrization"),
+        ({"path": {"shape": {"_tag": "!Waypoints", "corner_distance": 1e-5}}}, "corner_distance"),
         ({"controller": {"law": "magic"}}, "law"),
         ({"controller": {"gains": {"magic": {}}}}, "gains"),
         (
