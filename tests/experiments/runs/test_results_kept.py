@@ -146,7 +146,7 @@ def test_every_input_of_a_scenario_is_protected(tmp_path, capfd):
             "targets.velocity_servo.max_orientation_error={bound: '< 1'}",
             ("targets.velocity_servo.max_orientation_error: no such metric", "allowed: settling"),
         ),
-        (f"robot.model={'n' * 300}.urdf", ("nnn", "File name too long")),
+        (f"robot.model={'n' * 300}.urdf", ("nnn", "no such file")),
         (f"path.shape=!Waypoints {{file: {'n' * 300}.csv}}", ("File name too long",)),
     ],
 )
