@@ -89,19 +89,19 @@ def test_singularity_on_the_way(fault, tmp_path):
         "elbow singular at eta = ",
         "path.shape=!Line {start: [1.1, 0, 1], end: [2, 0, 1]}",
         "reference={points: [0, 0.4975], velocity: 1, acceleration: 8, dwell: 0}",
-        "controller.min_rcond=0.015",
+        "controller.min_rcond=0.02",
         "start.offset=[0, 0]",
         duration="1.5",
     )
     last_good = np.flatnonzero(log["fault"] == "none")[-1]
     assert set(log["fault"][last_good + 1 :]) == {"singular"}
-    assert log["rcond"][:last_good, 0].min() >= 0.015
+    assert log["rcond"][:last_good, 0].min() >= 0.02
     # until the drives gave out the law was exact: first torques, then geometry
     exact = np.cumsum(log["saturated_drives"][:, 0]) == 0
     assert np.abs(log["xi"][exact]).max() < 1e-3
     assert 0.2 < log["eta"][last_good, 0] < 0.8
     beyond = log["q_J"][:, 2].max() - np.deg2rad(80.0)
-    assert beyond > 0.1
+    assert beyond > 0.05
     assert metrics["joint_limit_margin"]["value"] == pytest.approx(-beyond)
     assert metrics["joint_velocity_share"]["value"] > 1.0
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
