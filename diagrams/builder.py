@@ -10,7 +10,7 @@ from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm, add_arm
-from diagrams.robots.delta import DeltaPart, add_delta, is_delta, load_delta_robot
+from diagrams.robots.delta import DeltaPart, add_delta, is_delta
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
@@ -152,7 +152,6 @@ def draw_station(settings: Scenario, folder: FilePath, station: Station) -> Robo
 
 def build_station_replay(
     settings: Scenario,
-    folder: FilePath,
     station: Station,
     drawing: RobotDrawing | None,
     motion: RecordedMotion,
@@ -162,7 +161,6 @@ def build_station_replay(
 
     Args:
         settings: The scenario that was run.
-        folder: Where its relative file names start.
         station: Its station.
         drawing: What its robot looks like, from :func:`draw_station`.
         motion: What to draw.
@@ -173,7 +171,7 @@ def build_station_replay(
     if station.workpiece is not None:
         look = station.workpiece.look(upwards(station.part.gravity, "notch"))
     if isinstance(station.part, DeltaPart):
-        robot = load_delta_robot(settings.robot, folder)
+        robot = station.part.robot
         return build_delta_replay(robot, station.path, layout, motion, meshcat, period, look)
     assert drawing is not None  # draw_station knows every other robot
     return build_replay(drawing, station.path, layout, motion, meshcat, period, look)

@@ -29,7 +29,6 @@ class PreparedRun:
     Attributes:
         settings: The scenario as resolved.
         text: The same as YAML.
-        folder: Where relative file names in the scenario started.
         station: The station.
         integration: How its plant is integrated.
         drawing: What its robot looks like, if that had to be read.
@@ -38,7 +37,6 @@ class PreparedRun:
 
     settings: Scenario
     text: str
-    folder: Path
     station: Station
     integration: Integration
     drawing: RobotDrawing | None
@@ -79,7 +77,7 @@ def prepare(
     _resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
     text = yaml_dump_typed(settings)
-    return PreparedRun(settings, text, folder, station, integration, drawing, warnings)
+    return PreparedRun(settings, text, station, integration, drawing, warnings)
 
 
 def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:

@@ -204,9 +204,7 @@ def _path_points(prepared: PreparedRun) -> np.ndarray:
 def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
     """Return the recording as a page of its own."""
     meshcat, settings = Meshcat(MeshcatParams(host="localhost")), prepared.settings
-    diagram = build_station_replay(
-        settings, prepared.folder, prepared.station, prepared.drawing, motion, meshcat
-    )
+    diagram = build_station_replay(settings, prepared.station, prepared.drawing, motion, meshcat)
     return record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from diagrams.drawing.replay import RecordedMotion, add_source
-from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
+from diagrams.drawing.replay import RecordedMotion, add_motion
+from diagrams.drawing.workpiece_drawing import look_down_at
 from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
@@ -37,20 +37,14 @@ def build_delta_replay(
         workpiece: What its tool touches, if anything.
     """
     _arrange_scene(path, meshcat)
-    builder = DiagramBuilder()
-    slides = add_source(builder, "positions", motion.times, motion.positions)
-    tool_pose = add_source(builder, "tool_pose", motion.times, motion.tool_pose)
-    path_point = add_source(builder, "path_point", motion.times, motion.path_point)
     if workpiece is not None:
-        add_workpiece_drawing(builder, workpiece, tool_pose, meshcat, period)
         look_down_at(meshcat, np.array([0.0, 0.0, _CLEARANCE]))
+    builder = DiagramBuilder()
+    slides = add_motion(
+        builder, PathVisualizer(path, layout, meshcat, period), motion, workpiece, meshcat, period
+    )
     body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
     builder.Connect(slides, body.GetInputPort("slide_positions"))
-    drawing = builder.AddNamedSystem(
-        "path_visualizer", PathVisualizer(path, layout, meshcat, period)
-    )
-    builder.Connect(tool_pose, drawing.GetInputPort("tool_pose"))
-    builder.Connect(path_point, drawing.GetInputPort("path_point"))
     return builder.Build()
 
 

@@ -64,26 +64,52 @@ def build_replay(
     """
     bodies = _body_origins(robot.plant, motion.positions[0])
     meshcat.SetCameraPose(*camera_and_target(_path_points(path), bodies))
+    if workpiece is not None:
+        look_down_at(meshcat, _path_points(path).mean(axis=0))
     builder = DiagramBuilder()
+    positions = add_motion(
+        builder, PathVisualizer(path, layout, meshcat, period), motion, workpiece, meshcat, period
+    )
+    body = builder.AddNamedSystem(
+        "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
+    )
+    builder.Connect(positions, body.GetInputPort("positions"))
+    return builder.Build()
+
+
+def add_motion(
+    builder: DiagramBuilder,
+    drawing: PathVisualizer,
+    motion: RecordedMotion,
+    workpiece: WorkpieceLook | None,
+    meshcat: Meshcat,
+    period: float,
+) -> OutputPort:
+    """Add what plays a recorded motion and draws all of it but the robot.
+
+    Args:
+        builder: Builder of the diagram.
+        drawing: Draws the path and the tool's trail.
+        motion: What to draw.
+        workpiece: What the tool touches, if anything.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+
+    Returns:
+        The robot's positions, shape (nq,).
+    """
     signals: Mapping[str, np.ndarray] = {
         "positions": motion.positions,
         "tool_pose": motion.tool_pose,
         "path_point": motion.path_point,
     }
     sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
-    body = builder.AddNamedSystem(
-        "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
-    )
-    builder.Connect(sources["positions"], body.GetInputPort("positions"))
-    drawing = builder.AddNamedSystem(
-        "path_visualizer", PathVisualizer(path, layout, meshcat, period)
-    )
+    builder.AddNamedSystem("path_visualizer", drawing)
     builder.Connect(sources["tool_pose"], drawing.GetInputPort("tool_pose"))
     builder.Connect(sources["path_point"], drawing.GetInputPort("path_point"))
     if workpiece is not None:
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
-        look_down_at(meshcat, _path_points(path).mean(axis=0))
-    return builder.Build()
+    return sources["positions"]
 
 
 def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

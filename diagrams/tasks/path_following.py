@@ -39,6 +39,8 @@ class PathTask(Task):
         InputError: If the path or the motion along it cannot be made.
     """
 
+    _law_manifold: type[PathManifold] = PathManifold
+
     def __init__(
         self,
         scenario: Scenario,
@@ -53,7 +55,7 @@ class PathTask(Task):
         self.relative_degree = RELATIVE_DEGREE[law]
         oriented = self.path.orientation is not None
         self.place = PathManifold(self.relative_degree, oriented=oriented)
-        self.manifold: PathManifold = self.place
+        self.manifold = self._law_manifold(self.relative_degree, oriented=oriented)
         self._check_points(reference.points)
         self.motion = rest_to_rest(
             reference.points,
@@ -137,15 +139,7 @@ class PathTask(Task):
 class TrajectoryTask(PathTask):
     """Classical tracking of a point that moves along the path with time (Sec. 3.8.4)."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        folder: FilePath,
-        progress: Progress | None = None,
-    ) -> None:
-        super().__init__(scenario, folder, progress)
-        oriented = self.path.orientation is not None
-        self.manifold = MovingPoint(self.relative_degree, oriented=oriented)
+    _law_manifold = MovingPoint
 
     def add_place(
         self,

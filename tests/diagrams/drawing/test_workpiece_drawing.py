@@ -48,7 +48,7 @@ def replay(settings, meshcat, y_t, R_e):
     station = build_station(settings, SCENARIO_DIRECTORY)
     drawing = draw_station(settings, SCENARIO_DIRECTORY, station)
     motion = resting(station, np.array(y_t), R_e)
-    diagram = build_station_replay(settings, SCENARIO_DIRECTORY, station, drawing, motion, meshcat)
+    diagram = build_station_replay(settings, station, drawing, motion, meshcat)
     Simulator(diagram).AdvanceTo(2 * PERIOD)
     return station, diagram
 
