@@ -56,10 +56,11 @@ def build_station(
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
     require_orientation(task.path, part.robot.dimension)
-    law = make_law(scenario.controller, part.robot, task.manifold)
+    believed = part.belief.robot
+    law = make_law(scenario.controller, believed, task.manifold)
     start, initial_state = _start(scenario, task, part, workpiece)
-    on_motors = scenario.controller.law == "rigid" and not part.robot.is_rigid
-    following = Following(scenario, part.robot, task, law, on_motors)
+    on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
+    following = Following(scenario, believed, task, law, on_motors)
 
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(builder, true_state, part.robot, scenario)
@@ -94,7 +95,7 @@ def build_station(
         + part.start_warnings(
             scenario.start, link_state[: part.robot.dimension], start.R_e is not None
         )
-        + law_warnings(scenario, part.robot, law, link_state)
+        + law_warnings(scenario, believed, law, link_state)
         + sensor_warnings(scenario),
         workpiece,
     )
@@ -116,7 +117,7 @@ def _add_robot(
 ) -> RobotPart:
     if is_delta(scenario.robot.model):
         return add_delta(builder, scenario, folder, workpiece)
-    return add_arm(builder, scenario.robot, folder, workpiece)
+    return add_arm(builder, scenario, folder, workpiece)
 
 
 def _start(

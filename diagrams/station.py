@@ -58,7 +58,7 @@ class Station:
 
     @property
     def robot(self) -> RobotModel:
-        """The robot as the laws know it."""
+        """The robot as it is."""
         return self.part.robot
 
     @property
@@ -123,7 +123,7 @@ class Station:
         """Return a sentence on a fault that is logged in a column of a signal."""
         now, before = first_instant(self.log, root, signal, column)
         place = self.task.place
-        scene = FaultScene(self.law, self.robot, place, self.on_motors, now, before)
+        scene = FaultScene(self.law, self.part.belief.robot, place, self.on_motors, now, before)
         return describe(fault, scene)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:

@@ -122,8 +122,9 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
         settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
     for name, package in settings.robot.packages.items():
         settings.robot.packages[name] = str((folder / package).resolve())
-    shape, model = settings.path.shape, settings.robot.model
+    shape = settings.path.shape
     if isinstance(shape, Waypoints):
         shape.file = str((folder / shape.file).resolve())
-    if Path(model).suffix and not model.startswith("package://"):
-        settings.robot.model = str((folder / model).resolve())
+    for block in (settings.robot, settings.controller):
+        if Path(block.model).suffix and not block.model.startswith("package://"):
+            block.model = str((folder / block.model).resolve())

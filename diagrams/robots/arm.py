@@ -1,16 +1,18 @@
 """A serial arm in a diagram, whichever model moves it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.geometry import GeometryId, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, Joint
+from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
+from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
+from diagrams.robots.belief import Belief
 from diagrams.robots.contact import add_scene, connect_scene
-from diagrams.robots.model import read_robot, tool_frame
+from diagrams.robots.model import tool_frame
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
@@ -21,7 +23,7 @@ from diagrams.robots.plant_wiring import (
     joint_state_of,
 )
 from diagrams.robots.start_posture import posture_near, posture_warnings
-from diagrams.scenario import RobotParameters, StartParameters
+from diagrams.scenario import Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece
 from pfsc_drake.control.compliance.tool_load import ToolLoad
@@ -30,9 +32,8 @@ from pfsc_drake.robot.inverse_kinematics import solve_pose
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
-from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
 from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
@@ -45,18 +46,34 @@ class Arm(RobotPart):
     """A serial arm in a diagram.
 
     Attributes:
-        model: The arm as Drake knows it, finalized; bodies, frames and joints by name.
-        robot: The arm as the laws know it, N joints.
-        coordinates: Where its coordinates stand in the state of ``model``.
-        tool: Frame whose origin follows the manifold.
-        warnings: What there is to say about the model, one sentence each.
+        true: The arm as it is.
+        belief: The arm as whatever controls it believes it to be.
+        believed: The model that the belief starts from, ``true`` unless it is another one.
     """
 
-    model: MultibodyPlant
-    robot: SerialChain
-    coordinates: PlantCoordinates
-    tool: Frame
-    warnings: list[str] = field(default_factory=list, kw_only=True)
+    true: ArmModel
+    belief: Belief
+    believed: ArmModel
+
+    @property
+    def model(self) -> MultibodyPlant:
+        """The arm as Drake knows it, finalized."""
+        return self.true.plant
+
+    @property
+    def robot(self) -> SerialChain:  # type: ignore[override]
+        """The arm as it is, N joints."""
+        return self.true.chain
+
+    @property
+    def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
+        """Where its coordinates stand in the state of ``model``."""
+        return self.true.coordinates
+
+    @property
+    def tool(self) -> Frame:
+        """Frame whose origin follows the manifold."""
+        return self.true.tool
 
     @property
     def gravity(self) -> np.ndarray:
@@ -89,7 +106,7 @@ class Arm(RobotPart):
 
     def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
         """See :class:`RobotPart`."""
-        return self.warnings + posture_warnings(start.posture_deg, self.robot, q_J, oriented)
+        return self.true.warnings + posture_warnings(start.posture_deg, self.robot, q_J, oriented)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""
@@ -99,15 +116,9 @@ class Arm(RobotPart):
             np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
         )
 
-    def _tool_load(self, name: str) -> tuple[Joint, ToolLoad]:
-        """Return the sensor's joint and what is behind it."""
-        if not self.model.HasJointNamed(name):
-            joints = [self.model.get_joint(i).name() for i in self.model.GetJointIndices()]
-            raise InputError(
-                f"sensor.joint: the model has no joint '{name}'; allowed: {', '.join(joints)}"
-            )
-        joint = self.model.GetJointByName(name)
-        return joint, tool_load_from_plant(self.model, joint, self.tool)
+    def _believed_load(self, joint: str) -> ToolLoad:
+        """Return what is believed to be behind a sensor."""
+        return self.belief.tool_load(self.believed.tool_load(joint))
 
 
 @dataclass(frozen=True)
@@ -151,9 +162,11 @@ class MultibodyArm(Arm):
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
-        mount, load = self._tool_load(joint)
         return SensorMount(
-            load, self.model.get_reaction_forces_output_port(), reaction_index(self.model, mount)
+            self.true.tool_load(joint),
+            self._believed_load(joint),
+            self.model.get_reaction_forces_output_port(),
+            reaction_index(self.model, self.true.sensor_joint(joint)),
         )
 
 
@@ -198,15 +211,15 @@ class CoupledArm(Arm):
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
-        _, load = self._tool_load(joint)
+        load = self.true.tool_load(joint)
         acceleration = self.full.GetOutputPort("link_acceleration")
         reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
-        return SensorMount(load, reaction)
+        return SensorMount(load, self._believed_load(joint), reaction)
 
 
 def add_arm(
     builder: DiagramBuilder,
-    parameters: RobotParameters,
+    scenario: Scenario,
     folder: FilePath,
     workpiece: Workpiece | None = None,
 ) -> Arm:
@@ -214,45 +227,44 @@ def add_arm(
 
     Args:
         builder: Builder of the diagram.
-        parameters: Which robot.
+        scenario: The scenario.
         folder: Where relative file names start.
         workpiece: What its tool may touch, if anything.
 
     Raises:
-        InputError: If the model cannot be read, is no chain of joints, or its rotors are
-            not known.
+        InputError: If the model cannot be read, is no chain of joints, its rotors are not known,
+            or what is to be believed of it makes no arm.
     """
-    if parameters.rotor_coupling:
-        return _add_coupled_arm(builder, parameters, folder, workpiece)
-    if workpiece is None:
-        model, warnings = read_robot(parameters, folder)
-        builder.AddNamedSystem("plant", model)
-        return MultibodyArm(model, *_chain(model, parameters), warnings=warnings)
-    return _add_touching_arm(builder, parameters, folder, workpiece)
+    if scenario.robot.rotor_coupling:
+        return _add_coupled_arm(builder, scenario, folder, workpiece)
+    if workpiece is not None:
+        return _add_touching_arm(builder, scenario, folder, workpiece)
+    true = read_arm(scenario.robot, folder)
+    builder.AddNamedSystem("plant", true.plant)
+    return MultibodyArm(true, *believe_arm(true, scenario, folder))
 
 
 def _add_coupled_arm(
     builder: DiagramBuilder,
-    parameters: RobotParameters,
+    scenario: Scenario,
     folder: FilePath,
     workpiece: Workpiece | None,
 ) -> CoupledArm:
-    coupled = parameters.rotor_coupling
+    coupled = scenario.robot.rotor_coupling
     allowed = "empty where the robot touches a workpiece; the full model has no contact"
     require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
-    model, warnings = read_robot(parameters, folder)
-    chain, coordinates, tool = _chain(model, parameters)
+    true = read_arm(scenario.robot, folder)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
-        plant = FullElasticPlant(chain, mounts_from_parameters(chain, robot))
+        plant = FullElasticPlant(true.chain, mounts_from_parameters(true.chain, robot))
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(model, chain, coordinates, tool, plant, warnings=warnings)
+    return CoupledArm(true, *believe_arm(true, scenario, folder), plant)
 
 
 def _add_touching_arm(
-    builder: DiagramBuilder, parameters: RobotParameters, folder: FilePath, workpiece: Workpiece
+    builder: DiagramBuilder, scenario: Scenario, folder: FilePath, workpiece: Workpiece
 ) -> MultibodyArm:
     """Add a discrete plant; of the robot only what touches the workpiece has geometry in it."""
     allowed = "0 on a robot that turns its tool: the ball sits at the tool point"
@@ -262,18 +274,9 @@ def _add_touching_arm(
 
     def add_workpiece(plant: MultibodyPlant) -> None:
         scene_graph.append(add_scene(builder, plant))
-        geometries.extend(workpiece.add(plant, tool_frame(plant, parameters)))
+        geometries.extend(workpiece.add(plant, tool_frame(plant, scenario.robot)))
 
-    model, warnings = read_robot(parameters, folder, workpiece.time_step, add_workpiece)
-    builder.AddNamedSystem("plant", model)
-    contact = connect_scene(builder, model, scene_graph[0], geometries)
-    return MultibodyArm(model, *_chain(model, parameters), contact, warnings=warnings)
-
-
-def _chain(
-    model: MultibodyPlant, parameters: RobotParameters
-) -> tuple[SerialChain, PlantCoordinates, Frame]:
-    """Return the arm as the laws know it."""
-    tool = tool_frame(model, parameters)
-    chain, coordinates = chain_from_plant(model, tool)
-    return chain, coordinates, tool
+    true = read_arm(scenario.robot, folder, workpiece.time_step, add_workpiece)
+    builder.AddNamedSystem("plant", true.plant)
+    contact = connect_scene(builder, true.plant, scene_graph[0], geometries)
+    return MultibodyArm(true, *believe_arm(true, scenario, folder), contact)

@@ -10,6 +10,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody, SpatialIn
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
+from diagrams.robots.belief import Belief, naming_model_error
 from diagrams.robots.contact import add_scene, connect_scene
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
@@ -24,6 +25,7 @@ from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.robot.delta.believed_delta import believed_delta
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.multibody import (
     DeltaModel,
@@ -48,10 +50,12 @@ class DeltaPart(RobotPart):
     Everything is in the axes of the inertial frame (z_0 down).
 
     Attributes:
-        robot: The robot as the laws know it.
+        robot: The robot as it is.
+        belief: The robot as whatever controls it believes it to be.
     """
 
     robot: DeltaRobot
+    belief: Belief
 
     @property
     def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
@@ -132,7 +136,7 @@ class FreeDelta(DeltaPart):
         load = ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
         acceleration = self.analytic.GetOutputPort("acceleration")
         reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
-        return SensorMount(load, reaction)
+        return SensorMount(load, self.belief.tool_load(load), reaction)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
@@ -199,7 +203,10 @@ class TouchingDelta(DeltaPart):
         mount = plant.GetJointByName(joint)
         load = tool_load_from_plant(plant, mount, self.tool)
         return SensorMount(
-            load, plant.get_reaction_forces_output_port(), reaction_index(plant, mount)
+            load,
+            self.belief.tool_load(load),
+            plant.get_reaction_forces_output_port(),
+            reaction_index(plant, mount),
         )
 
     def place(self, context: Context, state: np.ndarray) -> None:
@@ -217,17 +224,16 @@ def is_delta(model: str) -> bool:
     return model in SHIPPED_ROBOTS or FilePath(model).suffix in (".yaml", ".yml")
 
 
-def load_delta_robot(parameters: RobotParameters, folder: FilePath) -> DeltaRobot:
-    """Return the DELTA robot of a scenario.
+def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
+    """Return a DELTA robot.
 
     Args:
-        parameters: Which robot.
+        model: Name of a shipped one, or file of parameters.
         folder: Where relative file names start.
 
     Raises:
         InputError: If its parameters cannot be read.
     """
-    model = parameters.model
     return DeltaRobot(load_delta_parameters(folder / model if FilePath(model).suffix else model))
 
 
@@ -249,9 +255,10 @@ def add_delta(
         InputError: If the scenario asks for something that a DELTA robot does not have.
     """
     _check(scenario)
-    robot = load_delta_robot(scenario.robot, folder)
+    robot = load_delta_robot(scenario.robot.model, folder)
+    belief = _believe(robot, scenario, folder)
     if workpiece is None:
-        return FreeDelta(robot, builder.AddNamedSystem("plant", DeltaPlant(robot)))
+        return FreeDelta(robot, belief, builder.AddNamedSystem("plant", DeltaPlant(robot)))
     plant = builder.AddNamedSystem("plant", MultibodyPlant(workpiece.time_step))
     scene_graph = add_scene(builder, plant)
     model = add_delta_plant(plant, robot.parameters, with_load=False)
@@ -259,7 +266,21 @@ def add_delta(
     geometries = workpiece.add(plant, tool)
     plant.Finalize()
     contact = connect_scene(builder, plant, scene_graph, geometries)
-    return TouchingDelta(robot, plant, model, tool, contact)
+    return TouchingDelta(robot, belief, plant, model, tool, contact)
+
+
+def _believe(robot: DeltaRobot, scenario: Scenario, folder: FilePath) -> Belief:
+    """Return what the controller believes of a robot."""
+    source, model = robot, scenario.controller.model
+    if model:
+        allowed = f"parameters of a DELTA robot: a YAML file, {', '.join(SHIPPED_ROBOTS)}"
+        require(is_delta(model), "controller.model", model, allowed)
+        source = load_delta_robot(model, folder)
+    with naming_model_error():
+        error = scenario.model_error.error(robot.gather("is_revolute"))
+        believed = believed_delta(source, error) if scenario.model_error.is_given else source
+    same = believed.parameters.geometry == robot.parameters.geometry
+    return Belief(believed, error, sees_truth=same)
 
 
 def _check(scenario: Scenario) -> None:

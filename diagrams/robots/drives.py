@@ -49,7 +49,7 @@ def add_drives(
         InputError: If the servos do not suit the robot or the controller.
     """
     period, torque = scenario.controller.sampling_time, ports["drive"]
-    chain, signals = part.robot, {}
+    chain, signals = part.belief.robot, {}
     if scenario.controller.law == "velocity_servo":
         q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
         servo, period = _add_servo(builder, chain, scenario, ports, q_J)

@@ -39,8 +39,8 @@ def add_sensor(
     compensation = builder.AddNamedSystem(
         "tool_compensation",
         ToolCompensation(
-            part.robot,
-            mount.load,
+            part.belief.robot,
+            mount.believed_load,
             parameters.measurement_range,
             parameters.compensation(),
             period,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
+from diagrams.robots.belief import Belief
 from diagrams.scenario import StartParameters
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.robot_model import RobotModel
@@ -39,12 +40,14 @@ class SensorMount:
 
     Attributes:
         load: Everything behind the sensor.
+        believed_load: The same as the controller believes it to be.
         reaction: Reaction ``[torque, force]`` on the tool, shape (6,), or abstract, all
             reactions of a plant.
         index: Of the sensor's joint in the plant's reactions, or None.
     """
 
     load: ToolLoad
+    believed_load: ToolLoad
     reaction: OutputPort
     index: int | None = None
 
@@ -53,12 +56,14 @@ class RobotPart(ABC):
     """A robot in a diagram: where its signals come from and where they go.
 
     Attributes:
-        robot: The robot as the laws know it, N joints.
+        robot: The robot as it is, N joints.
+        belief: The robot as whatever controls it believes it to be.
         coordinates: Where its coordinates stand in the state ``[q, v]`` of its model.
         contact: What the surroundings do to its tool, if it can touch them.
     """
 
     robot: RobotModel
+    belief: Belief
     coordinates: PlantCoordinates
     contact: ContactWrench | None = None
 

@@ -4,6 +4,7 @@ from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.controller import ControllerParameters, GainParameters, LawGains
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
 from diagrams.scenario.forces import HoldBackParameters
+from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import (
     BentLemniscate,
@@ -36,8 +37,10 @@ __all__ = [
     "Keyframe",
     "LawGains",
     "Line",
+    "ModelErrorParameters",
     "OrientationParameters",
     "PathParameters",
+    "RandomModelError",
     "ReferenceParameters",
     "RobotParameters",
     "Scenario",

@@ -84,6 +84,8 @@ class ControllerParameters:
         manifold: ``path``: path following; ``trajectory``: classical tracking of a point
             that moves along the path with time, for comparison.
         external_torque: What it knows of forces on the tool.
+        model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
+            robot parameters; empty for the plant's own. ``model_error`` comes on top.
     """
 
     law: str = "elastic"
@@ -96,6 +98,7 @@ class ControllerParameters:
     effort_scale: float = 1.0
     manifold: str = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
+    model: str = ""
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))

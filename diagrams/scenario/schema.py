@@ -14,6 +14,7 @@ from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.controller import ControllerParameters
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
 from diagrams.scenario.forces import HoldBackParameters
+from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.notch import NotchParameters
 from diagrams.scenario.path import PathParameters
@@ -49,6 +50,7 @@ class Scenario:
         robot: Which robot.
         path: Which path.
         controller: The controller.
+        model_error: What the controller believes wrongly of the robot.
         reference: Motion along the path.
         start: Where it starts.
         simulation: How it is integrated.
@@ -76,6 +78,7 @@ class Scenario:
     robot: RobotParameters = dc.field(default_factory=RobotParameters)
     path: PathParameters = dc.field(default_factory=PathParameters)
     controller: ControllerParameters = dc.field(default_factory=ControllerParameters)
+    model_error: ModelErrorParameters = dc.field(default_factory=ModelErrorParameters)
     reference: ReferenceParameters = dc.field(default_factory=ReferenceParameters)
     start: StartParameters = dc.field(default_factory=StartParameters)
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)

@@ -22,7 +22,7 @@ class Following:
 
     Attributes:
         scenario: The scenario.
-        robot: The robot.
+        robot: The robot as it is believed to be.
         task: What it is to do.
         law: The law.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.

@@ -8,14 +8,23 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.robots.arm import MultibodyArm
+from diagrams.robots.arm_model import ArmModel
+from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
 from diagrams.tasks.path_following import make_task
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.model_error import ModelError
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 LINE = Line([0.8, -0.1, 1.0], [0.8, 0.3, 1.0])
+
+
+def _part(arm):
+    true = ArmModel(arm.plant, arm.chain, arm.coordinates, arm.tool, [])
+    belief = Belief(arm.chain, ModelError.none(arm.chain.dimension))
+    return MultibodyArm(true, belief, true)
 
 
 @pytest.fixture
@@ -26,7 +35,7 @@ def start(load_arm):
         arm = load_arm(settings.robot.model)
         task = make_task(settings, None)
         begin = task.start(np.zeros(3))
-        part = MultibodyArm(arm.plant, arm.chain, arm.coordinates, arm.tool)
+        part = _part(arm)
         x = part.state_at_rest(part.posture(begin.y_t, begin.R_e, settings.start))
         arm.set_state(x)
         return task.path, begin.theta, arm, x
@@ -312,7 +321,7 @@ def test_a_closed_path_is_looked_at_once_however_many_rounds_there_are(load_scen
 
 def test_what_is_beyond_reach_is_refused(load_arm):
     arm = load_arm("comau_racer_1_4_3r")
-    part = MultibodyArm(arm.plant, arm.chain, arm.coordinates, arm.tool)
+    part = _part(arm)
     base, reach = arm.chain.links[0].p_PF, arm.chain.reach * np.array([1.0, 0.0, 0.0])
     part.check_reach(base + 0.999 * reach, "here")
     with pytest.raises(InputError, match=r"^here: .* unreachable, .* robot reaches"):

@@ -1,0 +1,176 @@
+"""A serial arm as read from a model, true or believed."""
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, Joint
+
+from diagrams.robots.belief import Belief, naming_model_error
+from diagrams.robots.model import read_robot, tool_frame
+from diagrams.scenario import RobotParameters, Scenario
+from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
+from pfsc_drake.robot.models.writer import write_sdf
+from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
+from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """A serial arm as read from a model.
+
+    Attributes:
+        plant: The arm as Drake knows it, finalized; bodies, frames and joints by name.
+        chain: The same as data, N joints.
+        coordinates: Where its coordinates stand in the state of ``plant``.
+        tool: Frame whose origin follows the manifold.
+        warnings: What there is to say about the model, one sentence each.
+    """
+
+    plant: MultibodyPlant
+    chain: SerialChain
+    coordinates: PlantCoordinates
+    tool: Frame
+    warnings: list[str]
+
+    def sensor_joint(self, name: str) -> Joint:
+        """Return the joint with the force/torque sensor in it.
+
+        Args:
+            name: Its name.
+
+        Raises:
+            InputError: If there is none of that name.
+        """
+        if not self.plant.HasJointNamed(name):
+            joints = [self.plant.get_joint(i).name() for i in self.plant.GetJointIndices()]
+            raise InputError(
+                f"sensor.joint: the model has no joint '{name}'; allowed: {', '.join(joints)}"
+            )
+        return self.plant.GetJointByName(name)
+
+    def tool_load(self, joint: str) -> ToolLoad:
+        """Return everything behind a sensor.
+
+        Args:
+            joint: Name of the joint with the sensor in it.
+
+        Raises:
+            InputError: If there is no such joint, or no tool behind it.
+        """
+        return tool_load_from_plant(self.plant, self.sensor_joint(joint), self.tool)
+
+    def tool_mass(self) -> ToolMass:
+        """Return what the body of the tool frame weighs, of a body beside the last link's own."""
+        body, link = self.tool.body(), self._last_link_frame()
+        context = self.plant.CreateDefaultContext()
+        if body.index() == link.body().index():
+            return ToolMass(0.0, self.chain.p_LT)
+        center = body.CalcCenterOfMassInBodyFrame(context)
+        X_LB = self.plant.CalcRelativeTransform(context, link, body.body_frame())
+        return ToolMass(body.get_mass(context), X_LB @ center)
+
+    def _last_link_frame(self) -> Frame:
+        body = self.tool.body()
+        fixed = {b.index() for b in self.plant.GetBodiesWeldedTo(body)}
+        joints = (self.plant.get_joint(i) for i in self.plant.GetJointIndices())
+        return next(
+            joint.frame_on_child()
+            for joint in joints
+            if joint.num_velocities() > 0 and joint.child_body().index() in fixed
+        )
+
+
+def read_arm(
+    parameters: RobotParameters,
+    folder: FilePath,
+    time_step: float = 0.0,
+    before_finalizing: Callable[[MultibodyPlant], None] | None = None,
+) -> ArmModel:
+    """Read a serial arm.
+
+    Args:
+        parameters: Which robot.
+        folder: Where relative file names start.
+        time_step: Of the plant [s]; 0 for a continuous one.
+        before_finalizing: What else is to be added to the plant.
+
+    Raises:
+        InputError: If the model cannot be read, or is no chain of joints.
+    """
+    plant, warnings = read_robot(parameters, folder, time_step, before_finalizing)
+    tool = tool_frame(plant, parameters)
+    return ArmModel(plant, *chain_from_plant(plant, tool), tool, warnings)
+
+
+def believe_arm(true: ArmModel, scenario: Scenario, folder: FilePath) -> tuple[Belief, ArmModel]:
+    """Return what the controller believes of an arm, and the model that this starts from.
+
+    Args:
+        true: The arm of the plant.
+        scenario: The scenario.
+        folder: Where its relative file names start.
+
+    Raises:
+        InputError: If what is to be believed cannot be read or suits no such arm.
+    """
+    source = _source(true, scenario, folder)
+    with naming_model_error():
+        error = scenario.model_error.error(true.chain.gather("is_revolute"))
+        believed = source.chain
+        if scenario.model_error.is_given:
+            believed = believed_chain(source.chain, error, source.tool_mass())
+    sees_truth = source is true and not error.moves_tool
+    return Belief(believed, error, sees_truth), source
+
+
+def _source(true: ArmModel, scenario: Scenario, folder: FilePath) -> ArmModel:
+    model, key = scenario.controller.model, "controller.model"
+    if not model:
+        return true
+    try:
+        if FilePath(model).suffix in (".yaml", ".yml"):
+            source = _from_parameters(folder / model, true, scenario, folder)
+        else:
+            source = read_arm(replace(scenario.robot, model=model), folder)
+    except InputError as error:
+        message = str(error).removeprefix("robot.model: ")
+        raise InputError(f"{key}: {message}") from None
+    kinds, own = source.chain.gather("kind").tolist(), true.chain.gather("kind").tolist()
+    if kinds != own:
+        raise InputError(
+            f"{key} = {model}: has the joints {', '.join(kinds)}; allowed: the robot's, "
+            f"{', '.join(own)}"
+        )
+    return source
+
+
+def _from_parameters(
+    file: FilePath, true: ArmModel, scenario: Scenario, folder: FilePath
+) -> ArmModel:
+    """Read the variant of a parameter file that has joints like the plant's."""
+    robot, elastic = load_parameters(file), not true.chain.is_rigid
+    axes = len(robot.links)
+    for variant in robot.variants:
+        if (axes - variant.fixed_deg.size, bool(variant.elasticity)) == (
+            true.chain.dimension,
+            elastic,
+        ):
+            break
+    else:
+        if true.chain.dimension != axes or elastic:
+            raise InputError(
+                f"{file}: none of its variants has {true.chain.dimension} "
+                f"{'elastic' if elastic else 'rigid'} joints; allowed: parameters with one"
+            )
+        variant = VariantParameters(name=robot.name)
+    with tempfile.TemporaryDirectory() as scratch:
+        model = FilePath(scratch) / f"{variant.name}.sdf"
+        model.write_text(write_sdf(robot, variant), encoding="utf-8")
+        return read_arm(replace(scenario.robot, model=str(model)), folder)

@@ -1,0 +1,64 @@
+"""What the controller believes of a robot, apart from what is true of it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.model_error import ModelError
+from pfsc_drake.robot.robot_model import RobotModel
+
+
+@dataclass(frozen=True)
+class Belief:
+    """A robot as whatever controls it believes it to be.
+
+    Attributes:
+        robot: Its model, N joints.
+        error: By how much that is off its own source, the plant or another model.
+        sees_truth: Whether the tool is where the measured joints let one believe it to be.
+    """
+
+    robot: RobotModel
+    error: ModelError
+    sees_truth: bool = True
+
+    @property
+    def friction(self) -> np.ndarray:
+        """Coulomb and viscous friction in units of the true ones, shape (2, N)."""
+        return self.error.friction
+
+    def tool_load(self, load: ToolLoad) -> ToolLoad:
+        """Return what is believed to be behind a force/torque sensor.
+
+        Args:
+            load: The load without error.
+
+        Raises:
+            InputError: If nothing would be left of it.
+        """
+        error = self.error
+        mass = load.mass * error.mass[-1] + error.tool_mass
+        if not mass > 0.0:
+            raise InputError(
+                f"model_error.tool_mass = {error.tool_mass:g} kg; allowed: more than "
+                f"{-load.mass * error.mass[-1]:g} kg, what the sensor carries"
+            )
+        return replace(
+            load,
+            mass=mass,
+            p_SC=load.p_SC + load.R_ST @ error.tool_center,
+            I_C=load.I_C * error.mass[-1] * error.inertia[-1],
+        )
+
+
+@contextmanager
+def naming_model_error() -> Iterator[None]:
+    """Name the block of the scenario in what is said against an error."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"model_error.{error}") from None

@@ -1,0 +1,166 @@
+"""What the controller of a scenario believes wrongly of the robot."""
+
+import dataclasses as dc
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagrams.scenario.checks import require, require_not_negative, require_numbers
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.model_error import ModelError
+from pfsc_drake.yaml.typed import ONE_OR_MANY
+
+_FACTORS = ("mass", "inertia", "rotor_inertia", "stiffness", "friction", "link_length")
+_LEAST, _MOST = 1e-3, 1e3
+_LARGEST_OFFSET_DEG, _FARTHEST = 90.0, 10.0  # deg, m
+
+
+def _one() -> list[float]:
+    return [1.0]
+
+
+@dc.dataclass
+class RandomModelError:
+    """Standard deviations of errors that are drawn for every link anew; none by default.
+
+    Attributes:
+        seed: Another one draws other errors; the draws of a kind depend on nothing else.
+        mass: Relative.
+        inertia: Relative.
+        center: Of each link's centre of mass along every axis [m].
+        rotor_inertia: Relative.
+        stiffness: Relative.
+        friction: Relative, Coulomb and viscous apart.
+        link_length: Relative.
+        joint_offset_deg: [deg].
+        tool_mass: [kg].
+    """
+
+    seed: int = 0
+    mass: float = 0.0
+    inertia: float = 0.0
+    center: float = 0.0
+    rotor_inertia: float = 0.0
+    stiffness: float = 0.0
+    friction: float = 0.0
+    link_length: float = 0.0
+    joint_offset_deg: float = 0.0
+    tool_mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
+        for key in self._kinds():
+            require_not_negative(key, getattr(self, key))
+
+    @classmethod
+    def _kinds(cls) -> list[str]:
+        return [f.name for f in dc.fields(cls) if f.name != "seed"]
+
+    def draw(self, kind: str, shape: Sequence[int] | int) -> np.ndarray:
+        """Return errors of a kind.
+
+        Args:
+            kind: Name of an attribute.
+            shape: How many.
+        """
+        generator = np.random.default_rng([self.seed, self._kinds().index(kind)])
+        return getattr(self, kind) * generator.standard_normal(shape)
+
+
+@dc.dataclass
+class ModelErrorParameters:
+    """What the controller believes of the robot, beside what is true of the plant.
+
+    Factors are what is believed in units of what is true: 0.95 is 5 % too low. They are one
+    number for all links, or a list, base first; of a DELTA robot slides, rods and end-effector
+    are the links, with ``l_A``, ``l_BC`` and ``l_EC`` their lengths.
+
+    Attributes:
+        mass: Factor of mass and inertia of each link.
+        inertia: Further factor of its inertia about the centre of mass.
+        rotor_inertia: Factor of the rotor inertias.
+        stiffness: Factor of the joint stiffnesses.
+        friction: Factor of the drives' friction, Coulomb and viscous.
+        link_length: Factor of the distance to the next joint, the last to the tool point.
+        joint_offset_deg: What is believed of each joint's zero, minus the truth [deg; m for
+            slides].
+        tool_mass: Added to the tool [kg].
+        tool_center: Error of the tool's centre of mass, axes of the tool frame [m].
+        random: Random errors in addition.
+    """
+
+    mass: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    inertia: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    rotor_inertia: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    stiffness: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    friction: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    link_length: list[float] = dc.field(default_factory=_one, metadata=ONE_OR_MANY)
+    joint_offset_deg: list[float] = dc.field(default_factory=lambda: [0.0], metadata=ONE_OR_MANY)
+    tool_mass: float = 0.0
+    tool_center: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    random: RandomModelError = dc.field(default_factory=RandomModelError)
+
+    def __post_init__(self) -> None:
+        for key in _FACTORS:
+            values = getattr(self, key)
+            good = len(values) > 0 and all(_LEAST <= value <= _MOST for value in values)
+            allowed = f"factors from {_LEAST:g} to {_MOST:g}, one or one per link"
+            require(good, key, values, allowed)
+        offsets = self.joint_offset_deg
+        good = len(offsets) > 0 and all(abs(value) <= _LARGEST_OFFSET_DEG for value in offsets)
+        allowed = f"numbers of at most {_LARGEST_OFFSET_DEG:g} deg, one or one per joint"
+        require(good, "joint_offset_deg", offsets, allowed)
+        require(bool(np.isfinite(self.tool_mass)), "tool_mass", self.tool_mass, "a finite number")
+        require_numbers("tool_center", self.tool_center, 3)
+        near = all(abs(value) <= _FARTHEST for value in self.tool_center)
+        require(near, "tool_center", self.tool_center, f"up to {_FARTHEST:g} m")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether anything is believed wrongly."""
+        return self != ModelErrorParameters(random=RandomModelError(seed=self.random.seed))
+
+    def error(self, is_revolute: np.ndarray) -> ModelError:
+        """Return the error, random parts drawn.
+
+        Args:
+            is_revolute: Whether each of the robot's N joints turns, shape (N,).
+
+        Raises:
+            InputError: If there are more or fewer links, or a draw leaves no positive number.
+        """
+        n, random = len(is_revolute), self.random
+        unit = np.where(is_revolute, np.pi / 180.0, 1.0)
+        offset = self._per_link("joint_offset_deg", n) + random.draw("joint_offset_deg", n)
+        return ModelError(
+            mass=self._factor("mass", n),
+            inertia=self._factor("inertia", n),
+            center=random.draw("center", (n, 3)),
+            rotor_inertia=self._factor("rotor_inertia", n),
+            stiffness=self._factor("stiffness", n),
+            friction=self._factor("friction", n, rows=2),
+            link_length=self._factor("link_length", n),
+            joint_offset=unit * offset,
+            tool_mass=self.tool_mass + float(random.draw("tool_mass", 1)[0]),
+            tool_center=np.array(self.tool_center, dtype=float),
+        )
+
+    def _per_link(self, key: str, n: int) -> np.ndarray:
+        values = getattr(self, key)
+        if len(values) not in (1, n):
+            raise InputError(
+                f"model_error.{key}: {len(values)} values; allowed: one, or one for each of the "
+                f"robot's {n} links"
+            )
+        return np.broadcast_to(np.array(values, dtype=float), n)
+
+    def _factor(self, key: str, n: int, rows: int | None = None) -> np.ndarray:
+        given = self._per_link(key, n)
+        factor = given * (1.0 + self.random.draw(key, n if rows is None else (rows, n)))
+        if not np.all(factor >= _LEAST):
+            raise InputError(
+                f"model_error.random.{key} = {getattr(self.random, key):g}: with seed "
+                f"{self.random.seed} it draws a factor of {factor.min():.3g}; allowed: deviations "
+                f"that leave {_LEAST:g} or more"
+            )
+        return factor
