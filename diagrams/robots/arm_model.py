@@ -121,10 +121,9 @@ def believe_arm(true: ArmModel, scenario: Scenario, folder: FilePath) -> tuple[B
         InputError: If what is to be believed cannot be read or suits no such arm.
     """
     source = _source(true, scenario, folder)
-    with naming_model_error():
-        error = scenario.model_error.error(true.chain.gather("is_revolute"))
-        believed = source.chain
-        if scenario.model_error.is_given:
+    error, believed = scenario.model_error.error(true.chain.gather("is_revolute")), source.chain
+    if scenario.model_error.is_given:
+        with naming_model_error():
             believed = believed_chain(source.chain, error, source.tool_mass())
     sees_truth = source is true and not error.moves_tool
     return Belief(believed, error, sees_truth), source

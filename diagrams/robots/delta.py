@@ -276,9 +276,10 @@ def _believe(robot: DeltaRobot, scenario: Scenario, folder: FilePath) -> Belief:
         allowed = f"parameters of a DELTA robot: a YAML file, {', '.join(SHIPPED_ROBOTS)}"
         require(is_delta(model), "controller.model", model, allowed)
         source = load_delta_robot(model, folder)
-    with naming_model_error():
-        error = scenario.model_error.error(robot.gather("is_revolute"))
-        believed = believed_delta(source, error) if scenario.model_error.is_given else source
+    error, believed = scenario.model_error.error(robot.gather("is_revolute")), source
+    if scenario.model_error.is_given:
+        with naming_model_error():
+            believed = believed_delta(source, error)
     same = believed.parameters.geometry == robot.parameters.geometry
     return Belief(believed, error, sees_truth=same)
 
