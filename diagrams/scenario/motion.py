@@ -17,6 +17,7 @@ _ACCELERATIONS = (1e-6, 1e6)  # m/s^2
 _FARTHEST = 1e6  # m, many rounds of a closed path
 _LONGEST_REST = 1e6  # s
 _SHORTEST_REST = 1e-6  # s
+_TRANSITIONS = (1e-3, 1e3)  # s
 
 
 @dc.dataclass
@@ -58,14 +59,21 @@ class StartParameters:
         rotation_deg: ZYX angles [deg] away from the path's orientation.
         posture_deg: Joint angles [deg] near the start pose (m for prismatic joints); they
             choose the branch of the inverse kinematics.
+        transition: Time in which the reference goes over from where the tool is to the path, so
+            that a start beside the path asks for no jump of the drives, 0 or 1e-3 to 1e3 [s];
+            0 for a reference that is on the path from the start.
     """
 
     offset: list[float] = dc.field(default_factory=lambda: [0.0, 0.0])
     rotation_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     posture_deg: list[float] = dc.field(default_factory=list)
+    transition: float = 0.0
 
     def __post_init__(self) -> None:
         require_numbers("offset", self.offset, 2)
+        good = self.transition == 0.0 or _TRANSITIONS[0] <= self.transition <= _TRANSITIONS[1]
+        allowed = f"zero or a positive number, {_TRANSITIONS[0]:g} to {_TRANSITIONS[1]:g} s"
+        require(good, "transition", self.transition, allowed)
         require_numbers("rotation_deg", self.rotation_deg, 3)
         allowed = f"numbers of at most {LARGEST_ANGLE:g} deg"
         for key in ("rotation_deg", "posture_deg"):

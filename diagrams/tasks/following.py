@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.task import Task
@@ -13,6 +14,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
+from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 
@@ -109,10 +111,11 @@ def add_law(
     controller = builder.AddNamedSystem(
         "following_controller", FollowingController(law, scenario.controller.sampling_time)
     )
-    made = {"reference": place.desired_reference, "law": controller.GetOutputPort("law")}
+    desired = _add_smooth_start(builder, following, controller, place.desired_reference)
+    made = {"reference": desired, "law": controller.GetOutputPort("law")}
     if scenario.compliance.is_given:
         inputs = signals | {
-            "desired_reference": place.desired_reference,
+            "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
         made |= add_compliance(builder, scenario, law.linearization, inputs)
@@ -122,3 +125,31 @@ def add_law(
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))
     return controller, made
+
+
+def _add_smooth_start(
+    builder: DiagramBuilder,
+    following: Following,
+    controller: FollowingController,
+    desired: OutputPort,
+) -> OutputPort:
+    """Return the reference, which starts where the tool is if it is to."""
+    duration, linearization = following.scenario.start.transition, following.law.linearization
+    if duration == 0.0:
+        return desired
+    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
+    require(not linearization.manifold.follows_time, "start.transition", duration, allowed)
+    start = builder.AddNamedSystem(
+        "smooth_start",
+        SmoothStart(
+            duration,
+            reference_order(following.scenario, linearization),
+            linearization.num_outputs,
+            controller.GetOutputPort("manifold_state").size(),
+        ),
+    )
+    builder.Connect(desired, start.GetInputPort("desired_reference"))
+    builder.Connect(
+        controller.GetOutputPort("manifold_state"), start.GetInputPort("manifold_state")
+    )
+    return start.GetOutputPort("reference")
