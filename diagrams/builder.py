@@ -65,7 +65,9 @@ def build_station(
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(builder, true_state, part.robot, scenario)
     place = add_place(builder, following, joint_state)
-    around = place.signals | {"joint_state": true_state}
+    # what acts on the tool acts where the tool is, also if a law follows another point
+    beside = place.projector.GetOutputPort("manifold_point")
+    around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     forces = add_surroundings(builder, part, task, scenario, around)
     if needs_sensor(scenario):
         states = {"joint_state": joint_state, "true_joint_state": true_state}

@@ -43,7 +43,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     deceived = measured is not None or not station.part.belief.sees_truth
     if linearization.manifold.follows_time or station.on_motors or deceived:
         if linearization.manifold.follows_time:
-            log.add("tracking_error", Y[:, 0, :3], "m", ["x", "y", "z"])
+            log.add("tracking_error", Y[:, 0, :3], "m", ["along", "normal_1", "normal_2"])
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose, linearization.relative_degree)

@@ -35,7 +35,8 @@ class Transition:
         # column k holds the k-th derivative's coefficients, in real time
         self._coefficients = np.zeros((rest.coef.size, order + 1))
         for k, coefficients in enumerate(derivatives):
-            self._coefficients[: coefficients.size, k] = coefficients / duration**k
+            self._coefficients[: coefficients.size, k] = coefficients
+        self._coefficients /= duration ** np.arange(order + 1)
         self._powers = np.arange(rest.coef.size)
 
     def at(self, time: float) -> np.ndarray:

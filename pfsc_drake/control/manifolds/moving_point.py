@@ -3,8 +3,13 @@
 import casadi as ca
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, orientation_error
-from pfsc_drake.control.manifolds.path_force import rotational_force
+from pfsc_drake.control.manifolds.path import (
+    PathGeometry,
+    PathManifold,
+    orientation_error,
+    transported,
+)
+from pfsc_drake.control.manifolds.path_force import force_components, rotational_force
 from pfsc_drake.jets import Jet
 
 
@@ -12,7 +17,9 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     """Return the errors ``y_t - sigma_t(theta_d(t))`` and the ZYX angles of ``R_d' R_e``.
 
     The classical counterpart of the path coordinates (Sec. 3.8.4): the reference point
-    is given by time, ``theta_d' = eta_d' / |sigma'|``, whatever the tool does.
+    is given by time, ``theta_d' = eta_d' / |sigma'|``, whatever the tool does. The errors are
+    told in the parallel transport frame of that point, so that they have the gains of the
+    path coordinates whose names they share.
 
     Args:
         y: Tool point ``y_t`` [m], vector jet of order r >= 1.
@@ -21,7 +28,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
         eta_d: Arc length of the reference point over time [m], scalar jet of order r.
 
     Returns:
-        3 or 6 scalar jets of order r [m, m, m, rad, rad, rad], world axes.
+        3 or 6 scalar jets of order r [m, m, m, rad, rad, rad]: along the tangent and the two
+        normals of the reference point, and angles.
     """
 
     def rate(theta: Jet) -> Jet:
@@ -30,7 +38,11 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
 
     theta_d = jets.solve_ode(rate, ca.SX(0), y.order)
     error = y - jets.compose(path.position, theta_d)
-    position = [error[i] for i in range(3)]
+    tangent = jets.compose(path.position[1:], theta_d)
+    e_par = tangent / jets.sqrt(jets.dot(tangent, tangent))
+    e_perp = transported(path.normal, e_par)
+    axes = (e_par, e_perp, jets.cross(e_par, e_perp))
+    position = [jets.dot(axis, error) for axis in axes]
     if not path.quaternion:
         return position
     return [*position, *orientation_error(R_e, jets.compose(path.quaternion, theta_d))]
@@ -39,8 +51,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
 class MovingPoint(PathManifold):
     """The point that moves along a path with time, as a manifold.
 
-    Its coordinates are the errors of :func:`trajectory_errors` in world axes; the first takes
-    the place, and the gains, of the tangential one.
+    Its coordinates are the errors of :func:`trajectory_errors`, in the order of a path's
+    coordinates and named like them.
     """
 
     name = "trajectory"
@@ -53,8 +65,9 @@ class MovingPoint(PathManifold):
     def force(
         self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
     ) -> ca.SX:
-        """Return the force in world axes and, with orientation, (3.44), (3.45)."""
+        """Return the force along the axes of the errors and, with orientation, (3.44), (3.45)."""
+        translational = force_components(wrench[:3], point, self.layout)
         if not self.layout.oriented:
-            return wrench[:3]
+            return translational
         rotational = rotational_force(wrench[3:], point, self.layout, reference[3:6])
-        return ca.vertcat(wrench[:3], rotational)
+        return ca.vertcat(translational, rotational)

@@ -87,7 +87,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     speed = jets.sqrt(jets.dot(tangent, tangent))
     eta = (speed * theta.differentiate()).integrate(path.eta)
     e_par = tangent / speed
-    e_perp = _transported(path.normal, e_par)
+    e_perp = transported(path.normal, e_par)
     offset = y.coefficients[0] - path.position[0]
     velocity = y.differentiate()
     xi = [
@@ -99,7 +99,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     return [eta, *xi, *orientation_error(R_e, jets.compose(path.quaternion, theta))]
 
 
-def _transported(normal: ca.SX, e_par: Jet) -> Jet:
+def transported(normal: ca.SX, e_par: Jet) -> Jet:
     """Return the parallel transport (3.4) of a normal vector along the moving tangent."""
     if e_par.order == 0:
         return Jet([normal])

@@ -21,13 +21,21 @@ def translational_force(force: ca.SX, point: ca.SX, layout: PathPointLayout) -> 
     Returns:
         Generalized forces [N], shape (3,).
     """
+    components = force_components(force, point, layout)
+    return ca.vertcat(components[0] * (1.0 - point[layout.alpha]), components[1:])
+
+
+def force_components(force: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX:
+    """Return a force along ``e_par``, ``e_perp`` and ``e_par x e_perp`` [N], shape (3,).
+
+    Args:
+        force: World axes [N], shape (3,).
+        point: Path point, laid out by ``layout``.
+        layout: Layout of ``point``.
+    """
     slope, e_perp = point[layout.position][3:6], point[layout.normal]
     e_par = slope / ca.norm_2(slope)
-    return ca.vertcat(
-        ca.dot(e_par, force) * (1.0 - point[layout.alpha]),
-        ca.dot(e_perp, force),
-        ca.dot(ca.cross(e_par, e_perp), force),
-    )
+    return ca.vertcat(*[ca.dot(e, force) for e in (e_par, e_perp, ca.cross(e_par, e_perp))])
 
 
 def rotational_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout, phi: ca.SX) -> ca.SX:

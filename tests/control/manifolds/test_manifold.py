@@ -28,6 +28,9 @@ def test_force_of_a_moving_point_is_its_power(oriented):
     """At rest, the power of a wrench is that of the force along the errors' rates."""
     rng, manifold = np.random.default_rng(3), MovingPoint(1, oriented=oriented)
     point = rng.uniform(-1.0, 1.0, manifold.layout.size)
+    slope = point[manifold.layout.position][3:6]
+    normal = np.cross(slope, rng.uniform(-1.0, 1.0, 3))
+    point[manifold.layout.normal] = normal / np.linalg.norm(normal)
     twist, wrench = rng.uniform(-1, 1, 6), rng.uniform(-1, 1, 6)
     y_t, R_e = rng.uniform(-1, 1, 3), Rotation.random(random_state=3).as_matrix()
     spin = np.cross(np.eye(3), twist[3:])
