@@ -120,7 +120,7 @@ def test_metrics(six_axes):
     assert 1.0 < median <= p99
     assert six_axes.metrics["real_time_factor"]["value"] > 0.0
     targets = {name for name, metric in six_axes.metrics.items() if "target" in metric}
-    assert {"max_path_deviation", "max_orientation_error", "controller_tick_us"} <= targets
+    assert {"max_path_deviation", "max_orientation_error"} <= targets
 
 
 def test_metrics_follow_from_the_log(three_axes):
