@@ -59,6 +59,8 @@ def report_page(
     interrupted: bool = False,
     warnings: Sequence[str] = (),
     diagram_svg: str | None = None,
+    kind: str = "Simulation run",
+    commands: Mapping[str, str] | None = None,
 ) -> str:
     """Returns the page; figures and diagram are inside, only the recording is beside it.
 
@@ -74,8 +76,11 @@ def report_page(
         interrupted: Whether the user stopped it.
         warnings: What may not have gone as well as hoped, one sentence each.
         diagram_svg: The block diagram as SVG text.
+        kind: What the page is about, above its title.
+        commands: Command lines worth repeating, by what they are good for.
     """
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        kind=escape(kind),
         title=escape(title),
         description=escape(description.strip()),
         badges=_badges(metrics, fault, interrupted),
@@ -84,6 +89,7 @@ def report_page(
         cards=_cards(metrics),
         recording=_recording(recording),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
+        commands=_commands(commands or {}),
         table=_table(metrics),
         details=_details(scenario_yaml_text, diagram_svg),
         attributes="\n".join(
@@ -177,6 +183,16 @@ def _figure(figure: Figure) -> str:
         f"<figcaption><strong>{escape(figure.title)}.</strong> {escape(figure.caption)}"
         "</figcaption></figure>"
     )
+
+
+def _commands(commands: Mapping[str, str]) -> str:
+    """Command lines to copy."""
+    blocks = (
+        f'<figure><pre class="command">{escape(command)}</pre>'
+        f"<figcaption>{escape(purpose)}</figcaption></figure>"
+        for purpose, command in commands.items()
+    )
+    return _section("Runs to look at", "\n".join(blocks))
 
 
 def _recording(recording: str | None) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 from experiments.results.metrics import Metric, Metrics
 from experiments.results.units import format_quantity
 from experiments.sweep.rows import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
-from pfsc_drake.errors import InputError, shortened
 
 # of the machine and what else it does, not of the robot
 MACHINE_METRICS = ("real_time_factor", "controller_tick_us", "controller_tick_us_p99")
@@ -68,27 +67,20 @@ def count_ends(rows: Mapping[int, RunRow]) -> dict[str, int]:
     return {spoken: counts[status] for status, spoken in _SPOKEN.items() if counts[status]}
 
 
-def choose_metric(rows: Mapping[int, RunRow], wanted: str | None) -> str | None:
-    """Returns the metric to draw: the one asked for, the distance from the path, or another.
+def choose_metric(spreads: Mapping[str, Spread], wanted: str | None) -> str | None:
+    """Returns the metric to draw: the one asked for if a run has it, else the usual one.
 
     Args:
-        rows: Of the sweep.
+        spreads: Of the sweep's metrics.
         wanted: Name of a metric; None for the usual one.
 
     Returns:
         None if no run completed.
-
-    Raises:
-        InputError: If no run that completed has the metric asked for.
     """
-    spreads = measure_spreads(rows)
-    if wanted is not None and spreads and wanted not in spreads:
-        raise InputError(
-            f"--metric {shortened(wanted)}: no run has it; allowed: {', '.join(spreads)}"
-        )
-    if wanted in spreads:
-        return wanted
-    return _FAVOURITE if _FAVOURITE in spreads else next(iter(spreads), None)
+    for name in (wanted, _FAVOURITE):
+        if name in spreads:
+            return name
+    return next(iter(spreads), None)
 
 
 def measure_spreads(rows: Mapping[int, RunRow]) -> dict[str, Spread]:
