@@ -1,15 +1,16 @@
 """The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``sweep`` many.
 
-Exit status: 0 the run completed, or all runs of a sweep ended, each with a row that says how; 2 the input is wrong, nothing was run (one line on stderr); 3 a
-fault stopped the run, everything logged so far is kept; 4 results could not be written, one line
-says which and where they are instead; 130 interrupted, everything logged so far is kept.
+Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
+input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, everything logged
+so far is kept; 4 results could not be written, one line says which and where they are instead; 130
+interrupted, everything logged so far is kept.
 """
 
 import dataclasses
 import json
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,7 +29,7 @@ from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
     from experiments.pages.report import Report
-    from experiments.results.metrics import Metrics
+    from experiments.results.metrics import Metric
     from experiments.run import RunOutcome
     from experiments.sweep.sweep import SweepOutcome
 
@@ -195,7 +196,7 @@ def sweep_command(
 def study_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Which law when: all laws on joints of rising stiffness (about a minute)."""
+    """Which law when: all laws on joints of rising stiffness, on all cores (about a minute)."""
     from experiments.studies.stiffness import write_study
 
     with _interruptible():
@@ -276,7 +277,8 @@ def _judge(outcome: "RunOutcome", out: Path, time: float) -> int:
 
 def _print_sweep(console: Console, outcome: "SweepOutcome") -> None:
     """What came out of a sweep."""
-    console.print(_metrics_table(outcome.metrics))
+    key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
+    console.print(_metrics_table(key_metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     for strikes, command in outcome.commands.items():
@@ -319,7 +321,7 @@ def _print_page(console: Console, invitation: str, page: Path | None) -> None:
         console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
 
 
-def _metrics_table(metrics: "Metrics") -> Table:
+def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
     from experiments.results.units import format_quantity
 

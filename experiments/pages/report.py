@@ -61,6 +61,7 @@ def report_page(
     diagram_svg: str | None = None,
     kind: str = "Simulation run",
     commands: Mapping[str, str] | None = None,
+    cards: Sequence[str] | None = None,
 ) -> str:
     """Returns the page; figures and diagram are inside, only the recording is beside it.
 
@@ -78,6 +79,7 @@ def report_page(
         diagram_svg: The block diagram as SVG text.
         kind: What the page is about, above its title.
         commands: Command lines worth repeating, by what they are good for.
+        cards: Names of the metrics that become cards, instead.
     """
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         kind=escape(kind),
@@ -86,7 +88,7 @@ def report_page(
         badges=_badges(metrics, fault, interrupted),
         fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
         warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
-        cards=_cards(metrics),
+        cards=_cards(metrics, cards),
         recording=_recording(recording),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
         commands=_commands(commands or {}),
@@ -119,9 +121,10 @@ def _badges(metrics: Metrics, fault: str | None, interrupted: bool) -> str:
     )
 
 
-def _cards(metrics: Metrics) -> str:
+def _cards(metrics: Metrics, chosen: Sequence[str] | None) -> str:
     """The metrics to look at first."""
-    chosen = [name for name, metric in metrics.items() if metric.target is not None]
+    if chosen is None:
+        chosen = [name for name, metric in metrics.items() if metric.target is not None]
     cards = [_card(name, metrics[name]) for name in (chosen or list(metrics))[:MAX_CARDS]]
     return _section("Key results", f'<div class="cards">{"".join(cards)}</div>' if cards else "")
 

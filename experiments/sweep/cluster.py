@@ -22,6 +22,9 @@ _SETTINGS = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
+    # what watches the process takes time from the run
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
     # nothing to look at from elsewhere
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
@@ -82,8 +85,10 @@ def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
 
 def _connect(address: str) -> "Client":
     from distributed import Client
+    from distributed.comm import parse_address, parse_host_port
 
     try:
+        parse_host_port(parse_address(address)[1])  # a Client that fails at this leaves a mess
         return Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
         reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
@@ -95,10 +100,9 @@ def _connect(address: str) -> "Client":
 
 def _require_dask() -> None:
     try:
-        import distributed
+        import distributed  # noqa: F401
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"{error.name} is not installed; allowed: pip install 'pfsc_drake[sweep]', or make setup"
+            f"{error.name} is not installed; allowed: make setup, or its extra 'sweep'"
         ) from None
-    del distributed

@@ -114,7 +114,7 @@ class SweepRecord:
         """Takes up what the folder holds of the same sweep.
 
         Raises:
-            InputError: If the folder holds another sweep, or its record cannot be read.
+            InputError: If the folder holds rows of another sweep, or its record cannot be read.
         """
         self._results, self._definition = results, definition
         self._written, self._pause = time.monotonic(), _OLDEST
@@ -159,12 +159,12 @@ def _read(path: Path, folder: Path, definition: SweepDefinition) -> dict[int, Ru
         raise InputError(
             f"{path}: not a readable record of a sweep: {error!r}; allowed: another folder"
         ) from None
-    if difference is not None:
+    if difference is not None and rows:
         raise InputError(
             f"--out {folder}: it holds another sweep ({difference}); allowed: the same command, "
             "or another folder"
         )
-    return rows
+    return {} if difference is not None else rows
 
 
 def _words(value: Any) -> str:

@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
@@ -28,9 +29,7 @@ _MICRO = 1e-4  # m or rad
 _CROSS_HEIGHT = 0.97  # of a panel
 
 
-def draw_sweep(
-    spread: Spread, columns: Columns, varied: Sequence[str]
-) -> list[Figure]:
+def draw_sweep(spread: Spread, columns: Columns, varied: Sequence[str]) -> list[Figure]:
     """Draws the pictures of a sweep.
 
     Args:
@@ -52,6 +51,10 @@ def _over_parameters(
     values = np.array([np.nan if v is None else v for v in columns[spread.name]], dtype=float)
     values[[status != COMPLETED for status in columns["status"]]] = np.nan
     influence = {name: _influence(columns[name], values) for name in varied}
+    kind = next((name for name in varied if _is_kind(columns[name])), None)
+    groups = _kinds(columns[kind]) if kind else []
+    colours = [COLOURS[groups.index(str(v))] for v in columns[kind]] if kind else []
+    colours = colours or [COLOURS[0]] * len(values)
     chosen = sorted(varied, key=lambda name: -abs(influence[name]))[:MAX_PANELS]
     across = min(len(chosen), _COLUMNS)
     down = -(-len(chosen) // across)
@@ -59,7 +62,7 @@ def _over_parameters(
         canvas = Canvas(figsize=(WIDTH, max(3.4, _PANEL_HEIGHT * down)))
         panels = canvas.subplots(down, across, sharey=True, squeeze=False)
         for panel, name in zip(panels.flat, chosen, strict=False):
-            _draw_parameter(panel, name, columns[name], values * scale)
+            _draw_parameter(panel, name, columns[name], values * scale, colours)
             worst = columns["run"].index(spread.worst_run)
             panel.plot(
                 _positions(columns[name])[worst],
@@ -77,7 +80,13 @@ def _over_parameters(
             row[0].set_ylabel(label)
         if _is_wide(spread):
             panels[0, 0].set_yscale("log")
-        caption = f"{_spoken(spread)} of every run over what was varied; what shows most comes first."
+        caption = (
+            f"{_spoken(spread)} of every run over what was varied; what shows most comes first."
+        )
+        if groups:
+            marks = [Line2D([], [], color=colour, marker="o", linestyle="") for colour in COLOURS]
+            labels = [_short(group) for group in groups]
+            canvas.legend(marks[: len(groups)], labels, loc="outside upper right", ncols=4)
         if len(chosen) < len(varied):
             caption += f" {len(varied) - len(chosen)} more parameters are in the table."
         caption += f" Ring: the worst, run {spread.worst_run}."
@@ -86,16 +95,21 @@ def _over_parameters(
         return render(Drawing("parameters", f"{_spoken(spread)} over parameters", caption, canvas))
 
 
-def _draw_parameter(panel: Axes, name: str, parameter: list[Any], values: NDArray[Any]) -> None:
+def _draw_parameter(
+    panel: Axes,
+    name: str,
+    parameter: list[Any],
+    values: NDArray[Any],
+    colours: Sequence[str],
+) -> None:
     positions, there = _positions(parameter), np.isfinite(values)
     size = float(np.clip(60.0 / np.sqrt(len(values)), 2.0, 7.0))
-    panel.plot(
+    panel.scatter(
         positions[there],
         values[there],
-        "o",
-        color=COLOURS[0],
-        markersize=size,
-        markeredgecolor="none",
+        s=size**2,
+        c=np.array(colours)[there],
+        edgecolors="none",
         alpha=0.65,
     )
     panel.plot(
@@ -115,10 +129,11 @@ def _draw_parameter(panel: Axes, name: str, parameter: list[Any], values: NDArra
         panel.set_xlim(-0.5, len(kinds) - 0.5)
         return
     numbers = np.array(parameter, dtype=float)
+    ticks = np.unique(numbers)
     if numbers.min() > 0.0 and numbers.max() > _WIDE * numbers.min():
         panel.set_xscale("log")
-    elif len(set(parameter)) <= _FEW:
-        panel.set_xticks(sorted(set(parameter)), [f"{v:.4g}" for v in sorted(set(parameter))])
+    elif len(set(parameter)) <= _FEW and np.diff(ticks).min(initial=np.inf) > np.ptp(ticks) / _FEW:
+        panel.set_xticks(ticks, [f"{tick:.4g}" for tick in ticks])
     else:
         panel.xaxis.set_major_locator(MaxNLocator(4))
 
@@ -172,6 +187,11 @@ def _positions(parameter: list[Any]) -> NDArray[Any]:
 
 def _kinds(parameter: list[Any]) -> list[str]:
     return list(dict.fromkeys(str(value) for value in parameter))
+
+
+def _is_kind(parameter: list[Any]) -> bool:
+    """Whether a parameter divides the runs into a few kinds, told apart by colour."""
+    return not _is_numeric(parameter) and 1 < len(_kinds(parameter)) <= len(COLOURS)
 
 
 def _is_numeric(parameter: list[Any]) -> bool:

@@ -94,7 +94,7 @@ class SweepProgress:
         parts = [f"{self._done} of {self._total} runs"]
         parts += [f"{n} {end}" for end, n in sorted(self._ends.items()) if end != COMPLETED]
         fresh = self._done - self._before
-        if 0 < fresh and self._done < self._total:
+        if fresh > 0 and self._done < self._total:
             left = (time.monotonic() - self._begin) / fresh * (self._total - self._done)
             parts.append(f"{spoken_time(left)} left")
         elif not fresh and self._done < self._total:

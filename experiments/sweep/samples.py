@@ -117,7 +117,7 @@ def draw_samples(variations: Sequence[Variation], count: int | None, seed: int) 
         np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(place,))))
         for place in range(len(variations))
     ]
-    samples = []
+    samples: list[Sample] = []
     for _ in range(draws):
         drawn = [
             grid or (_drawn(variation, generator),)
@@ -134,7 +134,8 @@ def _drawn(variation: Variation, generator: np.random.Generator) -> str:
 
 
 def _sample(index: int, variations: Sequence[Variation], texts: Sequence[str]) -> Sample:
-    overrides, varied = [], {}
+    overrides: list[str] = []
+    varied: dict[str, Any] = {}
     for variation, text in zip(variations, texts, strict=True):
         overrides += [f"{key}={text}" for key in variation.keys]
         varied |= _columns(variation, text)
@@ -148,5 +149,3 @@ def _columns(variation: Variation, text: str) -> dict[str, Any]:
         return {variation.name: column_value(text)}
     elements = split_values(text[1:-1], variation.name)
     return {f"{variation.name}[{i}]": column_value(piece) for i, piece in enumerate(elements)}
-
-

@@ -129,12 +129,27 @@ def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
         metrics.add(f"{chosen}_quantile_99", spread.quantile(0.99), spread.unit)
     for name in sorted(spreads, key=lambda name: name != chosen):
         spread = spreads[name]
-        if spread.target and spread.source:
-            described = f"{_described(spread)}; target: {spread.source}"
-        else:
-            described = _described(spread)
+        described = _described(spread)
+        if spread.source:
+            described += f"; {'target: ' if spread.target else ''}{spread.source}"
         metrics.add(f"{name}_worst", spread.worst, spread.unit, spread.target, described)
     return metrics
+
+
+def key_metrics(metrics: Metrics, chosen: str | None) -> list[str]:
+    """Returns the names of the metrics to look at first.
+
+    Args:
+        metrics: From :func:`summary_metrics`.
+        chosen: As there.
+    """
+    return [
+        name
+        for name, metric in metrics.items()
+        if name.startswith("runs")
+        or metric.target is not None
+        or name in {f"{chosen}_{end}" for end in ("median", "quantile_99", "worst")}
+    ]
 
 
 def _described(spread: Spread) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
 from experiments.interruption import noticed_interruption
 from experiments.pages.report import report_page, write_report
@@ -23,6 +24,7 @@ from experiments.sweep.samples import Sample, draw_samples, parse_variations
 from experiments.sweep.summary import (
     choose_metric,
     count_ends,
+    key_metrics,
     measure_spreads,
     striking_runs,
     summary_metrics,
@@ -66,6 +68,7 @@ class SweepOutcome:
         total: Number of all runs.
         commands: Command lines of runs to look at, by what strikes in them.
         metrics: What it says as a whole.
+        key_metrics: Names of those to look at first.
         warnings: What may not have gone as well as hoped, one sentence each.
         interrupted: Whether the user stopped it.
         stopped: Why not all runs were made; or None.
@@ -77,6 +80,7 @@ class SweepOutcome:
     total: int
     commands: dict[str, str]
     metrics: Metrics
+    key_metrics: list[str]
     warnings: list[str]
     interrupted: bool
     stopped: str | None
@@ -222,6 +226,7 @@ def _conclude(
         interrupted=interrupted,
         warnings=warnings,
         commands=commands,
+        cards=key_metrics(metrics, chosen),
     )
     report = write_report(results, figures, page)
     return SweepOutcome(
@@ -230,6 +235,7 @@ def _conclude(
         len(sweep.samples),
         commands,
         metrics,
+        key_metrics(metrics, chosen),
         warnings,
         interrupted,
         stopped,
@@ -250,8 +256,6 @@ def _check_keys(scenario: ScenarioFile, tasks: Sequence[RunTask]) -> None:
 
     A value that is wrong in one sample is the business of its row.
     """
-    from diagrams.scenario import Scenario  # Drake takes seconds to import
-
     first = None
     for task in tasks[:: -(-len(tasks) // _TRIED)]:
         try:
