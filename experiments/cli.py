@@ -1,15 +1,16 @@
-"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``study`` the laws.
+"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``sweep`` many.
 
-Exit status: 0 the run completed; 2 the input is wrong, nothing was run (one line on stderr); 3 a
-fault stopped the run, everything logged so far is kept; 4 results could not be written, one line
-says which and where they are instead; 130 interrupted, everything logged so far is kept.
+Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
+input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, everything logged
+so far is kept; 4 results could not be written, one line says which and where they are instead; 130
+interrupted, everything logged so far is kept.
 """
 
 import dataclasses
 import json
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,8 +29,9 @@ from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
     from experiments.pages.report import Report
-    from experiments.results.metrics import Metrics
+    from experiments.results.metrics import Metric
     from experiments.run import RunOutcome
+    from experiments.sweep.sweep import SweepOutcome
 
 WRONG_INPUT = 2
 FAULT = 3
@@ -121,11 +123,80 @@ def compare_command(
         raise typer.Exit(_show("comparison", report))
 
 
+@app.command("sweep")
+def sweep_command(
+    scenario: Annotated[
+        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+    ],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY.PATH=VALUES",
+            help="What varies: a,b,c or linspace(low,high,n), in all combinations; or at random "
+            "low:high, loguniform(low,high), normal(mean,sd), choice(a,b), each with *n for a "
+            "list of n. Repeatable.",
+        ),
+    ] = None,
+    samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the random draws.")] = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Dask scheduler, e.g. tcp://10.0.0.1:8786, whose workers run in a clone of this "
+            "revision. Default: all cores of this machine",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes on this machine. Default: one per core")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the results; the same command goes on with what is missing there. "
+            "Default: out/SCENARIO_sweep"
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+    ] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
+    ] = None,
+    metric: Annotated[
+        str | None, typer.Option(help="What to draw. Default: max_path_deviation")
+    ] = None,
+) -> None:
+    """Run a scenario many times, on all cores: grids, ranges, distributions over its keys."""
+    from experiments.sweep.sweep import define_sweep, run_sweep
+
+    seconds = None if duration is None else _read_duration(duration)
+    with _interruptible():
+        sweep = define_sweep(
+            scenario,
+            vary or [],
+            overrides=overrides or [],
+            duration=seconds,
+            samples=samples,
+            seed=seed,
+        )
+        name = sweep.scenario.name
+        folder = expand_home(out) if out is not None else Path("out") / f"{name}_sweep"
+        console = Console()
+        outcome = run_sweep(
+            sweep, folder, console, scheduler=scheduler, workers=workers, metric=metric
+        )
+        _print_sweep(console, outcome)
+        raise typer.Exit(_judge_sweep(outcome, folder))
+
+
 @app.command("study")
 def study_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Which law when: all laws on joints of rising stiffness (about a minute)."""
+    """Which law when: all laws on joints of rising stiffness, on all cores (about a minute)."""
     from experiments.studies.stiffness import write_study
 
     with _interruptible():
@@ -204,6 +275,36 @@ def _judge(outcome: "RunOutcome", out: Path, time: float) -> int:
     return status
 
 
+def _print_sweep(console: Console, outcome: "SweepOutcome") -> None:
+    """What came out of a sweep."""
+    key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
+    console.print(_metrics_table(key_metrics))
+    for warning in outcome.warnings:
+        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    for strikes, command in outcome.commands.items():
+        console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
+    _print_page(console, "\nOpen the report", outcome.report)
+
+
+def _judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
+    """Says in one line why a sweep is not whole, if it is not; returns the exit status."""
+    status, ends = 0, []
+    done = f"{len(outcome.rows)} of {outcome.total} runs"
+    if outcome.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted after {done}"]
+    if outcome.stopped is not None:
+        status, ends = FAULT, [f"fault: {outcome.stopped}; stopped after {done}"]
+    if ends:
+        ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
+    elif outcome.refusal is not None:
+        status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
+    if outcome.problem is not None:
+        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
+    if ends:
+        print_error("; ".join(ends), after_echo=outcome.interrupted)
+    return status
+
+
 def _show(what: str, report: "Report") -> int:
     """Says where a page is, or that it could not be written; returns the exit status."""
     _print_page(Console(), f"Open the {what}", report.path)
@@ -220,7 +321,7 @@ def _print_page(console: Console, invitation: str, page: Path | None) -> None:
         console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
 
 
-def _metrics_table(metrics: "Metrics") -> Table:
+def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
     from experiments.results.units import format_quantity
 

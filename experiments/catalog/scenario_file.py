@@ -12,7 +12,13 @@ from pfsc_drake.yaml.reading import MAX_DEPTH, parse_yaml, read_yaml
 
 _MAX_PATH = 4096  # characters
 
-__all__ = ["ScenarioFile", "find_scenario", "load_scenario_data", "read_scenario"]
+__all__ = [
+    "ScenarioFile",
+    "apply_override",
+    "find_scenario",
+    "load_scenario_data",
+    "read_scenario",
+]
 
 
 @dataclass
@@ -64,7 +70,7 @@ def load_scenario_data(path: Path, overrides: list[str]) -> dict[str, Any]:
     """
     data = read_yaml(path)
     for override in overrides:
-        _apply_override(data, override)
+        apply_override(data, override)
     return data
 
 
@@ -80,9 +86,18 @@ def _texts(data: Any) -> Iterator[str]:
             yield from _texts(value)
 
 
-def _apply_override(data: dict[str, Any], override: str) -> None:
-    """Sets one ``key.path=value`` in place."""
-    source = f"--set {shortened(override, 100)}"
+def apply_override(data: dict[str, Any], override: str, option: str = "--set") -> None:
+    """Sets one ``key.path=value`` in place, see :func:`load_scenario_data`.
+
+    Args:
+        data: Of a scenario.
+        override: What to set.
+        option: Of the command line, for messages.
+
+    Raises:
+        InputError: If the override is malformed, or goes through what is no mapping or list.
+    """
+    source = f"{option} {shortened(override, 100)}"
     path, separator, text = override.partition("=")
     keys = path.strip().split(".")
     if not separator or not all(keys):

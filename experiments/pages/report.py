@@ -59,6 +59,9 @@ def report_page(
     interrupted: bool = False,
     warnings: Sequence[str] = (),
     diagram_svg: str | None = None,
+    kind: str = "Simulation run",
+    commands: Mapping[str, str] | None = None,
+    cards: Sequence[str] | None = None,
 ) -> str:
     """Returns the page; figures and diagram are inside, only the recording is beside it.
 
@@ -74,16 +77,21 @@ def report_page(
         interrupted: Whether the user stopped it.
         warnings: What may not have gone as well as hoped, one sentence each.
         diagram_svg: The block diagram as SVG text.
+        kind: What the page is about, above its title.
+        commands: Command lines worth repeating, by what they are good for.
+        cards: Names of the metrics that become cards, instead.
     """
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        kind=escape(kind),
         title=escape(title),
         description=escape(description.strip()),
         badges=_badges(metrics, fault, interrupted),
         fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
         warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
-        cards=_cards(metrics),
+        cards=_cards(metrics, cards),
         recording=_recording(recording),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
+        commands=_commands(commands or {}),
         table=_table(metrics),
         details=_details(scenario_yaml_text, diagram_svg),
         attributes="\n".join(
@@ -113,9 +121,10 @@ def _badges(metrics: Metrics, fault: str | None, interrupted: bool) -> str:
     )
 
 
-def _cards(metrics: Metrics) -> str:
+def _cards(metrics: Metrics, chosen: Sequence[str] | None) -> str:
     """The metrics to look at first."""
-    chosen = [name for name, metric in metrics.items() if metric.target is not None]
+    if chosen is None:
+        chosen = [name for name, metric in metrics.items() if metric.target is not None]
     cards = [_card(name, metrics[name]) for name in (chosen or list(metrics))[:MAX_CARDS]]
     return _section("Key results", f'<div class="cards">{"".join(cards)}</div>' if cards else "")
 
@@ -177,6 +186,16 @@ def _figure(figure: Figure) -> str:
         f"<figcaption><strong>{escape(figure.title)}.</strong> {escape(figure.caption)}"
         "</figcaption></figure>"
     )
+
+
+def _commands(commands: Mapping[str, str]) -> str:
+    """Command lines to copy."""
+    blocks = (
+        f'<figure><pre class="command">{escape(command)}</pre>'
+        f"<figcaption>{escape(purpose)}</figcaption></figure>"
+        for purpose, command in commands.items()
+    )
+    return _section("Runs to look at", "\n".join(blocks))
 
 
 def _recording(recording: str | None) -> str:

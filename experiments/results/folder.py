@@ -5,16 +5,18 @@ import fcntl
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from experiments.results.manifest import (
     FIGURES,
+    GROWING,
     MANIFEST,
     UNFINISHED,
     earlier_results,
     find_obstacle,
+    listed_results,
     manifest_text,
 )
 from pfsc_drake.errors import InputError
@@ -30,25 +32,28 @@ class ResultsFolder:
         path: The folder.
     """
 
-    def __init__(self, path: Path, kind: str, handle: int) -> None:
-        """Takes over a folder that is empty of results.
+    def __init__(
+        self, path: Path, kind: str, handle: int, checksums: Mapping[str, str] | None = None
+    ) -> None:
+        """Takes over a folder.
 
         Args:
             path: Of the folder.
             kind: Kind of results, e.g. ``run``.
             handle: Descriptor of the open folder.
+            checksums: Of the results in it, see :func:`experiments.results.manifest.manifest_text`.
         """
         self.path = path
         self._kind = kind
         self._handle = handle
-        self._checksums: dict[str, str] = {}
+        self._checksums = dict(checksums or {})
         self._elsewhere: Path | None = None
         self._reasons: dict[str, str] = {}  # why a file could not be written here
         self._lost: list[str] = []  # what could not be written elsewhere either
         self._write_manifest()
 
-    def write(self, name: str, content: str | bytes) -> Path | None:
-        """Writes one result, whole or not at all.
+    def write(self, name: str, content: str | bytes, growing: bool = False) -> Path | None:
+        """Writes one result, whole or not at all; one of this folder's own is replaced.
 
         What cannot be written here is written into a temporary folder instead, see
         :meth:`explain_problems`.
@@ -56,6 +61,8 @@ class ResultsFolder:
         Args:
             name: See :mod:`experiments.results.manifest`: a result's, or ``figures/NAME.png``.
             content: Of the file; text becomes UTF-8.
+            growing: Whether it is still added to: at every moment it is there as it was or as it
+                is now.
 
         Returns:
             The file; None if it could not be written anywhere.
@@ -63,7 +70,7 @@ class ResultsFolder:
         if isinstance(content, str):
             content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
         try:
-            return self._write_here(name, content)
+            return self._write_here(name, content, growing)
         except OSError as error:
             self._reasons[name] = _reason(error)
         try:
@@ -84,15 +91,26 @@ class ResultsFolder:
             text += f"; kept in {self._elsewhere}"
         return f"{text}; lost: {_listed(self._lost)}" if self._lost else text
 
-    def _write_here(self, name: str, content: bytes) -> Path:
+    def _write_here(self, name: str, content: bytes, growing: bool) -> Path:
         if not os.path.samestat(os.fstat(self._handle), self.path.stat()):
             raise FileExistsError(errno.EEXIST, "another folder has taken its place")
-        if _exists(self.path / name):
+        target, before = self.path / name, self._checksums.get(name)
+        if before is None and _exists(target):
             raise FileExistsError(errno.EEXIST, f"somebody else has made {name} meanwhile")
-        # listed first, so that a file is known as a result whenever the process ends
-        self._checksums[name] = hashlib.sha256(content).hexdigest()
+        checksum = GROWING if growing else hashlib.sha256(content).hexdigest()
+        if before != GROWING:
+            if not growing:
+                target.unlink(missing_ok=True)  # nothing may stand under another's checksum
+            # listed first, so that a file is known as a result whenever the process ends
+            self._list(name, checksum)
+        file = _write_whole(self.path, name, content)
+        if checksum != self._checksums[name]:
+            self._list(name, checksum)
+        return file
+
+    def _list(self, name: str, checksum: str) -> None:
+        self._checksums[name] = checksum
         self._write_manifest()
-        return _write_whole(self.path, name, content)
 
     def _write_manifest(self) -> None:
         text = manifest_text(self._kind, self._checksums)
@@ -100,16 +118,20 @@ class ResultsFolder:
 
 
 @contextmanager
-def open_results(path: Path, kind: str, inputs: Sequence[Path] = ()) -> Iterator[ResultsFolder]:
+def open_results(
+    path: Path, kind: str, inputs: Sequence[Path] = (), resume: bool = False
+) -> Iterator[ResultsFolder]:
     """Takes a folder for results until the end of the context.
 
     The folder is created if it is missing and locked against other processes; the lock ends with
-    the process, also if that crashes. Earlier results of the same kind are removed.
+    the process, also if that crashes. Earlier results of the same kind are removed, unless they
+    are resumed.
 
     Args:
         path: Of the folder.
         kind: Kind of results, e.g. ``run``.
         inputs: Files that the results are made from.
+        resume: Whether earlier results stay until others replace them.
 
     Raises:
         InputError: If the folder cannot be written, is in use, or holds something else where
@@ -123,14 +145,21 @@ def open_results(path: Path, kind: str, inputs: Sequence[Path] = ()) -> Iterator
         with _naming(path):
             _lock(path, handle)
             check_folder(path, kind, inputs)  # as it is now that nobody else writes
-            for name in earlier_results(path):
-                (path / name).unlink(missing_ok=True)
-            with suppress(FileNotFoundError):
-                (path / FIGURES).rmdir()
-            results = ResultsFolder(path, kind, handle)
+            if resume:
+                results = ResultsFolder(path, kind, handle, listed_results(path))
+            else:
+                _remove_results(path)
+                results = ResultsFolder(path, kind, handle)
         yield results
     finally:
         os.close(handle)
+
+
+def _remove_results(path: Path) -> None:
+    for name in earlier_results(path):
+        (path / name).unlink(missing_ok=True)
+    with suppress(FileNotFoundError):
+        (path / FIGURES).rmdir()
 
 
 def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:

@@ -4,6 +4,8 @@ Beside results stands ``manifest.json``: their kind, and the SHA-256 of each fil
 and what still has that content, may be replaced by later results of the same kind. Everything else
 that bears a result's name is in the way, and so are results of another kind, and inputs.
 
+A file that is still added to is listed as growing; whatever it holds may be replaced.
+
 A folder without manifest counts as that of a run of version 0.1 if it holds nothing but files that
 this version wrote, and a log that says so.
 """
@@ -21,7 +23,17 @@ from pfsc_drake.yaml.text_file import find_status
 
 MANIFEST = "manifest.json"
 FIGURES = "figures"
-RESULTS = ("scenario.yaml", "log.h5", "metrics.json", "recording.html", "report.html")
+RESULTS = (
+    "scenario.yaml",
+    "log.h5",
+    "metrics.json",
+    "recording.html",
+    "report.html",
+    "sweep.json",
+    "sweep.csv",
+    "sweep.parquet",
+)
+GROWING = "growing"  # instead of a checksum
 UNFINISHED = ".unfinished"  # a file while it is being written
 
 _FIGURE = re.compile(rf"{FIGURES}/\w+\.png")
@@ -48,7 +60,7 @@ def manifest_text(kind: str, checksums: Mapping[str, str]) -> str:
 
     Args:
         kind: Kind of results, e.g. ``run``.
-        checksums: SHA-256 of each file, by its name in the folder.
+        checksums: SHA-256 of each file, or GROWING, by its name in the folder.
     """
     content = {"program": _PROGRAM, "results": kind, "files": dict(checksums)}
     return json.dumps(content, indent=2) + "\n"
@@ -64,6 +76,16 @@ def earlier_results(folder: Path) -> list[str]:
     if manifest is None:
         return _files_of_earlier_version(folder)
     return [*manifest[1], UNFINISHED, MANIFEST]
+
+
+def listed_results(folder: Path) -> dict[str, str]:
+    """Returns what the manifest of a folder lists, see :func:`manifest_text`; nothing without one.
+
+    Args:
+        folder: That :func:`find_obstacle` has nothing to say against.
+    """
+    manifest = _read_manifest(folder)
+    return {} if manifest is None else {name: entry for name, entry in manifest[1].items() if entry}
 
 
 def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None:
@@ -94,6 +116,8 @@ def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None
         if name not in own:
             return f"it holds {name}, which no {kind} has written"
         checksum = own[name]
+        if checksum == GROWING:
+            checksum = _checksum(folder / name) or GROWING  # no regular file: it matches nothing
         if checksum is not None and _checksum(folder / name) != checksum:
             return f"its {name} was changed after the {kind} that wrote it"
     return None

@@ -96,8 +96,20 @@ class Metrics(UserDict[str, Metric]):
 
     def to_json(self) -> str:
         """Returns flat JSON ``name: {value, unit, target?, source?}``; NaN, infinity are null."""
-        flat = {name: _to_json(metric) for name, metric in self.items()}
-        return json.dumps(flat, indent=2, allow_nan=False) + "\n"
+        return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
+
+    def to_data(self) -> dict[str, Any]:
+        """Returns what :meth:`to_json` writes, as data."""
+        return {name: _to_json(metric) for name, metric in self.items()}
+
+    @classmethod
+    def from_data(cls, flat: dict[str, Any]) -> Self:
+        """Returns the metrics of what :meth:`to_data` gave; null becomes NaN.
+
+        Raises:
+            ValueError, KeyError, TypeError, AttributeError: If it is something else.
+        """
+        return cls({name: _from_json(entry) for name, entry in flat.items()})
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -113,8 +125,7 @@ class Metrics(UserDict[str, Metric]):
             InputError: If the file cannot be read or is no such file.
         """
         try:
-            flat = json.loads(read_text(path))
-            return cls({name: _from_json(entry) for name, entry in flat.items()})
+            return cls.from_data(json.loads(read_text(path)))
         except InputError:
             raise
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

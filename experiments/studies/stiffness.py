@@ -13,11 +13,14 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
+from experiments.interruption import noticed_interruption
 from experiments.pages.report import Report, report_page, write_report
 from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
 from experiments.results.provenance import standard_attributes
-from experiments.run import run_scenario
+from experiments.sweep.many import run_many
+from experiments.sweep.rows import COMPLETED, RunRow
+from experiments.sweep.worker import RunTask
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
@@ -76,27 +79,17 @@ class StudyPoint:
     fault: str | None
 
 
-class _Quiet:
-    """Listens to no progress."""
-
-    def expect(self, duration: float) -> None:
-        """Ignore the length."""
-
-    def __call__(self, simulated_time: float, phase: str) -> None:
-        """Ignore the time."""
-
-
 def write_study(
     out: Path,
     progress: Callable[[str], None],
     laws: Sequence[str] = LAWS,
     stiffnesses: Sequence[float] = STIFFNESS,
 ) -> Report:
-    """Run all laws on all stiffnesses and write a page.
+    """Run all laws on all stiffnesses, on all cores, and write a page.
 
     Args:
         out: Folder for the page.
-        progress: Told one line per run.
+        progress: Told one line per run, in the order in which they end.
         laws: Laws to compare.
         stiffnesses: Stiffnesses of axis 1 [Nm/rad].
 
@@ -129,19 +122,29 @@ def write_study(
 def _run_all(
     progress: Callable[[str], None], laws: Sequence[str], stiffnesses: Sequence[float]
 ) -> list[StudyPoint]:
-    """Run all laws on all stiffnesses."""
-    points = []
-    with TemporaryDirectory() as folder:
-        for stiffness in stiffnesses:
-            resonance = None
-            for law in laws:
-                scenario = _scenario(law, float(stiffness), Path(folder))
-                resonance = resonance or _resonance(scenario)
-                point = _run(scenario, law, float(stiffness), resonance, Path(folder))
-                points.append(point)
-                result = point.fault or f"{point.deviation * 1e3:.3g} mm"
-                progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
-    return points
+    """Run all laws on all stiffnesses, on all cores.
+
+    Raises:
+        KeyboardInterrupt: At Ctrl-C.
+    """
+    cases = [(float(stiffness), law) for stiffness in stiffnesses for law in laws]
+    points: dict[int, StudyPoint] = {}
+    with TemporaryDirectory() as folder, noticed_interruption() as interrupted:
+        scenarios = [_scenario(law, stiffness, Path(folder)) for stiffness, law in cases]
+        resonances = [_resonance(scenario) for scenario in scenarios[:: len(laws)]]
+
+        def take(number: int, row: RunRow) -> None:
+            stiffness, law = cases[number]
+            point = _point(law, stiffness, resonances[number // len(laws)], row)
+            points[number] = point
+            result = point.fault or f"{point.deviation * 1e3:.3g} mm"
+            progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
+
+        tasks = {number: RunTask.of(scenario) for number, scenario in enumerate(scenarios)}
+        run_many(tasks, take, interrupted=interrupted)
+        if interrupted():
+            raise KeyboardInterrupt
+    return [points[number] for number in range(len(cases))]
 
 
 def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:
@@ -176,22 +179,12 @@ def _resonance(scenario: ScenarioFile) -> float:
     return float(joint_resonances(station.robot, q_J)[-1])
 
 
-def _run(
-    scenario: ScenarioFile, law: str, stiffness: float, resonance: float, folder: Path
-) -> StudyPoint:
-    """Run one law on one stiffness."""
-    outcome = run_scenario(
-        scenario,
-        out=folder / "run",
-        duration=None,
-        figures=False,
-        recording=False,
-        progress=_Quiet(),
-    )
-    if outcome.interrupted:
-        raise KeyboardInterrupt
-    deviation = np.nan if outcome.fault else outcome.metrics["max_path_deviation"].value
-    return StudyPoint(law, stiffness, resonance, deviation, outcome.fault)
+def _point(law: str, stiffness: float, resonance: float, row: RunRow) -> StudyPoint:
+    """Return what one run says."""
+    if row.status != COMPLETED:
+        return StudyPoint(law, stiffness, resonance, np.nan, row.reason)
+    deviation = row.metrics["max_path_deviation"].value
+    return StudyPoint(law, stiffness, resonance, deviation, None)
 
 
 def _picture(points: Sequence[StudyPoint], laws: Sequence[str]) -> Figure:

@@ -1,0 +1,181 @@
+"""What a sweep says as a whole: how many runs went well, quantiles, the worst run."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.results.metrics import Metric, Metrics
+from experiments.results.units import format_quantity
+from experiments.sweep.rows import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
+
+# of the machine and what else it does, not of the robot
+MACHINE_METRICS = ("real_time_factor", "controller_tick_us", "controller_tick_us_p99")
+_FAVOURITE = "max_path_deviation"
+_SPOKEN = {
+    COMPLETED: "completed",
+    FAULT: "stopped by a fault",
+    REFUSED: "refused as wrong input",
+    FAILED: "failed",
+    DIED: "died with their process",
+}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How one metric is spread over the runs that completed.
+
+    Attributes:
+        name: Of the metric.
+        unit: SI.
+        runs: Number of the samples with a value.
+        values: Theirs.
+        is_better_large: Whether the worst is the smallest.
+        target: Of the metric, if there is one.
+        source: Of the target.
+    """
+
+    name: str
+    unit: str
+    runs: tuple[int, ...]
+    values: np.ndarray
+    is_better_large: bool
+    target: str | None
+    source: str | None
+
+    @property
+    def worst_run(self) -> int:
+        """Number of the sample with the worst value."""
+        find = np.argmin if self.is_better_large else np.argmax
+        return self.runs[int(find(self.values))]
+
+    @property
+    def worst(self) -> float:
+        """The worst value."""
+        return float(self.values.min() if self.is_better_large else self.values.max())
+
+    def quantile(self, share: float) -> float:
+        """Value that a share of the runs is not worse than."""
+        at = 1.0 - share if self.is_better_large else share
+        return float(np.quantile(self.values, at))
+
+
+def count_ends(rows: Mapping[int, RunRow]) -> dict[str, int]:
+    """Returns how many runs ended in which way, in words."""
+    counts = Counter(row.status for row in rows.values())
+    return {spoken: counts[status] for status, spoken in _SPOKEN.items() if counts[status]}
+
+
+def choose_metric(spreads: Mapping[str, Spread], wanted: str | None) -> str | None:
+    """Returns the metric to draw: the one asked for if a run has it, else the usual one.
+
+    Args:
+        spreads: Of the sweep's metrics.
+        wanted: Name of a metric; None for the usual one.
+
+    Returns:
+        None if no run completed.
+    """
+    for name in (wanted, _FAVOURITE):
+        if name in spreads:
+            return name
+    return next(iter(spreads), None)
+
+
+def measure_spreads(rows: Mapping[int, RunRow]) -> dict[str, Spread]:
+    """Returns how each metric is spread over the runs that completed and have a value of it."""
+    completed = {i: rows[i] for i in sorted(rows) if rows[i].status == COMPLETED}
+    spreads = {}
+    for name in dict.fromkeys(name for row in completed.values() for name in row.metrics):
+        own = {i: row.metrics[name] for i, row in completed.items() if name in row.metrics}
+        own = {i: metric for i, metric in own.items() if np.isfinite(metric.value)}
+        if own:
+            spreads[name] = _spread(name, own)
+    return spreads
+
+
+def _spread(name: str, metrics: Mapping[int, Metric]) -> Spread:
+    # a target that not all runs share is none of the sweep; no target of the machine either
+    targets = {(metric.target, metric.source) for metric in metrics.values()}
+    target, source = targets.pop() if len(targets) == 1 else (None, None)
+    if name in MACHINE_METRICS:
+        target, source = None, None
+    bounds = [metric.bound for metric in metrics.values() if metric.bound is not None]
+    is_better_large = any(bound[0].startswith(">") for bound in bounds) or name in _LARGE
+    values = np.array([metric.value for metric in metrics.values()])
+    unit = next(iter(metrics.values())).unit
+    return Spread(name, unit, tuple(metrics), values, is_better_large, target, source)
+
+
+_LARGE = ("real_time_factor", "joint_limit_margin")
+
+
+def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
+    """Returns how many runs ended in which way, then the worst value of each metric.
+
+    Args:
+        rows: Of the sweep.
+        chosen: Metric that comes first, with its quantiles.
+    """
+    metrics = Metrics()
+    metrics.add("runs", len(rows), "1")
+    for spoken, count in count_ends(rows).items():
+        metrics.add(f"runs_{spoken.replace(' ', '_')}", count, "1")
+    spreads = measure_spreads(rows)
+    if chosen is not None:
+        spread = spreads[chosen]
+        metrics.add(f"{chosen}_median", spread.quantile(0.5), spread.unit)
+        metrics.add(f"{chosen}_quantile_99", spread.quantile(0.99), spread.unit)
+    for name in sorted(spreads, key=lambda name: name != chosen):
+        spread = spreads[name]
+        described = _described(spread)
+        if spread.source:
+            described += f"; {'target: ' if spread.target else ''}{spread.source}"
+        metrics.add(f"{name}_worst", spread.worst, spread.unit, spread.target, described)
+    return metrics
+
+
+def key_metrics(metrics: Metrics, chosen: str | None) -> list[str]:
+    """Returns the names of the metrics to look at first.
+
+    Args:
+        metrics: From :func:`summary_metrics`.
+        chosen: As there.
+    """
+    return [
+        name
+        for name, metric in metrics.items()
+        if name.startswith("runs")
+        or metric.target is not None
+        or name in {f"{chosen}_{end}" for end in ("median", "quantile_99", "worst")}
+    ]
+
+
+def _described(spread: Spread) -> str:
+    """Where the worst value is, and what is usual."""
+    median, share = (format_quantity(spread.quantile(q), spread.unit) for q in (0.5, 0.99))
+    return f"run {spread.worst_run}; median {median}, 99 % quantile {share}"
+
+
+def striking_runs(rows: Mapping[int, RunRow], chosen: str | None, most: int) -> dict[str, int]:
+    """Returns the runs that one wants to look at, by what strikes in them.
+
+    Args:
+        rows: Of the sweep.
+        chosen: Metric by which the worst run is found.
+        most: Number of runs of each kind of end, completed ones aside.
+    """
+    striking = {}
+    if chosen is not None:
+        spread = measure_spreads(rows)[chosen]
+        value = format_quantity(spread.worst, spread.unit)
+        striking[f"Worst {chosen} of those that completed, {value}"] = spread.worst_run
+    for status in (FAULT, REFUSED, FAILED, DIED):
+        own = [i for i in sorted(rows) if rows[i].status == status]
+        for i in own[:most]:
+            striking[f"Run {i}, {_SINGLE[status]}: {rows[i].reason}"] = i
+    return striking
+
+
+_SINGLE = {FAULT: "fault", REFUSED: "refused", FAILED: "failed", DIED: "died"}

@@ -1,0 +1,293 @@
+"""A sweep: many runs of one scenario into a folder, with table, pictures and page."""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from diagrams.scenario import Scenario
+from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
+from experiments.interruption import noticed_interruption
+from experiments.pages.report import report_page, write_report
+from experiments.results.folder import ResultsFolder, check_folder, open_results
+from experiments.results.metrics import Metrics
+from experiments.results.provenance import standard_attributes
+from experiments.sweep.cluster import count_cores
+from experiments.sweep.definition import SweepDefinition, SweepRecord, fingerprint
+from experiments.sweep.figures import draw_sweep
+from experiments.sweep.many import run_many
+from experiments.sweep.progress import SweepProgress
+from experiments.sweep.rows import REFUSED, RunRow
+from experiments.sweep.samples import Sample, draw_samples, parse_variations
+from experiments.sweep.summary import (
+    choose_metric,
+    count_ends,
+    key_metrics,
+    measure_spreads,
+    striking_runs,
+    summary_metrics,
+)
+from experiments.sweep.table import table_columns, to_csv, to_parquet, units_of
+from experiments.sweep.worker import RunTask
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.reading import dump_yaml
+from pfsc_drake.yaml.typed import load_typed
+
+_KIND = "sweep"
+# samples that are tried against the schema before anything runs
+_TRIED = 10
+_MOST_STRIKING = 3
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that can start.
+
+    Attributes:
+        definition: What makes it the sweep it is.
+        scenario: The scenario with what is the same in all runs.
+        samples: Of all runs.
+        tasks: The runs, in the same order.
+    """
+
+    definition: SweepDefinition
+    scenario: ScenarioFile
+    samples: list[Sample]
+    tasks: list[RunTask]
+
+
+@dataclass(frozen=True)
+class SweepOutcome:
+    """What a sweep left.
+
+    Attributes:
+        report: The page to open; None if it could not be written.
+        rows: What is there, by number of the sample.
+        total: Number of all runs.
+        commands: Command lines of runs to look at, by what strikes in them.
+        metrics: What it says as a whole.
+        key_metrics: Names of those to look at first.
+        warnings: What may not have gone as well as hoped, one sentence each.
+        interrupted: Whether the user stopped it.
+        stopped: Why not all runs were made; or None.
+        problem: Which results could not be written, why, and where they are instead; or None.
+    """
+
+    report: Path | None
+    rows: dict[int, RunRow]
+    total: int
+    commands: dict[str, str]
+    metrics: Metrics
+    key_metrics: list[str]
+    warnings: list[str]
+    interrupted: bool
+    stopped: str | None
+    problem: str | None
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the first run was refused, if all of them were."""
+        if not self.rows or any(row.status != REFUSED for row in self.rows.values()):
+            return None
+        return self.rows[min(self.rows)].reason
+
+
+def define_sweep(
+    scenario: str,
+    vary: Sequence[str],
+    *,
+    overrides: Sequence[str] = (),
+    duration: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+) -> Sweep:
+    """Reads a scenario and what varies, and checks both before anything runs.
+
+    Args:
+        scenario: Name of a shipped scenario, or path of a YAML file.
+        vary: ``key.path=values`` each, see :mod:`experiments.sweep.samples`.
+        overrides: ``key.path=value`` each, the same for all runs.
+        duration: Simulated time [s] instead of the scenario's.
+        samples: Number of random draws.
+        seed: Of the draws.
+
+    Raises:
+        InputError: If anything of it is wrong, or the scenario's schema takes none of the samples.
+    """
+    drawn = draw_samples(parse_variations(vary), samples, seed)
+    loaded = read_scenario(scenario, list(overrides))
+    definition = SweepDefinition(
+        scenario,
+        tuple(vary),
+        tuple(overrides),
+        duration,
+        samples,
+        seed,
+        fingerprint(loaded),
+    )
+    tasks = [RunTask.of(_varied(loaded, sample), duration) for sample in drawn]
+    _check_keys(loaded, tasks)
+    return Sweep(definition, loaded, drawn, tasks)
+
+
+def run_sweep(
+    sweep: Sweep,
+    out: Path,
+    console: Console,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    metric: str | None = None,
+) -> SweepOutcome:
+    """Makes the runs of a sweep that a folder does not have yet, and writes what they say.
+
+    Args:
+        sweep: From :func:`define_sweep`.
+        out: Folder for the results; one with a part of the same sweep is gone on with.
+        console: Where progress is shown.
+        scheduler: Address of a Dask scheduler; None for processes of this machine.
+        workers: Number of processes of this machine; None for all its cores.
+        metric: Metric to draw; None for the usual one.
+
+    Raises:
+        InputError: If the folder cannot be used, no scheduler answers, or Dask is not installed;
+            nothing has been run then.
+    """
+    inputs = sweep.scenario.inputs()
+    check_folder(out, _KIND, inputs)
+    count_cores()  # without Dask the folder stays as it is
+    with (
+        noticed_interruption() as interrupted,
+        open_results(out, _KIND, inputs, resume=True) as results,
+    ):
+        record = SweepRecord(results, sweep.definition)
+        missing = record.missing(len(sweep.samples))
+        title, done = sweep.scenario.name, len(sweep.samples) - len(missing)
+        with SweepProgress(console, title, len(sweep.samples), done) as progress:
+
+            def take(number: int, row: RunRow) -> None:
+                record.take(number, row)
+                progress.advance(row.status)
+
+            try:
+                stopped = run_many(
+                    {number: sweep.tasks[number] for number in missing},
+                    take,
+                    interrupted=interrupted,
+                    scheduler=scheduler,
+                    workers=workers,
+                    idle=progress.processes,
+                )
+            finally:
+                record.save(growing=False)
+        return _conclude(sweep, record.rows, results, metric, interrupted(), stopped)
+
+
+def _conclude(
+    sweep: Sweep,
+    rows: dict[int, RunRow],
+    results: ResultsFolder,
+    wanted: str | None,
+    interrupted: bool,
+    stopped: str | None,
+) -> SweepOutcome:
+    """Writes table, metrics, pictures and page of what is there."""
+    columns = table_columns(sweep.samples, rows)
+    results.write("scenario.yaml", dump_yaml(sweep.scenario.data))
+    results.write("sweep.csv", to_csv(columns))
+    results.write("sweep.parquet", to_parquet(columns, units_of(rows)))
+    spreads = measure_spreads(rows)
+    chosen = choose_metric(spreads, wanted)
+    metrics = summary_metrics(rows, chosen)
+    results.write("metrics.json", metrics.to_json())
+    commands = {
+        strikes: sweep.definition.run_command(sweep.samples[number].overrides)
+        for strikes, number in striking_runs(rows, chosen, _MOST_STRIKING).items()
+    }
+    figures = []
+    if chosen is not None:
+        varied = dict.fromkeys(name for sample in sweep.samples for name in sample.varied)
+        figures = draw_sweep(spreads[chosen], columns, list(varied))
+    warnings = _warnings(rows)
+    if wanted not in (None, chosen) and chosen is not None:
+        warnings.append(f"--metric {wanted}: no run has it; there are {', '.join(spreads)}")
+    page = report_page(
+        kind="Sweep",
+        title=sweep.scenario.name,
+        description=_description(sweep, rows),
+        scenario_yaml_text=dump_yaml(sweep.scenario.data),
+        metrics=metrics,
+        figures=figures,
+        log_attributes=standard_attributes(sweep.scenario.name)
+        | {"command": sweep.definition.command()},
+        fault=stopped,
+        interrupted=interrupted,
+        warnings=warnings,
+        commands=commands,
+        cards=key_metrics(metrics, chosen),
+    )
+    report = write_report(results, figures, page)
+    return SweepOutcome(
+        report.path,
+        rows,
+        len(sweep.samples),
+        commands,
+        metrics,
+        key_metrics(metrics, chosen),
+        warnings,
+        interrupted,
+        stopped,
+        report.problem,
+    )
+
+
+def _varied(scenario: ScenarioFile, sample: Sample) -> ScenarioFile:
+    """The scenario of one sample."""
+    data = copy.deepcopy(scenario.data)
+    for override in sample.overrides:
+        apply_override(data, override, "--vary")
+    return ScenarioFile(scenario.path, data)
+
+
+def _check_keys(scenario: ScenarioFile, tasks: Sequence[RunTask]) -> None:
+    """Refuses what the schema takes in no sample: a key that is not there, a text for a number.
+
+    A value that is wrong in one sample is the business of its row.
+    """
+    first = None
+    for task in tasks[:: -(-len(tasks) // _TRIED)]:
+        try:
+            load_typed(Scenario, task.data, str(scenario.path))
+            return
+        except InputError as error:
+            first = first or error
+    if first is not None:
+        raise first
+
+
+def _warnings(rows: dict[int, RunRow]) -> list[str]:
+    """What may not have gone as well as hoped."""
+    warnings = []
+    warned = [i for i in sorted(rows) if rows[i].warnings]
+    if warned:
+        example = f"run {warned[0]}: {rows[warned[0]].warnings[0]}"
+        warnings.append(f"{len(warned)} of {len(rows)} runs have warnings, e.g. {example}")
+    revisions = sorted({row.revision for row in rows.values() if row.revision})
+    if len(revisions) > 1:
+        shown = ", ".join(revision[:12] for revision in revisions)
+        warnings.append(f"the runs are of different revisions of the program: {shown}")
+    return warnings
+
+
+def _description(sweep: Sweep, rows: dict[int, RunRow]) -> str:
+    """What was run, for the head of the page."""
+    ends = ", ".join(f"{count} {spoken}" for spoken, count in count_ends(rows).items())
+    lines = [
+        str(sweep.scenario.data.get("description", "")),
+        "",
+        *(f"varied: {option}" for option in sweep.definition.vary),
+        f"{len(rows)} of {len(sweep.samples)} runs: {ends or 'none ended'}.",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,115 @@
+"""What runs in the processes of a sweep."""
+
+import logging
+import signal
+import socket
+import threading
+import time
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.catalog.scenario_file import ScenarioFile
+from experiments.results.provenance import git_revision
+from experiments.sweep.rows import COMPLETED, FAILED, FAULT, REFUSED, RunRow
+from experiments.terminal import one_line, silence_libraries
+from pfsc_drake.errors import InputError, shortened
+
+# of a worker that has several threads: compilation and the garbage collector know but one run
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@dataclass(frozen=True)
+class RunTask:
+    """One run, as it is sent to a worker.
+
+    Attributes:
+        file: Name of the scenario's file.
+        folder: Its folder, which names in it are relative to; None for a shipped scenario, which
+            every machine has in a folder of its own.
+        data: Its content with everything set.
+        duration: Simulated time [s] instead of the scenario's; or None.
+    """
+
+    file: str
+    folder: Path | None
+    data: dict[str, Any]
+    duration: float | None
+
+    @classmethod
+    def of(cls, scenario: ScenarioFile, duration: float | None = None) -> "RunTask":
+        """Returns the task to run a scenario."""
+        folder = scenario.path.parent.resolve()
+        is_shipped = folder == SCENARIO_DIRECTORY
+        return cls(scenario.path.name, None if is_shipped else folder, scenario.data, duration)
+
+    def scenario(self) -> ScenarioFile:
+        """Returns the scenario as this machine has it."""
+        return ScenarioFile((self.folder or SCENARIO_DIRECTORY) / self.file, self.data)
+
+
+class _Clock:
+    """Remembers how far a run is."""
+
+    def __init__(self) -> None:
+        self.simulated_time = 0.0
+
+    def expect(self, duration: float) -> None:
+        """Ignores the length."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """Takes the time [s]."""
+        self.simulated_time = max(self.simulated_time, simulated_time)
+
+
+def run_task(task: RunTask) -> RunRow:
+    """Runs a scenario as ``run`` does, without figures and recording; keeps its row alone.
+
+    Whatever is wrong with the run is said in its row.
+    """
+    begin, clock = time.perf_counter(), _Clock()
+    with _ONE_AT_A_TIME:
+        row = _run(task, clock)
+    row.end, row.seconds = clock.simulated_time, time.perf_counter() - begin
+    row.host, row.revision = socket.gethostname(), _revision()
+    return row
+
+
+def _run(task: RunTask, clock: _Clock) -> RunRow:
+    logging.getLogger("drake").setLevel(logging.CRITICAL)
+    try:
+        from experiments.run import run_scenario  # Drake takes seconds to import
+
+        with TemporaryDirectory(prefix="pfsc_drake_sweep_") as folder:
+            outcome = run_scenario(
+                task.scenario(),
+                out=Path(folder) / "run",
+                duration=task.duration,
+                figures=False,
+                recording=False,
+                progress=clock,
+            )
+    except InputError as error:
+        return RunRow(REFUSED, one_line(str(error)))
+    except Exception as error:  # whatever it is, the other runs go on
+        reason = one_line(f"{type(error).__name__}: {error}")
+        return RunRow(FAILED, shortened(reason, 500))
+    status = FAULT if outcome.fault else COMPLETED
+    return RunRow(status, outcome.fault or "", outcome.metrics, outcome.warnings)
+
+
+@cache
+def _revision() -> str:
+    return git_revision()
+
+
+def dask_setup(_worker: Any) -> None:
+    """Prepares a process on this machine before it takes runs; called by Dask."""
+    # Ctrl-C reaches every process of the terminal; the one that leads ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    silence_libraries()
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    import experiments.run  # noqa: F401  # before the first run rather than in it
