@@ -10,7 +10,7 @@ import dataclasses
 import json
 import logging
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -194,15 +194,32 @@ def sweep_command(
 
 @app.command("study")
 def study_command(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
+            "all laws on robots that are not their models; tracking: path following against "
+            "trajectory tracking."
+        ),
+    ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Which law when: all laws on joints of rising stiffness, on all cores (about a minute)."""
+    """Many runs on one page, on all cores: one minute (stiffness) to ten (robustness)."""
+    from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
+    from experiments.studies.tracking import write_tracking
 
+    studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
+        "stiffness": write_study,
+        "robustness": write_robustness,
+        "tracking": write_tracking,
+    }
+    if name not in studies:
+        raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
     with _interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
-        report = write_study(
+        report = studies[name](
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
         raise typer.Exit(_show("study", report))
