@@ -40,8 +40,8 @@ class RunRow:
 
     @property
     def is_final(self) -> bool:
-        """Whether the same run would end in the same way; where its process died, who knows."""
-        return self.status != DIED
+        """Whether the same run would end in the same way; not if the machine is to blame."""
+        return self.status not in (FAILED, DIED)
 
     def to_data(self) -> dict[str, Any]:
         """Returns the row as data for JSON; NaN is null."""

@@ -74,7 +74,7 @@ def run_task(task: RunTask) -> RunRow:
     with _ONE_AT_A_TIME:
         row = _run(task, clock)
     row.end, row.seconds = clock.simulated_time, time.perf_counter() - begin
-    row.host, row.revision = socket.gethostname(), _revision()
+    row.host, row.revision = socket.gethostname(), program_revision()
     return row
 
 
@@ -102,7 +102,8 @@ def _run(task: RunTask, clock: _Clock) -> RunRow:
 
 
 @cache
-def _revision() -> str:
+def program_revision() -> str:
+    """Returns the revision of the program in this process."""
     return git_revision()
 
 
