@@ -152,9 +152,12 @@ def run_sweep(
         metric: Metric to draw; None for the usual one.
 
     Raises:
-        InputError: If the folder cannot be used, no scheduler answers, or Dask is not installed;
+        InputError: If the folder cannot be used, ``workers`` go with ``scheduler``, no scheduler
+            answers, or Dask is not installed;
             nothing has been run then.
     """
+    if scheduler is not None and workers is not None:
+        raise InputError(f"--workers {workers}: --scheduler brings its own; allowed: one of both")
     inputs = sweep.scenario.inputs()
     check_folder(out, _KIND, inputs)
     count_cores()  # without Dask the folder stays as it is

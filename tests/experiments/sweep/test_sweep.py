@@ -118,6 +118,10 @@ def test_every_run_refused(address, tmp_path, capfd):
         (["--vary", "reference.velocity=a,b"], "key 'reference.velocity' is 'a'"),
         (["--vary", "description.no=1,2"], "--vary description.no=1: description is "),
         (["--vary", "duration=0:1"], "--samples: missing"),
+        (
+            ["--vary", "duration=1,2", "--scheduler", "tcp://a:1", "--workers", "2"],
+            "--workers 2: --scheduler brings its own",
+        ),
         (["--vary", "duration=1,2", "--scheduler", "here"], "no Dask scheduler answers"),
         (
             ["--vary", "duration=1,2", "--scheduler", "tcp://127.0.0.1:1"],
