@@ -122,5 +122,5 @@ def _require_dask() -> None:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"{error.name} is not installed; allowed: make setup, or its extra 'sweep'"
+            f"{error.name} is not installed; allowed: make setup, or the extra 'sweep'"
         ) from None

@@ -27,6 +27,7 @@ class RunRow:
         seconds: Wall clock time [s].
         host: Machine that ran it.
         revision: Of the program there.
+        memory: Of its process after the run [bytes]; not kept in files.
     """
 
     status: str
@@ -37,6 +38,7 @@ class RunRow:
     seconds: float = math.nan
     host: str = ""
     revision: str = ""
+    memory: float = 0.0
 
     @property
     def is_final(self) -> bool:

@@ -153,8 +153,7 @@ def run_sweep(
 
     Raises:
         InputError: If the folder cannot be used, ``workers`` go with ``scheduler``, no scheduler
-            answers, or Dask is not installed;
-            nothing has been run then.
+            answers, or Dask is not installed; nothing has been run then.
     """
     if scheduler is not None and workers is not None:
         raise InputError(f"--workers {workers}: --scheduler brings its own; allowed: one of both")

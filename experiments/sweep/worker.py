@@ -70,11 +70,14 @@ def run_task(task: RunTask) -> RunRow:
 
     Whatever is wrong with the run is said in its row.
     """
+    import psutil  # comes with Dask
+
     begin, clock = time.perf_counter(), _Clock()
     with _ONE_AT_A_TIME:
         row = _run(task, clock)
     row.end, row.seconds = clock.simulated_time, time.perf_counter() - begin
     row.host, row.revision = socket.gethostname(), program_revision()
+    row.memory = float(psutil.Process().memory_info().rss)
     return row
 
 

@@ -5,6 +5,7 @@ import signal
 import psutil
 
 from experiments.catalog.scenario_file import read_scenario
+from experiments.sweep import many
 from experiments.sweep.many import run_many
 from experiments.sweep.rows import COMPLETED, DIED, REFUSED
 from experiments.sweep.summary import MACHINE_METRICS
@@ -58,6 +59,22 @@ def test_two_processes_one_of_which_is_killed():
     assert {connection.laddr.ip for connection in listening} == {"127.0.0.1"}
     assert len(started) == 2
     assert workers() == []
+
+
+def test_a_process_that_has_grown_is_replaced(monkeypatch):
+    """What runs leave behind in memory does not add up over thousands of them."""
+    monkeypatch.setattr(many, "_MOST_MEMORY", 0.0)
+    rows, processes = {}, []
+
+    def take(number, row):
+        rows[number] = row
+        processes.append({process.pid for process in workers()})
+
+    tasks = {0: task(), 1: task()}
+    assert run_many(tasks, take, interrupted=lambda: False, workers=1) is None
+    assert [row.status for row in rows.values()] == [COMPLETED, COMPLETED]
+    assert rows[0].memory > 1e8
+    assert processes[0].isdisjoint(processes[1])
 
 
 def test_nothing_to_do_starts_nothing():

@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 import signal
+import sys
 
 import pytest
 from pyarrow import parquet
@@ -136,6 +137,16 @@ def test_what_is_wrong_is_said_in_one_line(arguments, reason, tmp_path, capfd, m
     assert status == 2
     assert reason in error
     assert error.count("\n") == 1
+
+
+def test_without_the_extra(tmp_path, capfd, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    arguments = ["--vary", "duration=1,2", "--out", str(tmp_path / "out")]
+    assert main(["sweep", "pfc_elastic_3r", *arguments]) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("error: distributed is not installed; allowed: make setup")
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_value_that_is_wrong_in_some_samples_is_the_business_of_their_rows():
