@@ -50,6 +50,10 @@ class OnePeriodMap:
         diagram: The diagram.
         period: Sampling time [s], of which every other in the diagram is a whole fraction.
         configure: Tells a simulator how to integrate.
+
+    Attributes:
+        context: Where the map arrived last.
+        size: Number of variables.
     """
 
     def __init__(
@@ -59,11 +63,11 @@ class OnePeriodMap:
         self._diagram = diagram
         self._simulator = Simulator(diagram)
         configure(self._simulator)
-        self._context = self._simulator.get_mutable_context()
+        self.context = self._simulator.get_mutable_context()
         self._silent = InitializeParams(suppress_initialization_events=True)
-        self._groups = range(self._context.num_discrete_state_groups())
-        sizes = [self._context.num_continuous_states()]
-        sizes += [self._context.get_discrete_state(group).size() for group in self._groups]
+        self._groups = range(self.context.num_discrete_state_groups())
+        sizes = [self.context.num_continuous_states()]
+        sizes += [self.context.get_discrete_state(group).size() for group in self._groups]
         ends = np.cumsum(sizes).tolist()
         self._parts = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
         self.size: int = ends[-1]
@@ -95,7 +99,7 @@ class OnePeriodMap:
             section: Context right after a tick; unchanged.
             x: Variables in place of its own, shape (size,).
         """
-        context, time = self._context, section.get_time()
+        context, time = self.context, section.get_time()
         # a product as in Drake's own schedule, so that rounding does not lose the tick
         next_tick = (round(time / self.period) + 1) * self.period
         context.SetTimeStateAndParametersFrom(section)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import place_poles
 
 from pfsc_drake.control.margins.disc import NO_MARGIN, common_disc_margin, disc_margins
 
@@ -18,7 +19,7 @@ def two_drives(rng):
     """A plant of four states with two drives, and a stable state feedback after each tick."""
     A = 0.95 * np.eye(4) + 0.05 * rng.standard_normal((4, 4))
     B = 0.2 * rng.standard_normal((4, 2))
-    K = np.linalg.lstsq(B, 0.25 * A, rcond=None)[0]
+    K = place_poles(A, B, [0.9, 0.85, 0.93, 0.97]).gain_matrix
     return A, B, K, np.block([[A, B], [-K @ A, -K @ B]])
 
 
@@ -48,7 +49,7 @@ def test_a_loop_without_feedback_bears_any_gain():
     assert margin.gain == (0.0, np.inf)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 4])
+@pytest.mark.parametrize("seed", range(4))
 def test_the_margin_is_the_smallest_disc_that_makes_the_loop_unstable(seed):
     A, B, K, closed = two_drives(np.random.default_rng(seed))
     assert np.max(np.abs(np.linalg.eigvals(closed))) < 1.0
@@ -68,7 +69,7 @@ def test_the_margin_is_the_smallest_disc_that_makes_the_loop_unstable(seed):
         assert worst[1.02] > 1.0
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 4])
+@pytest.mark.parametrize("seed", range(4))
 def test_all_drives_at_once_bear_the_common_margin(seed):
     rng = np.random.default_rng(seed)
     A, B, K, closed = two_drives(rng)
