@@ -70,7 +70,8 @@ class Error:
 def _words(key: str, amount: float) -> str:
     if key == "tool_mass":
         return f"tool believed {abs(amount):g} kg too {'heavy' if amount > 0.0 else 'light'}"
-    return f"{_FACTORS[key]} believed {100.0 * abs(amount):.3g} % too {'high' if amount > 0 else 'low'}"
+    side = "high" if amount > 0.0 else "low"
+    return f"{_FACTORS[key]} believed {100.0 * abs(amount):.3g} % too {side}"
 
 
 def single_errors(box: Box, elastic: bool) -> Iterator[tuple[str, Error]]:
