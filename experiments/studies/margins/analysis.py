@@ -1,7 +1,7 @@
 """Margins of a scenario's closed loop along its way, nominal and over a box of model errors."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -40,6 +40,11 @@ class Place:
     def rate(self) -> float:
         """Rate of the slowest or fastest growing mode [1/s]; infinite where the law gives up."""
         return np.inf if self.modes is None else self.modes.slowest
+
+    @property
+    def damping(self) -> float:
+        """The smallest damping ratio of a mode; -1 where the law gives up."""
+        return -1.0 if self.modes is None else self.modes.smallest_damping
 
 
 @dataclass(frozen=True)
@@ -136,10 +141,10 @@ class MarginAnalysis:
         return dict(sorted(found.items(), key=lambda item: -item[1].worst.rate))
 
     @property
-    def smallest_damping(self) -> Place | None:
+    def least_damped(self) -> Place | None:
         """Where the loop, as the scenario says, is damped least."""
         known = [place for place in self.nominal.places if place.modes is not None]
-        return min(known, key=lambda place: place.modes.smallest_damping, default=None)
+        return min(known, key=lambda place: place.damping, default=None)
 
     @property
     def tightest(self) -> DriveMargins | None:
@@ -258,7 +263,7 @@ def _weakest_instants(analysis: MarginAnalysis) -> list[Instant]:
 
 
 @contextlib.contextmanager
-def _saying(key: str, remarks: list[str]):  # type: ignore[no-untyped-def]
+def _saying(key: str, remarks: list[str]) -> Iterator[None]:
     """Leave out a parameter that a robot does not have, and say so."""
     try:
         yield

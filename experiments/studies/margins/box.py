@@ -64,7 +64,9 @@ class Error:
 
     def __str__(self) -> str:
         """In words."""
-        return ", ".join(_words(*part) for part in self.parts) or "as the scenario says"
+        if len(self.parts) > 1:
+            return f"believed {', '.join(_short(*part) for part in self.parts)}"
+        return "".join(_words(*part) for part in self.parts) or "as the scenario says"
 
 
 def _words(key: str, amount: float) -> str:
@@ -72,6 +74,12 @@ def _words(key: str, amount: float) -> str:
         return f"tool believed {abs(amount):g} kg too {'heavy' if amount > 0.0 else 'light'}"
     side = "high" if amount > 0.0 else "low"
     return f"{_FACTORS[key]} believed {100.0 * abs(amount):.3g} % too {side}"
+
+
+def _short(key: str, amount: float) -> str:
+    if key == "tool_mass":
+        return f"tool {amount:+g} kg"
+    return f"{_FACTORS[key]} {100.0 * amount:+.3g} %"
 
 
 def single_errors(box: Box, elastic: bool) -> Iterator[tuple[str, Error]]:
