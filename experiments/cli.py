@@ -86,6 +86,9 @@ def run_command(
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Record the motion.")
     ] = True,
+    margins: Annotated[
+        bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
+    ] = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
     from experiments.catalog.scenario_file import read_scenario
@@ -105,6 +108,7 @@ def run_command(
                 figures=figures,
                 recording=recording,
                 progress=progress,
+                margins=margins,
             )
         _print_outcome(console, outcome)
         raise typer.Exit(_judge(outcome, folder, progress.simulated_time))
@@ -299,6 +303,8 @@ def _print_outcome(console: Console, outcome: "RunOutcome") -> None:
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    if outcome.margins is not None:
+        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
     _print_page(console, "\nOpen the report", outcome.report)
 
 

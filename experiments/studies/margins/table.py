@@ -15,16 +15,15 @@ def place_table(analysis: MarginAnalysis) -> Table:
     Args:
         analysis: The analysis.
     """
-    table = _table("t in s", "eta in m", "m/s", "slowest in 1/s", "damping", "in the box")
-    table.add_column("disc margin", justify="right")
-    table.add_column("of drive")
-    table.add_column("delay", justify="right")
+    table = _table("t in s", "eta in m", "m/s", "1/s", "damping", "in the box", "disc margin")
+    table.add_column("of", no_wrap=True)
+    table.add_column("delay", justify="right", no_wrap=True)
     margins = {item.instant.time: item for item in analysis.margins}
     for number, place in enumerate(analysis.nominal.places):
-        instant, modes = place.instant, place.modes
+        instant = place.instant
         box = max((case.places[number].rate for case in analysis.singles), default=place.rate)
         row = [f"{instant.time:.3f}", f"{instant.eta:.3f}", f"{abs(instant.speed):.2f}"]
-        row += [_rate(place.rate), "" if modes is None else f"{modes.smallest_damping:.2f}"]
+        row += [_rate(place.rate), f"{place.damping:.2f}"]
         row.append(_rate(box))
         own = margins.get(instant.time)
         if own is not None:

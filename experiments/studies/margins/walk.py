@@ -54,13 +54,20 @@ class Walk:
     fault: bool
 
 
-def walk(loop: StationLoop, duration: float, progress: Callable[[float], None]) -> Walk:
+def walk(
+    loop: StationLoop,
+    duration: float,
+    progress: Callable[[float], None],
+    *,
+    only_start: bool = False,
+) -> Walk:
     """Run a station and keep its state at rest and in motion.
 
     Args:
         loop: Its loop.
         duration: Length of the run [s].
         progress: Told the simulated time [s].
+        only_start: Whether to keep the first instant alone.
     """
     station, simulator = loop.station, Simulator(loop.station.diagram)
     loop.configure(simulator)
@@ -68,7 +75,8 @@ def walk(loop: StationLoop, duration: float, progress: Callable[[float], None]) 
     station.set_start(root)
     simulator.Initialize()
     instants: list[Instant] = []
-    for tick, eta, speed in _chosen_ticks(station, duration):
+    chosen = _chosen_ticks(station, duration)
+    for tick, eta, speed in chosen[:1] if only_start else chosen:
         now = round(root.get_time() / period)
         stride = max(1, round(_CHUNK / period))
         for goal in [*range(now + stride, tick, stride), tick]:

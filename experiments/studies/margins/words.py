@@ -42,7 +42,8 @@ def one_line(analysis: MarginAnalysis) -> str:
         analysis: The analysis.
     """
     tightest = analysis.tightest
-    parts = [f"{'stable' if analysis.nominal.is_stable else 'UNSTABLE'} {_mode(analysis.nominal)}"]
+    verdict = "stable" if analysis.nominal.is_stable else "UNSTABLE"
+    parts = [f"{verdict} {_where(analysis.nominal.worst)}, {_mode(analysis.nominal)}"]
     if tightest is not None and analysis.nominal.is_stable:
         drive = int(np.argmin([margin.alpha for margin in tightest.drives]))
         parts.append(
@@ -66,9 +67,9 @@ def metrics_of(analysis: MarginAnalysis) -> Metrics:
     """
     result = Metrics()
     result.add("slowest_rate", analysis.nominal.worst.rate, "1/s", "< 0", "as the scenario says")
-    damped = analysis.smallest_damping
-    if damped is not None and damped.modes is not None:
-        result.add("smallest_damping", damped.modes.smallest_damping, "1", source=_where(damped))
+    damped = analysis.least_damped
+    if damped is not None:
+        result.add("smallest_damping", damped.damping, "1", source=_where(damped))
     if len(analysis.cases) > 1:
         weakest = analysis.weakest
         result.add(
@@ -113,10 +114,10 @@ def margins_json(analysis: MarginAnalysis) -> str:
 
 def _nominal(case: Case) -> str:
     if case.is_stable:
-        return f"As the scenario says, the loop is stable: {_mode(case)} ({_where(case.worst)})."
+        return f"As the scenario says, the loop is stable: it {_mode(case)} ({_where(case.worst)})."
     if math.isinf(case.worst.rate):
         return f"As the scenario says, the law gives up {_where(case.worst)}."
-    return f"As the scenario says, the loop is unstable: {_mode(case)} ({_where(case.worst)})."
+    return f"As the scenario says, the loop is unstable: it {_mode(case)} ({_where(case.worst)})."
 
 
 def _box(analysis: MarginAnalysis) -> str:
@@ -126,12 +127,12 @@ def _box(analysis: MarginAnalysis) -> str:
     worst = max(analysis.cases[1:], key=lambda case: case.worst.rate)
     if not unstable:
         return (
-            f"All {len(analysis.cases) - 1} model errors of the box are borne; the slowest, "
-            f"{_mode(worst)}, with {worst.error} ({_where(worst.worst)})."
+            f"All {len(analysis.cases) - 1} model errors of the box are borne; the worst loop "
+            f"{_mode(worst)}: {worst.error} ({_where(worst.worst)})."
         )
     return (
         f"{len(unstable)} of {len(analysis.cases) - 1} model errors of the box make the loop "
-        f"unstable; the worst, {_mode(worst)}, with {worst.error} ({_where(worst.worst)})."
+        f"unstable; the worst loop {_mode(worst)}: {worst.error} ({_where(worst.worst)})."
     )
 
 
@@ -169,7 +170,7 @@ def _drives(analysis: MarginAnalysis) -> list[str]:
 def _mode(case: Case) -> str:
     place = case.worst
     if place.modes is None:
-        return "the law gives up"
+        return "ends with a fault of the law"
     frequency = place.modes.slowest_frequency / (2.0 * np.pi)
     oscillates = f" at {frequency:.2g} Hz" if frequency > 0.01 else ""
     verb = "decays with" if place.rate <= 0.0 else "grows with"
@@ -212,7 +213,7 @@ def _case_data(case: Case) -> dict[str, Any]:
                 "fault": place.modes is None,
                 "rates": [] if place.modes is None else place.modes.rate.tolist(),
                 "frequencies_rad_s": [] if place.modes is None else place.modes.frequency.tolist(),
-                "smallest_damping": None if place.modes is None else place.modes.smallest_damping,
+                "smallest_damping": place.damping,
                 "neutral_modes": None if place.modes is None else place.modes.neutral,
             }
             for place in case.places
