@@ -86,6 +86,9 @@ def run_command(
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Record the motion.")
     ] = True,
+    margins: Annotated[
+        bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
+    ] = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
     from experiments.catalog.scenario_file import read_scenario
@@ -105,6 +108,7 @@ def run_command(
                 figures=figures,
                 recording=recording,
                 progress=progress,
+                margins=margins,
             )
         _print_outcome(console, outcome)
         raise typer.Exit(_judge(outcome, folder, progress.simulated_time))
@@ -225,6 +229,49 @@ def study_command(
         raise typer.Exit(_show("study", report))
 
 
+@app.command("margins")
+def margins_command(
+    scenario: Annotated[
+        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+    ],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the page. Default: out/SCENARIO_margins")
+    ] = None,
+    mass: Annotated[
+        float, typer.Option(help="Relative error of masses and inertias to be borne.")
+    ] = 0.05,
+    stiffness: Annotated[
+        float, typer.Option(help="Relative error of joint stiffnesses to be borne.")
+    ] = 0.05,
+    rotor: Annotated[
+        float, typer.Option(help="Relative error of rotor inertias to be borne.")
+    ] = 0.0,
+    tool: Annotated[float, typer.Option(help="Error of the tool's mass to be borne [kg].")] = 0.1,
+) -> None:
+    """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
+    from experiments.catalog.scenario_file import read_scenario
+    from experiments.studies.margins.box import Box
+    from experiments.studies.margins.page import write_margins
+    from experiments.studies.margins.table import case_table, place_table, summary
+
+    with _interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console, box = Console(), Box(mass, stiffness, rotor, tool)
+        with ProgressDisplay(console, loaded.name, None) as progress:
+            outcome = write_margins(loaded, folder, box, progress)
+        for table in (place_table(outcome.analysis), case_table(outcome.analysis)):
+            console.print(table)
+            console.print()
+        console.print(summary(outcome.analysis), highlight=False)
+        raise typer.Exit(_show("margins", outcome.report))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
@@ -273,6 +320,8 @@ def _print_outcome(console: Console, outcome: "RunOutcome") -> None:
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    if outcome.margins is not None:
+        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
     _print_page(console, "\nOpen the report", outcome.report)
 
 

@@ -4,6 +4,7 @@ import dataclasses as dc
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 MANIFOLDS = ("path", "trajectory")
 _TORQUE_SOURCES = ("none", "known", "measured")
@@ -14,22 +15,41 @@ class GainParameters:
     """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
 
     Attributes:
-        poles: Real poles [1/s], r of them.
+        poles: Real poles [1/s], r of them; ``auto`` to have them chosen for a bandwidth: two slow
+            ones for the convergence, faster ones for the robustness. A run's resolved scenario
+            names what was chosen.
+        bandwidth: Magnitude of the slow poles [1/s] that ``auto`` chooses.
+        bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
         coefficients: ``a_1 .. a_r``, alternatively.
         integral: ``a_0``; needs coefficients.
     """
 
-    poles: list[float] = dc.field(default_factory=list)
+    poles: list[float] = dc.field(default_factory=list, metadata=AUTO_OR_MANY)
     coefficients: list[float] = dc.field(default_factory=list)
     integral: float = 0.0
+    bandwidth: float = 0.0
+    bears: float = 0.05
 
     def __post_init__(self) -> None:
+        require_not_negative("bandwidth", self.bandwidth)
+        require(0.0 <= self.bears <= 0.5, "bears", self.bears, "a fraction from 0 to 0.5")
+        require(
+            not (self.bandwidth and self.coefficients),
+            "bandwidth",
+            self.bandwidth,
+            "with poles: auto only, not with coefficients",
+        )
         require(
             not (self.poles and (self.coefficients or self.integral)),
             "poles",
             self.poles,
             "either poles, or coefficients with or without integral",
         )
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether poles are to be chosen."""
+        return self.bandwidth > 0.0 and not self.poles
 
 
 @dc.dataclass

@@ -1,11 +1,13 @@
 """The law of a scenario."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from diagrams.scenario import (
     ControllerParameters,
-    GainParameters,
 )
+from diagrams.tasks.gains import choose_poles, gains_of
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
 from pfsc_drake.control.law.linearization import (
@@ -13,11 +15,9 @@ from pfsc_drake.control.law.linearization import (
     ActuationOptions,
     linearize,
 )
+from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.stabilization import (
-    CoordinateGains,
     Stabilization,
-    check_gains,
-    gains_from_poles,
 )
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
@@ -25,14 +25,18 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 
 def make_law(
-    parameters: ControllerParameters, robot: RobotModel, manifold: Manifold
+    parameters: ControllerParameters,
+    robot: RobotModel,
+    manifold: Manifold,
+    rest: Callable[[], RestPosture] | None = None,
 ) -> FollowingLaw:
     """Return the law that makes a robot follow a manifold.
 
     Args:
-        parameters: What the scenario says.
+        parameters: What the scenario says; poles that are to be chosen are filled in.
         robot: The robot.
         manifold: What to follow.
+        rest: Tells where the robot starts at rest; needed to choose poles.
 
     Raises:
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
@@ -51,10 +55,11 @@ def make_law(
             f"write {law}: {{{example}}} with poles (1/s) of your choice"
         )
     by_kind = parameters.gains[law]
+    choose_poles(parameters, robot, linearization, rest)
     # coordinates of a kind share their gains
     names = [coordinate.kind.value for coordinate in manifold.coordinates]
     relative_degree = linearization.relative_degree
-    gains = [_gains(getattr(by_kind, name), relative_degree, law, name) for name in names]
+    gains = [gains_of(getattr(by_kind, name), relative_degree, law, name) for name in names]
     effort = robot.gather("effort_limit") * parameters.effort_scale
     limits = robot.gather("velocity_limit") if relative_degree == 1 else effort
     return FollowingLaw(
@@ -66,20 +71,3 @@ def make_law(
         parameters.max_alpha,
         SafeState(parameters.brake_damping * effort),
     )
-
-
-def _gains(
-    parameters: GainParameters, relative_degree: int, law: str, name: str
-) -> CoordinateGains:
-    key = f"controller.gains.{law}.{name}"
-    if parameters.poles:
-        gains = gains_from_poles(parameters.poles)
-    elif len(parameters.coefficients) == relative_degree:
-        gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
-    else:
-        raise InputError(
-            f"{key}: {len(parameters.coefficients)} coefficients and no poles; "
-            f"the law needs {relative_degree} of either"
-        )
-    check_gains(gains, relative_degree, key)
-    return gains
