@@ -3,6 +3,7 @@
 import dataclasses as dc
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 
 MANIFOLDS = ("path", "trajectory")
@@ -86,6 +87,7 @@ class ControllerParameters:
         external_torque: What it knows of forces on the tool.
         model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
             robot parameters; empty for the plant's own. ``model_error`` comes on top.
+        friction: What it does about friction.
     """
 
     law: str = "elastic"
@@ -99,6 +101,9 @@ class ControllerParameters:
     manifold: str = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
     model: str = ""
+    friction: FrictionCompensationParameters = dc.field(
+        default_factory=FrictionCompensationParameters
+    )
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))

@@ -8,6 +8,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
+from diagrams.tasks.friction import Coefficients, add_friction_compensation
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
@@ -28,6 +29,7 @@ class Following:
         task: What it is to do.
         law: The law.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
+        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
     """
 
     scenario: Scenario
@@ -35,6 +37,7 @@ class Following:
     task: Task
     law: FollowingLaw
     on_motors: bool = False
+    friction: Coefficients | None = None
 
 
 @dataclass(frozen=True)
@@ -102,10 +105,11 @@ def add_law(
 
     Returns:
         The controller, and its signals ``reference`` and ``law``; with compliance also
-        ``desired_reference`` and ``manifold_force``.
+        ``desired_reference`` and ``manifold_force``, with an observer of friction
+        ``friction_estimate``.
 
     Raises:
-        InputError: If compliance or external torques do not suit the law.
+        InputError: If compliance, external torques or friction do not suit the law.
     """
     scenario, law, signals = following.scenario, following.law, place.signals | forces
     controller = builder.AddNamedSystem(
@@ -121,6 +125,9 @@ def add_law(
         made |= add_compliance(builder, scenario, law.linearization, inputs)
     if scenario.controller.external_torque.source != "none":
         add_external_torque(builder, following.robot, scenario, controller, signals)
+    made |= add_friction_compensation(
+        builder, following.robot, scenario, controller, following.friction, signals
+    )
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))

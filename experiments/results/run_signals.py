@@ -286,3 +286,6 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     if "friction_torque" in raw:
         labels = [f"tau_f_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_f", raw["friction_torque"], effort, labels)
+    if "friction_estimate" in raw:
+        labels = [f"tau_f_estimate_{i + 1}" for i in range(station.robot.dimension)]
+        log.add("friction_estimate", raw["friction_estimate"], effort, labels)

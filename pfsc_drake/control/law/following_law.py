@@ -134,6 +134,7 @@ class FollowingLaw:
         self._state, self._point = arrays["state"], arrays["manifold_point"]
         self._reference, self._integral = arrays["reference"], arrays["integral"]
         self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
+        self._friction = arrays["friction"]
         self._lead, self._rhs = arrays["lead"], arrays["rhs"]
         # CasADi stores by columns
         self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
@@ -148,6 +149,7 @@ class FollowingLaw:
         integral: np.ndarray,
         last_held: np.ndarray | None = None,
         tau_ext: np.ndarray | None = None,
+        friction: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the drive input of one tick and all that belongs to it.
 
@@ -160,6 +162,8 @@ class FollowingLaw:
             last_held: ``held`` of the last tick, shape (N,); if omitted nothing is
                 extrapolated.
             tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
+            friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,);
+                zero if omitted.
 
         Returns:
             New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
@@ -169,6 +173,7 @@ class FollowingLaw:
         self._reference[:] = reference
         self._integral[:] = integral
         self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
+        self._friction[:] = 0.0 if friction is None else friction
         self._linearize()
         solution = self._inverse.solve(self._A, self._rhs)
         self._solution[:] = solution.x
@@ -194,7 +199,7 @@ class FollowingLaw:
             and math.isfinite(self._check[0])
         ):
             return _NO_FAULT
-        inputs = (self._state, self._reference, self._integral, self._tau_ext)
+        inputs = (self._state, self._reference, self._integral, self._tau_ext, self._friction)
         if not all(np.isfinite(values).all() for values in inputs):
             return Fault.INPUT_NOT_FINITE
         if status == _NOT_CONVERGED:
@@ -264,11 +269,11 @@ def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca
     n, m = linearization.num_joints, linearization.num_outputs
     r = linearization.relative_degree
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    solution, drift, offset, last_held = (ca.SX.sym(name, n) for name in "xdol")
+    solution, drift, offset, last_held, friction = (ca.SX.sym(name, n) for name in "xdolf")
     gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
     v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
     held = gain @ solution + drift
-    wanted = held + lead * (held - last_held) + offset
+    wanted = held + lead * (held - last_held) + offset + friction
     drive = ca.fmin(ca.fmax(wanted, -limits), limits)
     saturated = ca.sum1(ca.fabs(wanted) > limits)
     # the fault is judged outside
@@ -279,6 +284,7 @@ def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca
         "gain": gain,
         "drift": drift,
         "offset": offset,
+        "friction": friction,
         "last_held": last_held,
         "lead": lead,
         "Y": Y,

@@ -34,6 +34,8 @@ class FollowingController(LeafSystem):
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.
+        friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
+            [Nm or N], shape (N,); zero if not connected, and in the safe state. Only for r > 1.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
             m/s]; the attribute ``drive_port`` holds the name.
@@ -68,6 +70,7 @@ class FollowingController(LeafSystem):
         )
         self._reference: InputPort = self.DeclareVectorInputPort("reference", (r + 1) * m)
         self._tau_ext: InputPort | None = None
+        self._friction: InputPort | None = None
         sources = {
             self._joint_state.ticket(),
             self._manifold_point.ticket(),
@@ -76,7 +79,8 @@ class FollowingController(LeafSystem):
         }
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
-            sources.add(self._tau_ext.ticket())
+            self._friction = self.DeclareVectorInputPort("friction_torque", n)
+            sources |= {self._tau_ext.ticket(), self._friction.ticket()}
         self._output: OutputPort = self.DeclareVectorOutputPort(
             "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
@@ -104,16 +108,15 @@ class FollowingController(LeafSystem):
 
     def _calc_law(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
-        state, tau_ext = self._joint_state.Eval(context), None
-        if self._tau_ext is not None and self._tau_ext.HasValue(context):
-            tau_ext = self._tau_ext.Eval(context)
+        state = self._joint_state.Eval(context)
         result = self._law.evaluate(
             state,
             self._manifold_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
             memory[self._held] if memory[self._known] else None,
-            tau_ext,
+            _value(self._tau_ext, context),
+            _value(self._friction, context),
         )
         status = self.layout.status.start
         fault = memory[self._fault] or result[status]
@@ -143,3 +146,10 @@ class FollowingController(LeafSystem):
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error
+
+
+def _value(port: InputPort | None, context: Context) -> np.ndarray | None:
+    """Return the value of an optional port, or None if there is none."""
+    if port is None or not port.HasValue(context):
+        return None
+    return port.Eval(context)

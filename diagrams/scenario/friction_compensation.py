@@ -1,0 +1,93 @@
+"""What the controller does about friction."""
+
+import dataclasses as dc
+
+import numpy as np
+
+from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.drives import JointFrictionParameters
+
+_SOURCES = ("none", "model", "observer")
+_OBSERVERS = ("disturbance", "kalman")
+_VELOCITIES = ("measured", "reference")
+
+
+@dc.dataclass
+class KalmanParameters:
+    """Friction Kalman filter, see :class:`~pfsc_drake.control.estimation.friction_kalman`.
+
+    Numbers of the same kind are one for all joints or one per joint.
+
+    Attributes:
+        intervals: ``mean``: what happens in a sampling interval enters by its mean; ``begin``:
+            by its value at the beginning, as printed in (A.5).
+        start: First estimates of f_c and f_v, as a fraction of what is believed.
+        momentum_noise: Variance that the momentum gains per sample [(Nm s)^2].
+        coulomb_noise: Variance that f_c gains per sample [Nm^2].
+        viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2].
+        measurement_noise: Variance of a measured momentum [(Nm s)^2].
+        initial_variance: Of all states at the start.
+        resting_velocity: Magnitude below which a drive counts as stuck and teaches nothing
+            [rad/s or m/s]; ``intervals: mean`` only.
+    """
+
+    intervals: str = "mean"
+    start: float = 1.0
+    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
+    coulomb_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
+    viscous_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
+    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-2])
+    initial_variance: float = 1e3
+    resting_velocity: float = 0.01
+
+    def __post_init__(self) -> None:
+        known = self.intervals in ("mean", "begin")
+        require(known, "intervals", self.intervals, "mean, begin")
+        for key in ("start", "initial_variance", "resting_velocity"):
+            require_not_negative(key, getattr(self, key))
+        for key in ("momentum_noise", "coulomb_noise", "viscous_noise"):
+            good = bool(getattr(self, key)) and all(0.0 <= x < np.inf for x in getattr(self, key))
+            require(good, key, getattr(self, key), "finite numbers, none negative")
+        noise = self.measurement_noise
+        good = bool(noise) and all(0.0 < x < np.inf for x in noise)
+        require(good, "measurement_noise", noise, "positive numbers")
+
+
+@dc.dataclass
+class FrictionCompensationParameters:
+    """Friction that the drive torques overcome, (2.42), (3.29), (3.58), (3.65).
+
+    What is believed of it is what the plant has, unless ``believed`` says otherwise.
+
+    Attributes:
+        source: ``none``; ``model``: Coulomb and viscous friction as believed; ``observer``: what
+            an observer makes of how the joints move.
+        velocity: On which friction with known coefficients acts: ``measured``, or the
+            ``reference`` velocity of the joints, which has no noise but is a tick old.
+        smoothing: Velocity around zero over which Coulomb friction changes its sign [rad/s or
+            m/s].
+        observer: ``disturbance``: of first order, the torque without a model of friction;
+            ``kalman``: of the coefficients.
+        rate: L of the disturbance observer [1/s].
+        kalman: The friction Kalman filter.
+        applied: Whether what an observer finds is compensated, or only logged.
+        believed: Coefficients that are believed.
+    """
+
+    source: str = "none"
+    velocity: str = "measured"
+    smoothing: float = 0.02
+    observer: str = "disturbance"
+    rate: float = 300.0
+    kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
+    applied: bool = True
+    believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+
+    def __post_init__(self) -> None:
+        require(self.source in _SOURCES, "source", self.source, ", ".join(_SOURCES))
+        require(self.velocity in _VELOCITIES, "velocity", self.velocity, ", ".join(_VELOCITIES))
+        require(self.observer in _OBSERVERS, "observer", self.observer, ", ".join(_OBSERVERS))
+        require_positive("smoothing", self.smoothing)
+        require_positive("rate", self.rate)
+        allowed = "true; friction by a model is known beforehand, source none leaves it alone"
+        require(self.applied or self.source != "model", "applied", self.applied, allowed)
