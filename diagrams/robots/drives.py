@@ -134,6 +134,31 @@ def add_friction(
     return {"friction_torque": friction.GetOutputPort("friction_torque")}
 
 
+def believed_friction(
+    part: RobotPart, scenario: Scenario, folder: FilePath
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the coefficients f_c and f_v that the controller believes, each (N,), if any.
+
+    Those of ``controller.friction.believed``, else those of the plant with the belief's error.
+
+    Args:
+        part: The robot.
+        scenario: The scenario.
+        folder: Where relative file names start.
+
+    Raises:
+        InputError: If they do not suit the robot.
+    """
+    given = scenario.controller.friction.believed
+    if given.is_given:
+        return _given_coefficients(given, part.robot, folder, "controller.friction.believed")
+    true = _coefficients(scenario, part, folder)
+    if true is None:
+        return None
+    factors = part.belief.friction
+    return factors[0] * true[0], factors[1] * true[1]
+
+
 def _bristles(
     scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
@@ -162,12 +187,12 @@ def _coefficients(
     allowed = "null; the parameters of this robot tell no friction, 'friction' does"
     require(own is not None or wanted is None, "drive_friction", wanted, allowed)
     if scenario.friction.is_given:
-        return _given_coefficients(scenario.friction, part.robot, folder)
+        return _given_coefficients(scenario.friction, part.robot, folder, "friction")
     return None if wanted is False else own
 
 
 def _given_coefficients(
-    parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath
+    parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath, block: str
 ) -> tuple[np.ndarray, np.ndarray]:
     n = chain.dimension
     if parameters.file:
@@ -175,13 +200,13 @@ def _given_coefficients(
         known = load_parameters(folder / file if FilePath(file).suffix else file).friction
         if known.coulomb.size < n:
             raise InputError(
-                f"friction.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
+                f"{block}.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
             )
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):
         given = getattr(parameters, key) or [0.0] * n
         if len(given) != n:
-            raise InputError(f"friction.{key}: {len(given)} values; the robot has {n} joints")
+            raise InputError(f"{block}.{key}: {len(given)} values; the robot has {n} joints")
         values.append(np.array(given, dtype=float))
     return values[0], values[1]

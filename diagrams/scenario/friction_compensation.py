@@ -14,7 +14,7 @@ _VELOCITIES = ("measured", "reference")
 
 @dc.dataclass
 class KalmanParameters:
-    """Friction Kalman filter, see :class:`~pfsc_drake.control.estimation.friction_kalman`.
+    """The friction Kalman filter, see :class:`FrictionKalmanFilter`.
 
     Numbers of the same kind are one for all joints or one per joint.
 
@@ -70,7 +70,7 @@ class FrictionCompensationParameters:
             ``kalman``: of the coefficients.
         rate: L of the disturbance observer [1/s].
         kalman: The friction Kalman filter.
-        applied: Whether what an observer finds is compensated, or only logged.
+        watched: Whether the observer runs beside ``none`` or ``model``, only to be logged.
         believed: Coefficients that are believed.
     """
 
@@ -80,7 +80,7 @@ class FrictionCompensationParameters:
     observer: str = "disturbance"
     rate: float = 300.0
     kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
-    applied: bool = True
+    watched: bool = False
     believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
 
     def __post_init__(self) -> None:
@@ -89,5 +89,17 @@ class FrictionCompensationParameters:
         require(self.observer in _OBSERVERS, "observer", self.observer, ", ".join(_OBSERVERS))
         require_positive("smoothing", self.smoothing)
         require_positive("rate", self.rate)
-        allowed = "true; friction by a model is known beforehand, source none leaves it alone"
-        require(self.applied or self.source != "model", "applied", self.applied, allowed)
+        told = self.velocity == "measured" or self.source == "none" or self.has_coefficients
+        allowed = "measured; the disturbance observer knows no friction that acts on a velocity"
+        require(told, "velocity", self.velocity, allowed)
+
+    @property
+    def has_coefficients(self) -> bool:
+        """Whether what is compensated is friction with coefficients."""
+        kalman = self.source == "observer" and self.observer == "kalman"
+        return kalman or self.source == "model"
+
+    @property
+    def needs_reference_velocity(self) -> bool:
+        """Whether the law has to tell the velocities that the reference asks for."""
+        return self.velocity == "reference" and self.has_coefficients

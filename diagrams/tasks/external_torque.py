@@ -21,7 +21,7 @@ def add_external_torque(
     scenario: Scenario,
     controller: FollowingController,
     ports: dict[str, OutputPort],
-) -> None:
+) -> dict[str, OutputPort]:
     """Tell the law the external torques in the joints, if it is to know them.
 
     Args:
@@ -30,6 +30,9 @@ def add_external_torque(
         scenario: The scenario.
         controller: The controller.
         ports: ``joint_state``, and of ``wrench_ext`` and ``wrench_measured`` what there is.
+
+    Returns:
+        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the tool.
 
     Raises:
         InputError: If the law knows no external torques.
@@ -43,7 +46,7 @@ def add_external_torque(
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
     if wrench is None:  # nothing acts on the tool
-        return
+        return {}
     torque = builder.AddNamedSystem(
         "external_torque",
         ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
@@ -51,3 +54,4 @@ def add_external_torque(
     builder.Connect(wrench, torque.GetInputPort("wrench"))
     builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
     builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))
+    return {"tau_ext": torque.GetOutputPort("tau_ext")}

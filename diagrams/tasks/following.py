@@ -124,7 +124,7 @@ def add_law(
         }
         made |= add_compliance(builder, scenario, law.linearization, inputs)
     if scenario.controller.external_torque.source != "none":
-        add_external_torque(builder, following.robot, scenario, controller, signals)
+        signals |= add_external_torque(builder, following.robot, scenario, controller, signals)
     made |= add_friction_compensation(
         builder, following.robot, scenario, controller, following.friction, signals
     )

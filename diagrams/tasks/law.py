@@ -65,6 +65,7 @@ def make_law(
         limits,
         parameters.max_alpha,
         SafeState(parameters.brake_damping * effort),
+        tells_reference_velocity=parameters.friction.needs_reference_velocity,
     )
 
 

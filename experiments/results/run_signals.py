@@ -287,5 +287,15 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         labels = [f"tau_f_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_f", raw["friction_torque"], effort, labels)
     if "friction_estimate" in raw:
-        labels = [f"tau_f_estimate_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("friction_estimate", raw["friction_estimate"], effort, labels)
+        _add_friction_estimate(log, station, raw["friction_estimate"])
+
+
+def _add_friction_estimate(log: RunLog, station: Station, estimate: np.ndarray) -> None:
+    """Add what is thought of friction: torques, and coefficients if they are estimated."""
+    _, speed, effort = _joint_units(station)
+    n = station.robot.dimension
+    names = {"friction_estimate": ("tau_f", effort), "f_c_estimate": ("f_c", effort)}
+    names["f_v_estimate"] = ("f_v", f"{effort} s/rad" if speed == "rad/s" else f"{effort} s/m")
+    parts = np.split(estimate, estimate.shape[1] // n, axis=1)
+    for (name, (symbol, unit)), values in zip(names.items(), parts, strict=False):
+        log.add(name, values, unit, [f"{symbol}_estimate_{i + 1}" for i in range(n)])
