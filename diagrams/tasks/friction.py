@@ -96,7 +96,7 @@ def _add_observer(
 ) -> tuple[OutputPort, OutputPort]:
     """Add an observer of friction, and return the torque and all that it tells."""
     parameters, period = scenario.controller.friction, scenario.controller.sampling_time
-    momentum = drive_momentum(robot)
+    momentum = drive_momentum(robot).with_delay(velocity_delay(scenario))
     system: DisturbanceObserver | FrictionEstimator
     torque = "estimate"
     if parameters.observer == "kalman":
@@ -114,6 +114,11 @@ def _add_observer(
         # laws for rigid joints are told torques without derivatives
         builder.Connect(ports["tau_ext"], observer.GetInputPort("known_torque"))
     return observer.GetOutputPort(torque), observer.GetOutputPort("estimate")
+
+
+def velocity_delay(scenario: Scenario) -> float:
+    """Return how old measured velocities are [s]; a difference quotient is that of mid-interval."""
+    return scenario.controller.sampling_time / 2.0 if scenario.encoders.difference_quotient else 0.0
 
 
 def _required(believed: Coefficients | None, choice: str) -> Coefficients:

@@ -63,12 +63,13 @@ class FrictionKalmanFilter:
 
     (s for a velocity that goes evenly from one value to the other), and an axis at rest, below a
     velocity, is left alone: a drive that sticks tells nothing about its coefficients. Velocities
-    and positions are those that friction acts on, of the motors.
+    and positions are those that friction acts on, of the motors. Where velocities are measured
+    with a delay, all is taken that much earlier.
 
     Memory is one array, which :meth:`estimate` reads and :meth:`remember` writes.
 
     Args:
-        model: Momenta and forces, of :func:`drive_momentum`.
+        model: Momenta and forces, of :func:`drive_momentum`; their delay is at most T.
         start: First estimates of f_c and f_v, shape (2, N).
         noise: The covariances.
         period: Sampling time T [s].
@@ -181,14 +182,18 @@ def _filter_function(
 
     ``(memory, state, velocity, drive_torque, known_torque) -> (estimate, next memory, check)``;
     the check is finite only if the next memory is. Memory: p, f_c, f_v; the entries pp, pc, pv,
-    cc, cv, vv of P; position, velocity, forces and drive torques of the last sample; whether
-    there was one.
+    cc, cv, vv of P; position, velocity, forces and torques of the last sample, and the torques
+    of the one before; whether there was one.
     """
     n = model.dimension
-    memory, velocity = ca.SX.sym("memory", 13 * n + 1), ca.SX.sym("velocity", n)
+    memory, velocity = ca.SX.sym("memory", 14 * n + 1), ca.SX.sym("velocity", n)
     drive, known = ca.SX.sym("drive_torque", n), ca.SX.sym("known_torque", n)
-    p, f_c, f_v, pp, pc, pv, cc, cv, vv, q_0, v_0, forces_0, acting = ca.vertsplit(memory[:-1], n)
+    p, f_c, f_v, pp, pc, pv, cc, cv, vv, q_0, v_0, forces_0, last, before = ca.vertsplit(
+        memory[:-1], n
+    )
+    acting = last + model.delay / period * (before - last)
     q, v = ca.vertsplit(model.state, n)[2:]
+    q = q - model.delay * v
     if mean:
         turns = v * v_0 < 0.0
         share = (ca.fabs(v) - ca.fabs(v_0)) / ca.if_else(turns, v - v_0, 1.0)
@@ -223,7 +228,7 @@ def _filter_function(
     learns = ca.logic_and(memory[-1] > 0.0, ca.fmin(ca.fabs(v), ca.fabs(v_0)) > resting)
     filtered = [ca.if_else(learns, a, b) for a, b in zip(corrected, anew, strict=True)]
     told = ca.DM(model.drive_weight) * drive + ca.DM(model.known_weight) * known
-    following = ca.vertcat(*filtered, q, v, model.forces, told, 1.0)
+    following = ca.vertcat(*filtered, q, v, model.forces, told, last, 1.0)
     torque = friction_torque(filtered[1], filtered[2], velocity, smoothing)
     results = [ca.vertcat(torque, *filtered[1:3]), following, ca.sum1(following)]
     return ca.Function(

@@ -6,7 +6,7 @@ kinetic less the potential energy (A. De Luca, R. Mattone, ICRA 2003; App. A). I
 no acceleration, and a difference of momenta tells the mean of all that acted in between.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,7 @@ class MomentumModel:
         drive_weight: Of each drive, 1 or 0, shape (N,).
         known_weight: Of each known torque, shape (N,).
         sign: 1 or -1.
+        delay: Age of the velocities when they are measured [s].
     """
 
     state: ca.SX
@@ -37,11 +38,26 @@ class MomentumModel:
     drive_weight: np.ndarray
     known_weight: np.ndarray
     sign: float
+    delay: float = 0.0
 
     @property
     def dimension(self) -> int:
         """Number of joints N."""
         return self.momentum.numel()
+
+    def with_delay(self, delay: float) -> "MomentumModel":
+        """Return the momenta of a state whose velocities are older than its positions.
+
+        A difference quotient is the velocity half an interval ago. So that all is of one age,
+        positions are taken back, ``q - delay q'``; what acts has to be of the same age, too.
+
+        Args:
+            delay: Age of the velocities [s].
+        """
+        q_J, v_J, q_M, v_M = ca.vertsplit(self.state, self.dimension)
+        then = ca.vertcat(q_J - delay * v_J, v_J, q_M - delay * v_M, v_M)
+        momentum, forces = ca.substitute([self.momentum, self.forces], [self.state], [then])
+        return replace(self, momentum=momentum, forces=forces, delay=delay)
 
     def function(self) -> ca.Function:
         """Return ``state -> (p, f)``, shapes (4N,), (N,), (N,)."""

@@ -18,7 +18,8 @@ class MomentumObserver:
 
         z_mean = sign ((p_k - p_{k-1}) / T - (f_k + f_{k-1}) / 2 - tau_{k-1})
 
-    with ``tau = drive_weight tau_d + known_weight tau_k``. The estimate follows it as
+    with ``tau = drive_weight tau_d + known_weight tau_k``; where velocities are measured with a
+    delay, tau is the mean over an interval that much earlier. The estimate follows it as
     :class:`SignalDerivatives` does; without derivatives that is the disturbance observer of
     first order with rate L, ``z_hat' = L (z - z_hat)``, exactly discretized::
 
@@ -28,7 +29,7 @@ class MomentumObserver:
     that of an observer that has seen nothing: the first estimate is zero.
 
     Args:
-        model: Momenta and forces.
+        model: Momenta and forces; their delay is at most T.
         rate: L [1/s].
         period: Sampling time T [s].
         num_derivatives: Number of derivatives of the estimate, 0 to 2.
@@ -106,10 +107,11 @@ def _observer_function(
     """
     n, rows = model.dimension, num_derivatives + 1
     filter_ = SignalDerivatives(num_derivatives, rate, period)
-    memory = ca.SX.sym("memory", (rows + 3) * n + 1)
+    memory = ca.SX.sym("memory", (rows + 4) * n + 1)
     drive, known = ca.SX.sym("drive_torque", n), ca.SX.sym("known_torque", n)
     predicted = ca.reshape(memory[: rows * n], n, rows)
-    p, f, acting = ca.vertsplit(memory[rows * n : -1], n)
+    p, f, last, before = ca.vertsplit(memory[rows * n : -1], n)
+    acting = last + model.delay / period * (before - last)
     change = (model.momentum - p) / period
     mean = model.sign * (change - (model.forces + f) / 2.0 - acting)
     innovation = ca.if_else(memory[-1] > 0.0, mean - predicted[:, 0], 0.0)
@@ -119,6 +121,7 @@ def _observer_function(
         model.momentum,
         model.forces,
         ca.DM(model.drive_weight) * drive + ca.DM(model.known_weight) * known,
+        last,
         1.0,
     )
     results = [ca.vec(estimate), following, ca.sum1(following)]
