@@ -148,11 +148,16 @@ def _kalman(
             )
         return np.broadcast_to(np.array(given, dtype=float), n)
 
-    kinds = ("momentum_noise", "coulomb_noise", "viscous_noise", "measurement_noise")
     return FrictionKalmanFilter(
         momentum,
         kalman.start * np.array(believed),
-        FrictionNoise(*(values(key) for key in kinds), kalman.initial_variance),
+        FrictionNoise(
+            values("momentum_noise"),
+            values("coulomb_noise"),
+            values("viscous_noise"),
+            values("measurement_noise"),
+            kalman.initial_variance,
+        ),
         period,
         intervals=kalman.intervals,
         resting_velocity=kalman.resting_velocity,

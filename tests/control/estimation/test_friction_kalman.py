@@ -9,7 +9,7 @@ from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, 
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
 from pfsc_drake.errors import InputError
 
-PERIOD, COUNT = 1e-3, 400
+PERIOD, COUNT = 4e-3, 400
 F_C, F_V = np.array([12.0, 5.0]), np.array([6.0, 9.0])
 MASS, SPEED = np.array([3.0, 0.8]), np.array([1.3, 0.9])
 RATE, PHASE = np.array([9.0, 14.0]), np.array([0.4, 1.9])
@@ -36,7 +36,7 @@ def swing(count=3 * COUNT):
     v = SPEED * np.sin(RATE * t + PHASE)
 
     def sign_time(axis, k):
-        turns = (np.pi * np.arange(0, 20) - PHASE[axis]) / RATE[axis]
+        turns = (np.pi * np.arange(0, 30) - PHASE[axis]) / RATE[axis]
         inside = [x for x in turns if t[k, 0] < x < t[k + 1, 0]]
         value, _ = quad(
             lambda x: np.sign(np.sin(RATE[axis] * x + PHASE[axis])),
@@ -105,7 +105,7 @@ def test_means_find_what_beginnings_miss():
         )
         ends[intervals] = estimate(kalman, states, drives)[-1, 2:]
     off = {k: np.abs(x / np.concatenate([F_C, F_V]) - 1.0) for k, x in ends.items()}
-    assert off["mean"].max() < 2e-4
+    assert off["mean"].max() < 1e-3
     assert off["begin"].max() > 10.0 * off["mean"].max()
 
 
