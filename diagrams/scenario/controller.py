@@ -7,7 +7,7 @@ from diagrams.scenario.friction_compensation import FrictionCompensationParamete
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 
 MANIFOLDS = ("path", "trajectory")
-_TORQUE_SOURCES = ("none", "known", "measured")
+_TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
 @dc.dataclass
@@ -54,9 +54,11 @@ class ExternalTorqueParameters:
 
     Attributes:
         source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
-            ``measured``: from the force/torque sensor.
+            ``measured``: from the force/torque sensor; ``observed``: from how the links move,
+            without a sensor.
         bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
-            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives.
+            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives,
+            which only an observer cannot do.
     """
 
     source: str = "none"
@@ -66,6 +68,8 @@ class ExternalTorqueParameters:
         known = self.source in _TORQUE_SOURCES
         require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
         require_not_negative("bandwidth", self.bandwidth)
+        possible = self.source != "observed" or self.bandwidth > 0.0
+        require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 
 
 @dc.dataclass

@@ -12,7 +12,7 @@ from pfsc_drake.systems.control.following_controller import FollowingController
 def needs_sensor(scenario: Scenario) -> bool:
     """Return whether something in the scenario acts on measured forces."""
     measured = scenario.controller.external_torque.source == "measured"
-    return measured or scenario.compliance.is_given
+    return measured or scenario.compliance.needs_sensor
 
 
 def add_external_torque(
@@ -22,7 +22,7 @@ def add_external_torque(
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Tell the law the external torques in the joints, if it is to know them.
+    """Tell the law the external torques in the joints, as far as they come from a wrench.
 
     Args:
         builder: Builder of the diagram.
@@ -38,6 +38,8 @@ def add_external_torque(
         InputError: If the law knows no external torques.
     """
     parameters = scenario.controller.external_torque
+    if parameters.source in ("none", "observed"):
+        return {}
     wrench = ports.get({"known": "wrench_ext", "measured": "wrench_measured"}[parameters.source])
     degree = controller.relative_degree
     if degree == 1:

@@ -26,7 +26,7 @@ def add_friction_compensation(
     controller: FollowingController,
     believed: Coefficients | None,
     ports: dict[str, OutputPort],
-) -> dict[str, OutputPort]:
+) -> tuple[OutputPort | None, dict[str, OutputPort]]:
     """Let the law overcome friction, if it is to.
 
     Args:
@@ -38,15 +38,16 @@ def add_friction_compensation(
         ports: ``joint_state`` as measured, and ``tau_ext`` if the law is told of it.
 
     Returns:
-        For the log ``friction_estimate``, torques of shape (N,), or with coefficients
-        ``friction_estimate`` of shape (3N,), ``[tau_f, f_c, f_v]``; nothing without observer.
+        The friction torque that is compensated, if any is, shape (N,); and for the log
+        ``friction_estimate``, torques of shape (N,), or from the Kalman filter of shape (3N,),
+        ``[tau_f, f_c, f_v]``, if there is any.
 
     Raises:
         InputError: If the compensation does not suit law or robot, or lacks coefficients.
     """
     parameters = scenario.controller.friction
     if parameters.source == "none" and not parameters.watched:
-        return {}
+        return None, {}
     if controller.relative_degree == 1:
         raise InputError(
             f"controller.friction.source = {parameters.source} with the law "
@@ -66,7 +67,7 @@ def add_friction_compensation(
             compensated = torque
     if compensated is not None:
         builder.Connect(compensated, controller.GetInputPort("friction_torque"))
-    return logged
+    return compensated, logged
 
 
 def _add_model(

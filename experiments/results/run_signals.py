@@ -249,6 +249,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     known = {
         "wrench_ext": ("N, Nm", wrench),
         "wrench_measured": ("N, Nm", wrench),
+        "wrench_observed": ("N, Nm", wrench),
         "manifold_force": ("N, Nm", manifold),
         "tared": ("1", None),
         "sensor_fault": ("1", None),
@@ -259,6 +260,9 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     if "wrench_ext" in raw:
         labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
+    if "tau_ext_observed" in raw:
+        labels = [f"tau_ext_observed_{i + 1}" for i in range(station.robot.dimension)]
+        log.add("tau_ext_observed", raw["tau_ext_observed"], effort, labels)
     if "desired_reference" in raw:
         desired = raw["desired_reference"][:, :m]
         for kind, part, names in _kinds(station):
