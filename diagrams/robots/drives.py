@@ -1,5 +1,6 @@
 """What is between the law's output and the plant's joints: hold, servo, bus, friction."""
 
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -126,7 +127,9 @@ def add_friction(
             "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
         )
     bristles = _bristles(scenario, *coefficients, drives)
-    friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+    friction = builder.AddNamedSystem(
+        "joint_friction", JointFriction(bristles, scenario.friction.drift)
+    )
     velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
     builder.Connect(joint_state, velocity.get_input_port())
     builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
@@ -162,7 +165,15 @@ def believed_friction(
 def _bristles(
     scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
-    """Return friction whose bristles suit how the plant is integrated."""
+    """Return friction whose bristles suit how the plant is integrated, however it drifts."""
+    drift = scenario.friction.drift
+    stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
+    return replace(_bristles_now(scenario, stiffest, f_v, drives), coulomb=f_c)
+
+
+def _bristles_now(
+    scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+) -> BristleFriction:
     if drives.step is not None:
         return bristles_for_step(
             f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP

@@ -92,6 +92,8 @@ class FrictionCompensationParameters:
         told = self.velocity == "measured" or self.source == "none" or self.has_coefficients
         allowed = "measured; the disturbance observer knows no friction that acts on a velocity"
         require(told, "velocity", self.velocity, allowed)
+        drift = self.believed.drift
+        require(drift is None, "believed.drift", drift, "null; what is believed does not drift")
 
     @property
     def has_coefficients(self) -> bool:

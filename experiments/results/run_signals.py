@@ -73,6 +73,13 @@ def optional_signals(station: Station) -> set[str]:
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
     if "desired_reference" in names:
         names.add("xi_d")
+    if "friction_torque" in names:
+        names.add("tau_f")
+    estimate = station.log.rows.get("friction_estimate")
+    if estimate is not None and estimate.stop - estimate.start > station.robot.dimension:
+        names |= {"f_c_estimate", "f_v_estimate"}
+        if "tau_f" in names:
+            names |= {"f_c", "f_v"}
     if station.on_motors:
         names.add("xi_M")
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
@@ -292,6 +299,16 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         log.add("tau_f", raw["friction_torque"], effort, labels)
     if "friction_estimate" in raw:
         _add_friction_estimate(log, station, raw["friction_estimate"])
+    if "f_c_estimate" in log and "friction_torque" in raw:
+        _add_coefficients(log, station)
+
+
+def _add_coefficients(log: RunLog, station: Station) -> None:
+    """Add the true coefficients of friction, in the units of what is estimated."""
+    friction = station.diagram.GetSubsystemByName("joint_friction")
+    for name, values in zip(("f_c", "f_v"), friction.coefficients(log.time), strict=True):
+        labels = [f"{name}_{i + 1}" for i in range(station.robot.dimension)]
+        log.add(name, values, log[f"{name}_estimate"].unit, labels)
 
 
 def _add_friction_estimate(log: RunLog, station: Station, estimate: np.ndarray) -> None:
