@@ -23,8 +23,9 @@ class KalmanParameters:
             by its value at the beginning, as printed in (A.5).
         start: First estimates of f_c and f_v, as a fraction of what is believed.
         momentum_noise: Variance that the momentum gains per sample [(Nm s)^2].
-        coulomb_noise: Variance that f_c gains per sample [Nm^2].
-        viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2].
+        coulomb_noise: Variance that f_c gains per sample [Nm^2]; empty for the square of a
+            thousandth of what is believed.
+        viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2]; likewise.
         measurement_noise: Variance of a measured momentum [(Nm s)^2].
         initial_variance: Of all states at the start.
         resting_velocity: Magnitude below which a drive counts as stuck and teaches nothing
@@ -33,10 +34,10 @@ class KalmanParameters:
 
     intervals: str = "mean"
     start: float = 1.0
-    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
-    coulomb_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
-    viscous_noise: list[float] = dc.field(default_factory=lambda: [1e-4])
-    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-2])
+    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-6])
+    coulomb_noise: list[float] = dc.field(default_factory=list)
+    viscous_noise: list[float] = dc.field(default_factory=list)
+    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-3])
     initial_variance: float = 1e3
     resting_velocity: float = 0.01
 
@@ -46,8 +47,9 @@ class KalmanParameters:
         for key in ("start", "initial_variance", "resting_velocity"):
             require_not_negative(key, getattr(self, key))
         for key in ("momentum_noise", "coulomb_noise", "viscous_noise"):
-            good = bool(getattr(self, key)) and all(0.0 <= x < np.inf for x in getattr(self, key))
+            good = all(0.0 <= x < np.inf for x in getattr(self, key))
             require(good, key, getattr(self, key), "finite numbers, none negative")
+        require(bool(self.momentum_noise), "momentum_noise", [], "one number or one per joint")
         noise = self.measurement_noise
         good = bool(noise) and all(0.0 < x < np.inf for x in noise)
         require(good, "measurement_noise", noise, "positive numbers")

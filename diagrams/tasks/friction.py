@@ -17,6 +17,8 @@ from pfsc_drake.systems.control.friction_estimator import FrictionEstimator
 
 # f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
 Coefficients = tuple[np.ndarray, np.ndarray]
+# by which part of itself a coefficient is thought to change from sample to sample
+_DRIFT = 1e-3
 
 
 def add_friction_compensation(
@@ -140,8 +142,10 @@ def _kalman(
 ) -> FrictionKalmanFilter:
     kalman, n = parameters.kalman, momentum.dimension
 
-    def values(key: str) -> np.ndarray:
+    def values(key: str, believed: np.ndarray | None = None) -> np.ndarray:
         given = getattr(kalman, key)
+        if believed is not None and not given:
+            return (_DRIFT * believed) ** 2
         if len(given) not in (1, n):
             raise InputError(
                 f"controller.friction.kalman.{key}: {len(given)} values; allowed: 1 or {n}, the "
@@ -154,8 +158,8 @@ def _kalman(
         kalman.start * np.array(believed),
         FrictionNoise(
             values("momentum_noise"),
-            values("coulomb_noise"),
-            values("viscous_noise"),
+            values("coulomb_noise", believed[0]),
+            values("viscous_noise", believed[1]),
             values("measurement_noise"),
             kalman.initial_variance,
         ),

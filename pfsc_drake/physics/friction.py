@@ -128,7 +128,7 @@ class BristleFriction:
         return np.clip(load / limit, -1.0, 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass
 class FrictionDrift:
     """Friction that changes during a run, as that of a gear that becomes warm, evenly.
 
