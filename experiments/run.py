@@ -20,9 +20,9 @@ from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import PreparedRun, prepare
 from experiments.progress import ProgressListener
 from experiments.results.folder import ResultsFolder, check_folder, open_results
+from experiments.results.friction_metrics import friction_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.metrics import Metrics
-from experiments.results.friction_metrics import friction_metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
