@@ -12,7 +12,7 @@ from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.delta import DeltaPart, add_delta, is_delta
-from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.drives import add_drives, add_friction, believed_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
@@ -64,7 +64,8 @@ def build_station(
     law = make_law(scenario.controller, believed, task.manifold, rest)
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
-    following = Following(scenario, believed, task, law, on_motors)
+    friction = believed_friction(part, scenario, folder)
+    following = Following(scenario, believed, task, law, on_motors, friction)
 
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(builder, true_state, part.robot, scenario)

@@ -20,6 +20,7 @@ from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import PreparedRun, prepare
 from experiments.progress import ProgressListener
 from experiments.results.folder import ResultsFolder, check_folder, open_results
+from experiments.results.friction_metrics import friction_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
@@ -184,6 +185,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape))
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
@@ -194,7 +196,9 @@ def _measure(
     if analysis is not None:
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     for metric, target in settings.targets.get(settings.controller.law, {}).items():
-        metrics.set_target(metric, target.bound, target.source)
+        # what another choice of the controller would tell has been checked, and is no metric here
+        if metric in metrics:
+            metrics.set_target(metric, target.bound, target.source)
     results.write("metrics.json", metrics.to_json())
     warnings = [*prepared.warnings, *limits.warnings(log)]
     return _Measured(log, motion, metrics, warnings, result.fault, end)

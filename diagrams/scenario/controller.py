@@ -3,11 +3,12 @@
 import dataclasses as dc
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 MANIFOLDS = ("path", "trajectory")
-_TORQUE_SOURCES = ("none", "known", "measured")
+_TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
 @dc.dataclass
@@ -73,9 +74,11 @@ class ExternalTorqueParameters:
 
     Attributes:
         source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
-            ``measured``: from the force/torque sensor.
+            ``measured``: from the force/torque sensor; ``observed``: from how the links move,
+            without a sensor.
         bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
-            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives.
+            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives,
+            which only an observer cannot do.
     """
 
     source: str = "none"
@@ -85,6 +88,8 @@ class ExternalTorqueParameters:
         known = self.source in _TORQUE_SOURCES
         require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
         require_not_negative("bandwidth", self.bandwidth)
+        possible = self.source != "observed" or self.bandwidth > 0.0
+        require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 
 
 @dc.dataclass
@@ -106,6 +111,7 @@ class ControllerParameters:
         external_torque: What it knows of forces on the tool.
         model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
             robot parameters; empty for the plant's own. ``model_error`` comes on top.
+        friction: What it does about friction.
     """
 
     law: str = "elastic"
@@ -119,6 +125,9 @@ class ControllerParameters:
     manifold: str = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
     model: str = ""
+    friction: FrictionCompensationParameters = dc.field(
+        default_factory=FrictionCompensationParameters
+    )
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))

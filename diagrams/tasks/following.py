@@ -8,6 +8,8 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
+from diagrams.tasks.friction import Coefficients, add_friction_compensation
+from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
@@ -16,6 +18,9 @@ from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+
+# what an observer tells, for the log
+_OBSERVED = ("tau_ext_observed", "wrench_observed")
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,7 @@ class Following:
         task: What it is to do.
         law: The law.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
+        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
     """
 
     scenario: Scenario
@@ -35,6 +41,7 @@ class Following:
     task: Task
     law: FollowingLaw
     on_motors: bool = False
+    friction: Coefficients | None = None
 
 
 @dataclass(frozen=True)
@@ -102,10 +109,12 @@ def add_law(
 
     Returns:
         The controller, and its signals ``reference`` and ``law``; with compliance also
-        ``desired_reference`` and ``manifold_force``.
+        ``desired_reference`` and ``manifold_force``, with what estimates friction
+        ``friction_estimate``, with what observes forces ``tau_ext_observed`` and
+        ``wrench_observed``.
 
     Raises:
-        InputError: If compliance or external torques do not suit the law.
+        InputError: If compliance, external torques or friction do not suit the law.
     """
     scenario, law, signals = following.scenario, following.law, place.signals | forces
     controller = builder.AddNamedSystem(
@@ -113,14 +122,21 @@ def add_law(
     )
     desired = _add_smooth_start(builder, following, controller, place.desired_reference)
     made = {"reference": desired, "law": controller.GetOutputPort("law")}
+    signals |= add_external_torque(builder, following.robot, scenario, controller, signals)
+    friction, logged = add_friction_compensation(
+        builder, following.robot, scenario, controller, following.friction, signals
+    )
+    made |= logged
+    if friction is not None:
+        signals["friction"] = friction
+    signals |= add_observed_forces(builder, following.robot, scenario, controller, signals)
+    made |= {name: signals[name] for name in _OBSERVED if name in signals}
     if scenario.compliance.is_given:
         inputs = signals | {
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
         made |= add_compliance(builder, scenario, law.linearization, inputs)
-    if scenario.controller.external_torque.source != "none":
-        add_external_torque(builder, following.robot, scenario, controller, signals)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))

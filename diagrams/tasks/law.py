@@ -70,4 +70,5 @@ def make_law(
         limits,
         parameters.max_alpha,
         SafeState(parameters.brake_damping * effort),
+        tells_reference_velocity=parameters.friction.needs_reference_velocity,
     )
