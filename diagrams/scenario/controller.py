@@ -2,6 +2,8 @@
 
 import dataclasses as dc
 
+import numpy as np
+
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -23,16 +25,23 @@ class GainParameters:
         bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
         coefficients: ``a_1 .. a_r``, alternatively.
         integral: ``a_0``; needs coefficients.
+        integral_pole: With poles, one more pole [1/s] and with it an integral part, which takes
+            away what wrong masses leave at rest; 0 for none.
     """
 
     poles: list[float] = dc.field(default_factory=list, metadata=AUTO_OR_MANY)
     coefficients: list[float] = dc.field(default_factory=list)
     integral: float = 0.0
+    integral_pole: float = 0.0
     bandwidth: float = 0.0
     bears: float = 0.05
 
     def __post_init__(self) -> None:
         require_not_negative("bandwidth", self.bandwidth)
+        good = self.integral_pole <= 0.0 and bool(np.isfinite(self.integral_pole))
+        require(good, "integral_pole", self.integral_pole, "zero or a negative number")
+        alone = self.integral_pole != 0.0 and bool(self.coefficients)
+        require(not alone, "integral_pole", self.integral_pole, "0 with coefficients; see integral")
         require(0.0 <= self.bears <= 0.5, "bears", self.bears, "a fraction from 0 to 0.5")
         require(
             not (self.bandwidth and self.coefficients),

@@ -34,7 +34,7 @@ def gains_of(
     """
     key = f"controller.gains.{law}.{name}"
     if parameters.poles:
-        gains = gains_from_poles(parameters.poles)
+        gains = gains_from_poles(parameters.poles, parameters.integral_pole)
     elif len(parameters.coefficients) == relative_degree:
         gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
     else:
