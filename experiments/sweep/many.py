@@ -1,6 +1,7 @@
 """Many runs on many processes."""
 
 import contextlib
+import math
 import queue
 import threading
 import time
@@ -18,7 +19,8 @@ from pfsc_drake.errors import shortened
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-_LOOK = 0.2  # s, how often Ctrl-C and new workers are noticed
+_LOOK = 0.2  # s, how often Ctrl-C is noticed
+_ASK = 1.0  # s, how often new workers are; asking takes time from those of this machine
 # of a process [bytes], from which on it is replaced: every diagram leaves some megabytes behind
 _MOST_MEMORY = 1.5e9
 _RESTART_SECONDS = 120
@@ -89,6 +91,8 @@ class _Dispatcher:
         self._running: dict[int, _Run] = {}
         self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._restarting: set[str] = set()  # addresses
+        self._processes: list[str] = []
+        self._asked = -math.inf  # when they were asked for [s]
         self._batch = uuid.uuid4().hex
 
     def run(self, interrupted: Callable[[], bool]) -> str | None:
@@ -106,14 +110,16 @@ class _Dispatcher:
 
     def _hand_out(self) -> str | None:
         """Hands out runs to processes that have none; returns why that is impossible."""
-        try:
-            processes = list(self._client.nthreads())
-        except (OSError, ValueError, RuntimeError) as error:
-            return f"the scheduler is gone: {one_line(str(error)) or type(error).__name__}"
-        self._idle(len(processes))
+        if time.monotonic() - self._asked >= _ASK:
+            try:
+                self._processes = list(self._client.nthreads())
+            except (OSError, ValueError, RuntimeError) as error:
+                return f"the scheduler is gone: {one_line(str(error)) or type(error).__name__}"
+            self._asked = time.monotonic()
+            self._idle(len(self._processes))
         busy = {run.address for run in self._running.values()} | self._restarting
-        for address in (address for address in processes if address not in busy):
-            if not self._waiting or len(self._running) >= len(processes):
+        for address in (address for address in self._processes if address not in busy):
+            if not self._waiting or len(self._running) >= len(self._processes):
                 break
             number = self._waiting.pop()
             future = self._client.submit(
@@ -138,6 +144,7 @@ class _Dispatcher:
                 self._restarting.add(run.address)
                 threading.Thread(target=self._restart, args=[run.address], daemon=True).start()
         except KilledWorker:
+            self._processes = [address for address in self._processes if address != run.address]
             seconds = time.perf_counter() - run.begin
             reason = "its process ended in the middle of it: killed, crashed, or out of memory"
             row = RunRow(DIED, reason, seconds=seconds)
