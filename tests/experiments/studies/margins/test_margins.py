@@ -11,7 +11,7 @@ from experiments.cli import main
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.smooth import smooth
-from experiments.studies.margins.words import one_line, sentences
+from experiments.studies.margins.words import one_line
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 
@@ -44,23 +44,23 @@ def poles(*values):
     ]
 
 
-# rates [1/s] of one-tick differences made independently of this code, at rest
-@pytest.mark.parametrize(
-    ("error", "rate"), [("mass=0.95", 26.0), ("stiffness=1.05", 30.0), ("mass=1.05", -8.0)]
-)
-def test_six_axes_with_four_equal_poles(error, rate):
-    analysis = analysis_of("pfc_elastic_6r", *poles(-55, -55, -55, -55), f"model_error.{error}")
-    assert analysis.nominal.worst.rate == pytest.approx(rate, abs=1.0)
-    assert analysis.nominal.is_stable == (rate < 0.0)
-    assert ("UNSTABLE" in one_line(analysis)) == (rate > 0.0)
+def test_six_axes_with_four_equal_poles_do_not_bear_5_percent():
+    """By simulation the tool leaves the path by 130 mm and the run stops."""
+    changes = [*poles(-55, -55, -55, -55), "model_error.mass=0.95"]
+    analysis = analysis_of("pfc_elastic_6r", *changes)
+    # of one-tick differences made independently of this code, at rest
+    assert analysis.nominal.worst.rate == pytest.approx(26.0, abs=1.0)
+    assert not analysis.nominal.is_stable
+    assert "UNSTABLE" in one_line(analysis)
+    assert analysis.delay == -1
 
 
 def test_the_fast_pair_bears_the_box_and_has_margins():
     """With four equal poles the weakest drive bears 2 %."""
-    fast = analysis_of("pfc_elastic_6r", box=Box())
+    fast = analysis_of("pfc_elastic_6r", box=Box(0.05, 0.05, 0.0, 0.0))
     assert fast.nominal.is_stable
     assert all(case.is_stable for case in fast.cases)
-    assert list(fast.worst_by_key) == ["stiffness", "mass", "tool_mass"]
+    assert list(fast.worst_by_key) == ["stiffness", "mass"]
     equal = analysis_of("pfc_elastic_6r", *poles(-55, -55, -55, -55))
     assert equal.tightest.smallest < 0.05 < 0.2 < fast.tightest.smallest
 
@@ -93,7 +93,8 @@ def test_the_command_writes_a_page(tmp_path, capsys):
     assert status == 0
     text = capsys.readouterr().out
     assert "the loop is stable" in text
-    assert "What hurts most" in text
+    assert "What hurts most, by itself, is an error of" in text
+    assert "The weakest drive is" in text
     data = json.loads((out / "margins.json").read_text(encoding="utf-8"))
     assert len(data["loops"]) == 1 + 4 + 4
     assert data["loops"][0]["stable"]
@@ -152,10 +153,3 @@ def test_the_box():
 def test_refused_boxes(wrong):
     with pytest.raises(InputError, match="--"):
         Box(**wrong)
-
-
-def test_sentences_name_the_worst_parameter():
-    analysis = analysis_of("pfc_elastic_3r", box=Box())
-    text = " ".join(sentences(analysis))
-    assert "What hurts most, by itself, is an error of" in text
-    assert "The weakest drive is" in text
