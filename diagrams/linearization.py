@@ -92,6 +92,19 @@ class OnePeriodMap:
         discrete = [context.get_discrete_state(group).value() for group in self._groups]
         return np.concatenate([context.get_continuous_state_vector().CopyToVector(), *discrete])
 
+    def adopted(self, section: Context) -> Context:
+        """Return a section of this diagram with time and variables of another's.
+
+        Args:
+            section: Context of a diagram that differs in numbers only.
+        """
+        context = self._diagram.CreateDefaultContext()
+        context.SetTime(section.get_time())
+        x = self.variables(section)
+        for part in self._parts:
+            self._set_part(context, part, x[part])
+        return context
+
     def advance(self, section: Context, x: np.ndarray | None = None) -> np.ndarray:
         """Return the variables right after the next tick, shape (size,).
 

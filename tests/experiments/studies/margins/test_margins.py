@@ -123,6 +123,7 @@ def test_what_has_no_slope_is_taken_off():
         "pfc_compliant_6r",
         "encoders={motor_increments: [4000000], difference_quotient: true}",
         "friction.file=comau_racer_1_4",
+        "controller.friction.source=model",
     )
     smoothed, removed = smooth(settings)
     assert not smoothed.friction.is_given
@@ -130,6 +131,9 @@ def test_what_has_no_slope_is_taken_off():
     assert smoothed.encoders.difference_quotient
     assert not smoothed.sensor.noise.any()
     assert smoothed.forces == []
+    assert smoothed.controller.friction.source == "none"
+    observed = settings_of("pfc_elastic_6r", "controller.friction.source=observer")
+    assert smooth(observed)[0].controller.friction.source == "observer"
     assert settings.forces and settings.friction.is_given
     assert {"friction of the drives", "forces on the tool"} <= set(removed)
 
