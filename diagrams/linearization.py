@@ -92,6 +92,19 @@ class OnePeriodMap:
         discrete = [context.get_discrete_state(group).value() for group in self._groups]
         return np.concatenate([context.get_continuous_state_vector().CopyToVector(), *discrete])
 
+    def adopted(self, section: Context) -> Context:
+        """Return a section of this diagram with time and variables of another's.
+
+        Args:
+            section: Context of a diagram that differs in numbers only.
+        """
+        context = self._diagram.CreateDefaultContext()
+        context.SetTime(section.get_time())
+        x = self.variables(section)
+        for part in self._parts:
+            self._set_part(context, part, x[part])
+        return context
+
     def advance(self, section: Context, x: np.ndarray | None = None) -> np.ndarray:
         """Return the variables right after the next tick, shape (size,).
 
@@ -123,8 +136,11 @@ class OnePeriodMap:
         chosen = np.arange(self.size) if chosen is None else chosen
         n = len(chosen)
         A, changes = np.zeros((n, n)), np.zeros((n, n), dtype=bool)
-        switches = ~np.isfinite(x[chosen])
         middle = self.advance(section)[chosen]
+        # what is not known yet stays so; it must not make a switch of all that does not touch it
+        known = np.isfinite(middle)
+        switches = ~(np.isfinite(x[chosen]) & known)
+        middle[~known] = 0.0
         noise = _ROUNDING * np.maximum(1.0, np.abs(middle))
         for column, variable in enumerate(chosen):
             if switches[column]:
@@ -134,6 +150,7 @@ class OnePeriodMap:
                 self._shifted(section, x, variable, sign * delta)[chosen] - middle
                 for sign in (1.0, -1.0)
             )
+            forward[~known] = backward[~known] = 0.0
             with np.errstate(invalid="ignore"):
                 difference, bend = forward - backward, np.abs(forward + backward)
             scale = np.maximum(np.abs(forward), np.abs(backward))

@@ -7,9 +7,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from pydrake.systems.framework import Context
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.task import Task
 from experiments.progress import ProgressListener
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
@@ -192,11 +192,11 @@ def analyse(
     )
     if not way.instants:
         raise InputError("the law gives up before its first tick; run the scenario to see why")
-    study = _Study(smoothed, folder, station.task, way, progress, duration)
+    study = _Study(smoothed, folder, true_loop, way, progress, duration)
     errs = smoothed.model_error.is_given or bool(smoothed.controller.model)
     own = study.build(Error()) if errs else true_loop
-    chosen = own.variables_in_loop([way.instants[i].section for i in {0, len(way.instants) // 2}])
-    study.chosen = chosen
+    looked_at = [way.instants[i] for i in {0, len(way.instants) // 2}]
+    study.chosen = own.variables_in_loop([study.section(own, instant) for instant in looked_at])
     nominal, loops = study.case(own, Error(), way.instants)
     analysis = MarginAnalysis(
         period=own.map.period,
@@ -204,7 +204,7 @@ def analyse(
         box=box,
         nominal=nominal,
         drives_are_servos=own.drives_are_servos,
-        remarks=_remarks(removed, way),
+        remarks=_remarks(removed, way, station.workpiece is not None),
     )
     progress(duration, "margins of the drives")
     analysis.margins = [
@@ -232,7 +232,7 @@ class _Study:
 
     settings: Scenario
     folder: Path
-    task: Task
+    walked: StationLoop
     way: Walk
     progress: ProgressListener
     duration: float
@@ -240,13 +240,19 @@ class _Study:
 
     def build(self, error: Error) -> StationLoop:
         self.progress(self.duration, f"linearizing, {error}")
-        return StationLoop(error.applied_to(self.settings), self.folder, self.task)
+        return StationLoop(error.applied_to(self.settings), self.folder, self.walked.station.task)
+
+    def section(self, loop: StationLoop, instant: Instant) -> Context:
+        """Return an instant as a state of a loop's own station."""
+        own = loop is self.walked
+        return instant.section if own else loop.map.adopted(instant.section)
 
     def case(
         self, loop: StationLoop, error: Error, instants: Sequence[Instant]
     ) -> tuple[Case, list[LinearLoop | None]]:
         """Return a loop along its way, and what it is at each instant."""
-        loops = [linearize(loop, instant.section, self.chosen) for instant in instants]
+        sections = [self.section(loop, instant) for instant in instants]
+        loops = [linearize(loop, section, self.chosen) for section in sections]
         places = [
             Place(instant, None if linear is None else modes(linear.A, loop.map.period))
             for instant, linear in zip(instants, loops, strict=True)
@@ -282,8 +288,13 @@ def _saying(key: str, remarks: list[str]) -> Iterator[None]:
         remarks.append(f"model_error.{key} is left out: {error}")
 
 
-def _remarks(removed: Sequence[str], way: Walk) -> list[str]:
+def _remarks(removed: Sequence[str], way: Walk, touches: bool) -> list[str]:
     remarks = []
+    if touches:
+        remarks.append(
+            "Contact forces are those of the plant's last step, which it remembers beside its "
+            "state; that lag is left out, so that rates near zero tell little."
+        )
     if removed:
         remarks.append(
             f"Taken off, because it has no slope or acts from outside: {', '.join(removed)}."

@@ -123,7 +123,7 @@ def linearize(loop: StationLoop, section: Context, chosen: np.ndarray) -> Linear
 
     Args:
         loop: The loop.
-        section: Context right after a tick, of this station or of one that differs in numbers only.
+        section: Context right after a tick.
         chosen: The variables in the loop, in increasing order.
 
     Returns:

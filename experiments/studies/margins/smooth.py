@@ -16,7 +16,7 @@ from diagrams.tasks.external_torque import needs_sensor
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     """Return a scenario without what has no slope or acts from outside, and what was taken off.
 
-    Difference quotients, filters, delays and the operator's hand stay: they are part of the loop.
+    Difference quotients, filters, disturbance observers, delays and the operator's hand stay: they are part of the loop.
 
     Args:
         settings: The scenario; unchanged.
@@ -28,6 +28,13 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
         if is_delta(settings.robot.model):
             result.drive_friction = False
         removed.append("friction of the drives")
+    compensation = result.controller.friction
+    if compensation.has_coefficients or (
+        compensation.watched and compensation.observer == "kalman"
+    ):
+        # it answers friction that is not there any more; around rest it would push
+        compensation.source, compensation.watched = "none", False
+        removed.append("compensation of friction by its coefficients")
     encoders = settings.encoders
     if any(encoders.link_increments) or any(encoders.motor_increments):
         result.encoders.link_increments, result.encoders.motor_increments = [], []
