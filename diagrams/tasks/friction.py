@@ -51,9 +51,12 @@ def add_friction_compensation(
     if parameters.source == "none" and not parameters.watched:
         return None, {}
     if controller.relative_degree == 1:
+        choice, allowed = f"source = {parameters.source}", "none"
+        if parameters.source == "none":
+            choice, allowed = "watched = true", "false"
         raise InputError(
-            f"controller.friction.source = {parameters.source} with the law "
-            f"'{scenario.controller.law}'; allowed: none, its servos overcome friction"
+            f"controller.friction.{choice} with the law '{scenario.controller.law}'; allowed: "
+            f"{allowed}, its servos overcome friction and do not tell their torques"
         )
     signals = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
     if parameters.needs_reference_velocity:

@@ -161,3 +161,6 @@ def test_wrong_choices_are_refused(arm, load_scenario):
     servo.controller.friction.source = "model"
     with pytest.raises(InputError, match=r"friction.source = model with the law 'velocity_servo'"):
         build_station(servo, SCENARIO_DIRECTORY)
+    servo.controller.friction.source, servo.controller.friction.watched = "none", True
+    with pytest.raises(InputError, match=r"friction.watched = true with the law 'velocity_servo'"):
+        build_station(servo, SCENARIO_DIRECTORY)
