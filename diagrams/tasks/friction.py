@@ -45,19 +45,12 @@ def add_friction_compensation(
         ``[tau_f, f_c, f_v]``, if there is any.
 
     Raises:
-        InputError: If the compensation does not suit law or robot, or lacks coefficients.
+        InputError: If the compensation does not suit the robot, or lacks coefficients.
     """
     parameters = scenario.controller.friction
-    if parameters.source == "none" and not parameters.watched:
+    # servos overcome friction themselves, and do not tell their torques; law_warnings says so
+    if not parameters.is_given or controller.relative_degree == 1:
         return None, {}
-    if controller.relative_degree == 1:
-        choice, allowed = f"source = {parameters.source}", "none"
-        if parameters.source == "none":
-            choice, allowed = "watched = true", "false"
-        raise InputError(
-            f"controller.friction.{choice} with the law '{scenario.controller.law}'; allowed: "
-            f"{allowed}, its servos overcome friction and do not tell their torques"
-        )
     signals = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
     if parameters.needs_reference_velocity:
         signals["velocity"] = controller.GetOutputPort("reference_velocity")

@@ -31,6 +31,7 @@ def fixture_soft(load_scenario):
     settings.friction = JointFrictionParameters()
     settings.reference.dwell = 2.0
     settings.forces = [ForcePulse(0.02, 2.0, np.array([0.0, 20.0, 0.0]), frame="manifold")]
+    settings.controller.friction.source = "none"
     settings.compliance.source = "observed"
     settings.compliance.transversal.mass.value = 1.0
     settings.compliance.transversal.damping.value = 100.0
