@@ -59,7 +59,8 @@ class KalmanParameters:
 class FrictionCompensationParameters:
     """Friction that the drive torques overcome, (2.42), (3.29), (3.58), (3.65).
 
-    What is believed of it is what the plant has, unless ``believed`` says otherwise.
+    What is believed of it is what the plant has, unless ``believed`` says otherwise. Nothing of
+    it is used with the law ``velocity_servo``.
 
     Attributes:
         source: ``none``; ``model``: Coulomb and viscous friction as believed; ``observer``: what
@@ -96,6 +97,11 @@ class FrictionCompensationParameters:
         require(told, "velocity", self.velocity, allowed)
         drift = self.believed.drift
         require(drift is None, "believed.drift", drift, "null; what is believed does not drift")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether anything is done about friction, or an observer of it is watched."""
+        return self.source != "none" or self.watched
 
     @property
     def has_coefficients(self) -> bool:

@@ -45,16 +45,12 @@ def add_friction_compensation(
         ``[tau_f, f_c, f_v]``, if there is any.
 
     Raises:
-        InputError: If the compensation does not suit law or robot, or lacks coefficients.
+        InputError: If the compensation does not suit the robot, or lacks coefficients.
     """
     parameters = scenario.controller.friction
-    if parameters.source == "none" and not parameters.watched:
+    # servos overcome friction themselves, and do not tell their torques; law_warnings says so
+    if not parameters.is_given or controller.relative_degree == 1:
         return None, {}
-    if controller.relative_degree == 1:
-        raise InputError(
-            f"controller.friction.source = {parameters.source} with the law "
-            f"'{scenario.controller.law}'; allowed: none, its servos overcome friction"
-        )
     signals = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
     if parameters.needs_reference_velocity:
         signals["velocity"] = controller.GetOutputPort("reference_velocity")

@@ -52,6 +52,7 @@ def law_warnings(
         *(causes or _fragile_gains(parameters, robot, law, rest)),
         *_fast_servo(scenario, robot, link_state),
         *_unknown_forces(scenario, robot),
+        *_friction_behind_servos(parameters),
     ]
 
 
@@ -168,6 +169,15 @@ def _fast_servo(scenario: Scenario, robot: RobotModel, link_state: np.ndarray) -
         f"servo.bandwidth = {bandwidth:g} rad/s is above the lowest resonance of the joints, "
         f"{resonance:.0f} rad/s; servos that fast do not damp it, and the loop may oscillate: "
         "lower servo.bandwidth and the gains"
+    ]
+
+
+def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
+    if parameters.law != "velocity_servo" or not parameters.friction.is_given:
+        return []
+    return [
+        "controller.friction is not used: the servos of the law 'velocity_servo' overcome friction "
+        "themselves"
     ]
 
 

@@ -146,7 +146,7 @@ def test_without_coefficients(arm, change, message):
         build_station(arm, Path())
 
 
-def test_wrong_choices_are_refused(arm, load_scenario):
+def test_wrong_choices_are_refused(arm):
     friction = arm.controller.friction
     friction.source, friction.observer = "observer", "kalman"
     friction.kalman.momentum_noise = [1.0, 1.0]
@@ -156,8 +156,15 @@ def test_wrong_choices_are_refused(arm, load_scenario):
     friction.believed = JointFrictionParameters([1.0], [1.0, 2.0, 3.0])
     with pytest.raises(InputError, match=r"controller.friction.believed.f_c: 1 values"):
         build_station(arm, Path())
-    servo = load_scenario("pfc_compliant_6r")
-    servo.controller.law = "velocity_servo"
-    servo.controller.friction.source = "model"
-    with pytest.raises(InputError, match=r"friction.source = model with the law 'velocity_servo'"):
-        build_station(servo, SCENARIO_DIRECTORY)
+
+
+def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
+    settings = load_scenario("pfc_compliant_6r")
+    settings.controller.law = "velocity_servo"
+    for source, watched in (("observer", False), ("none", True), ("none", False)):
+        settings.controller.friction.source = source
+        settings.controller.friction.watched = watched
+        station = build_station(settings, SCENARIO_DIRECTORY)
+        assert "friction_estimate" not in station.log.rows
+        said = any("controller.friction is not used" in line for line in station.warnings)
+        assert said == (source != "none" or watched)
