@@ -55,6 +55,7 @@ def write_margins(
         results.write("margins.json", margins_json(analysis))
         figures = draw_margins(analysis)
         page = report_page(
+            kind="Sampled loop",
             title=f"Margins of {scenario.name}",
             description=" ".join(sentences(analysis)),
             scenario_yaml_text=yaml_dump_typed(settings),
