@@ -16,7 +16,8 @@ from diagrams.tasks.external_torque import needs_sensor
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     """Return a scenario without what has no slope or acts from outside, and what was taken off.
 
-    Difference quotients, filters, disturbance observers, delays and the operator's hand stay: they are part of the loop.
+    Difference quotients, filters, disturbance observers, delays and the operator's hand stay:
+    they are part of the loop.
 
     Args:
         settings: The scenario; unchanged.
