@@ -45,7 +45,7 @@ def _equal_poles(law: str, **poles: float) -> str:
 
 # nothing but the law between the plant and its model
 _BARE = ("model_error={}", "friction={}", "encoders={}")
-_OBSERVED = ("controller.friction.source=observer", "controller.friction.rate=600")
+_OBSERVED = ("controller.friction.source=observer",)
 _UNOBSERVED = ("controller.friction.source=none",)
 SUBJECTS = (
     Subject(
@@ -86,7 +86,7 @@ _DESCRIPTION = (
     "Every row believes its robot to be what the disturbance says, while the plant stays as it "
     "is; friction is that of Tab. C.3 (of the drives, on the DELTA robot). Before: gains with "
     "equal poles, nothing known of friction. After: the scenario's gains, and an observer of the "
-    "drives' disturbance torque (600 1/s). 'All at once' is friction, masses 5 % too low, K_s "
+    "drives' disturbance torque (300 1/s). 'All at once' is friction, masses 5 % too low, K_s "
     "5 % too high, and encoders of 4 million increments with difference quotients. Largest "
     "distances after the transition from the start to the path; of pfc_compliant_6r from the "
     "reference that yields."

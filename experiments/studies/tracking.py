@@ -30,9 +30,11 @@ FORCES: Mapping[str, tuple[str, ...]] = {
     ),
     "no force": ("hold_back.force=0",),
 }
+_DISTURBED = ("friction.file=comau_racer_1_4", "model_error.mass=0.95")
 ROBOTS: Mapping[str, tuple[str, ...]] = {
     "as modelled": (),
-    "friction, masses 5 % too low": ("friction.file=comau_racer_1_4", "model_error.mass=0.95"),
+    "friction, masses 5 % too low": _DISTURBED,
+    "the same, friction observed": (*_DISTURBED, "controller.friction.source=observer"),
 }
 METRICS = {"max_path_deviation": "m", "max_orientation_error": "rad", "max_tangential_error": "m"}
 _DESCRIPTION = (
@@ -109,7 +111,7 @@ def _said(case: Case, row: RunRow) -> str:
 def _picture(rows: Mapping[Case, RunRow]) -> Figure:
     forces, robots = (list(dict.fromkeys(case[i] for case in rows)) for i in (1, 2))
     with plt.rc_context(STYLE):
-        canvas = Canvas(figsize=(1.2 * WIDTH, 4.2))
+        canvas = Canvas(figsize=(1.2 * WIDTH, 5.6))
         panels = canvas.subplots(1, 2, sharey=True)
         groups = [(force, robot) for robot in robots for force in forces]
         places = np.arange(len(groups))[::-1].astype(float)
