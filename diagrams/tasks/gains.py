@@ -95,7 +95,7 @@ def choose_poles(
 
         def gains(fast: float) -> Stabilization:
             poles = {
-                kind: gains_from_poles(rule_of_poles(given.bandwidth, fast, r))
+                kind: gains_from_poles(rule_of_poles(given.bandwidth, fast, r), given.integral_pole)
                 if kind in automatic
                 else gains_of(given, r, law, kind)
                 for kind, given in by_kind.items()
