@@ -9,11 +9,11 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import ALERT, COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.pages.report import Report, report_page, write_report
+from experiments.pages.report import Report
 from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
-from experiments.results.provenance import standard_attributes
 from experiments.studies.side_by_side import run_side_by_side
+from experiments.studies.study_page import write_study_page
 from experiments.sweep.rows import COMPLETED, RunRow
 
 
@@ -129,17 +129,15 @@ def write_robustness(
             known = row.status == COMPLETED
             value = row.metrics[own].value if known else float("nan")
             metrics.add(f"{scenario}, {disturbance}, {when}", value, "m", source=row.reason or None)
-        results.write("metrics.json", metrics.to_json())
         figures = [_picture(rows, metric)]
-        page = report_page(
+        return write_study_page(
+            results,
             title="Robots that are not their models",
             description=_DESCRIPTION,
-            scenario_yaml_text=_listing(subjects, disturbances),
+            overrides=_listing(subjects, disturbances),
             metrics=metrics,
             figures=figures,
-            log_attributes=standard_attributes("robustness"),
         )
-        return write_report(results, figures, page)
 
 
 def _scenarios(
@@ -176,10 +174,10 @@ def _said(row: RunRow, metric: str) -> str:
     return f"{row.metrics[metric].value * 1e3:8.3f} mm"
 
 
-def _listing(subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]) -> str:
+def _listing(subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]) -> list[str]:
     lines = [f"{name}: {' '.join(changes) or '-'}" for name, changes in disturbances.items()]
     lines += [f"{s.scenario}, before: {' '.join((*_UNOBSERVED, *s.before))}" for s in subjects]
-    return "\n".join([*lines, f"after: {' '.join(_OBSERVED)}"])
+    return [*lines, f"after: {' '.join(_OBSERVED)}"]
 
 
 def _picture(rows: Mapping[Case, RunRow], metric: Mapping[str, str]) -> Figure:

@@ -13,11 +13,11 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.pages.report import Report, report_page, write_report
+from experiments.pages.report import Report
 from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
-from experiments.results.provenance import standard_attributes
 from experiments.studies.side_by_side import run_side_by_side
+from experiments.studies.study_page import write_study_page
 from experiments.sweep.rows import COMPLETED, RunRow
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
@@ -104,17 +104,15 @@ def write_study(
         for point in points:
             name = f"{point.law}, K_s1 = {point.stiffness:.3g} Nm/rad"
             metrics.add(name, point.deviation, "m", source=point.fault)
-        results.write("metrics.json", metrics.to_json())
         figures = [_picture(points, laws)]
-        page = report_page(
+        return write_study_page(
+            results,
             title="Which law when",
             description=_DESCRIPTION,
-            scenario_yaml_text="\n".join(_MOTION),
+            overrides=_MOTION,
             metrics=metrics,
             figures=figures,
-            log_attributes=standard_attributes("which law when"),
         )
-        return write_report(results, figures, page)
 
 
 def _run_all(

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.pages.report import Report, report_page, write_report
+from experiments.pages.report import Report
 from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
-from experiments.results.provenance import standard_attributes
 from experiments.studies.side_by_side import run_side_by_side
+from experiments.studies.study_page import write_study_page
 from experiments.sweep.rows import COMPLETED, RunRow
 
 _GAINS = "controller.gains.singular_perturbation.xi.coefficients"
@@ -84,18 +84,16 @@ def write_tracking(
             for name, unit in METRICS.items():
                 source = row.reason or None
                 metrics.add(f"{', '.join(case)}: {name}", _value(row, name), unit, source=source)
-        results.write("metrics.json", metrics.to_json())
         figures = [_picture(rows)]
         overrides = [" ".join(x) for x in (*forces.values(), *robots.values()) if x]
-        page = report_page(
+        return write_study_page(
+            results,
             title="Path following against trajectory tracking",
             description=_DESCRIPTION,
-            scenario_yaml_text="\n".join(overrides),
+            overrides=overrides,
             metrics=metrics,
             figures=figures,
-            log_attributes=standard_attributes("tracking"),
         )
-        return write_report(results, figures, page)
 
 
 def _value(row: RunRow, metric: str) -> float:

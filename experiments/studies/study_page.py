@@ -1,0 +1,41 @@
+"""The page of a study."""
+
+from collections.abc import Sequence
+
+from experiments.figures.style import Figure
+from experiments.pages.report import Report, report_page, write_report
+from experiments.results.folder import ResultsFolder
+from experiments.results.metrics import Metrics
+from experiments.results.provenance import standard_attributes
+
+
+def write_study_page(
+    results: ResultsFolder,
+    *,
+    title: str,
+    description: str,
+    overrides: Sequence[str],
+    metrics: Metrics,
+    figures: Sequence[Figure],
+) -> Report:
+    """Write metrics and page of a study, and return the page.
+
+    Args:
+        results: Folder for them.
+        title: A few words.
+        description: What was run, and what to see in it.
+        overrides: What was changed in scenarios, one line each.
+        metrics: Results of all runs.
+        figures: Pictures.
+    """
+    results.write("metrics.json", metrics.to_json())
+    page = report_page(
+        kind="Study",
+        title=title,
+        description=description,
+        scenario_yaml_text="\n".join(overrides),
+        metrics=metrics,
+        figures=list(figures),
+        log_attributes=standard_attributes(title),
+    )
+    return write_report(results, list(figures), page)
