@@ -57,7 +57,7 @@ def build_station(
     part = _add_robot(builder, scenario, folder, workpiece)
     require_orientation(task.path, part.robot.dimension)
     believed = part.belief.robot
-    law = make_law(scenario.controller, believed, task.manifold)
+    law = make_law(scenario.controller, believed, task.manifold, scenario.faults)
     start, initial_state = _start(scenario, task, part, workpiece)
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     following = Following(scenario, believed, task, law, on_motors)

@@ -1,5 +1,6 @@
 """What is between the law's output and the plant's joints: hold, servo, bus, friction."""
 
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -10,6 +11,7 @@ from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
+from diagrams.tasks.law import safe_state, supervision
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
@@ -75,12 +77,23 @@ def _add_servo(
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
     effort = chain.gather("effort_limit") * scenario.controller.effort_scale
+    watched = replace(supervision(scenario, chain), joint_limits=False)
     system = builder.AddNamedSystem(
-        "velocity_servo", VelocityServo(chain, VelocityServoLaw(gains, effort))
+        "velocity_servo",
+        VelocityServo(
+            chain,
+            VelocityServoLaw(gains, effort),
+            safe_state(scenario.controller, chain, scenario.faults),
+            watched,
+            servo.watchdog or np.inf,
+        ),
     )
     velocity = ports["drive"]
     if servo.bus_delay > 0.0:
-        bus = add_bus_delay(builder, velocity, servo.bus_delay, tick)
+        bus = add_bus_delay(
+            builder, velocity, servo.bus_delay, tick, lost=(servo.lost.begin, servo.lost.end)
+        )
+        builder.Connect(bus.GetOutputPort("silence"), system.GetInputPort("silence"))
         velocity = bus.GetOutputPort("delivered")
     elif ratio > 1:
         # the law must not be evaluated between its own ticks

@@ -8,6 +8,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
+from diagrams.tasks.law import supervision
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
@@ -109,7 +110,10 @@ def add_law(
     """
     scenario, law, signals = following.scenario, following.law, place.signals | forces
     controller = builder.AddNamedSystem(
-        "following_controller", FollowingController(law, scenario.controller.sampling_time)
+        "following_controller",
+        FollowingController(
+            law, scenario.controller.sampling_time, supervision(scenario, following.robot)
+        ),
     )
     desired = _add_smooth_start(builder, following, controller, place.desired_reference)
     made = {"reference": desired, "law": controller.GetOutputPort("law")}

@@ -1,5 +1,7 @@
 """The law that makes a robot follow a manifold, as a Drake system."""
 
+import itertools
+
 import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
@@ -14,6 +16,14 @@ from pydrake.systems.framework import (
 
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.safe_stop import SafeStop
+from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+
+# what the alarms mean, in order; each is the index of one, from 1 on, or 0 for none
+ALARMS = (
+    {1: Fault.FORCE_SENSOR_LOST, 2: Fault.FORCE_SENSOR_SATURATED},
+    dict.fromkeys(range(1, 8), Fault.COMPLIANCE_INVALID),
+)
 
 
 class FollowingController(LeafSystem):
@@ -23,8 +33,8 @@ class FollowingController(LeafSystem):
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
     The integral is held while a drive is at its limit. After a fault (:class:`Fault`)
-    the drives hold the links against gravity and brake; only a new initialization
-    leaves that state.
+    the drives stop the robot and hold it where it has come to rest (:class:`SafeStop`), velocity
+    servos get the reference zero; only a new initialization leaves that state.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -34,6 +44,9 @@ class FollowingController(LeafSystem):
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.
+        alarms (input, optional): Faults of others that the robot is to stop for, shape (2,): a
+            :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, and an
+            :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
             m/s]; the attribute ``drive_port`` holds the name.
@@ -42,26 +55,46 @@ class FollowingController(LeafSystem):
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         law (output): All of these, laid out by the law's ``layout``; computed once per
             tick, the others are parts of it.
+        supervision (output): What :meth:`Supervision.evaluate` returns; only with supervision.
 
     State:
         Discrete: integral of the error, shape (m,); latched fault, shape (1,); whether
         the next is known, shape (1,); part of the drive input that is extrapolated over
-        the hold, shape (N,); last ``joint_state`` without fault, shape (4N,).
+        the hold, shape (N,); ``joint_state`` of the last tick, shape (4N,); virtual output of
+        the last tick, shape (m,); memory of the safe stop, and of the supervision; for how many
+        ticks each drive has been at its limit, shape (N,).
 
     Args:
         law: The law.
         period: Sampling time [s].
+        supervision: What is watched of joints and drives; nothing if omitted.
     """
 
-    def __init__(self, law: FollowingLaw, period: float) -> None:
+    def __init__(
+        self,
+        law: FollowingLaw,
+        period: float,
+        supervision: SupervisionParameters | None = None,
+    ) -> None:
         super().__init__()
         self._law, self.period, self.layout = law, period, law.layout
         linearization = law.linearization
         n, m = linearization.num_joints, linearization.num_outputs
         r = self.relative_degree = linearization.relative_degree
         self._integral, self._fault, self._known = slice(0, m), m, m + 1
-        self._held, self._last_good = slice(m + 2, m + 2 + n), slice(m + 2 + n, m + 2 + 5 * n)
-        memory = self.DeclareDiscreteState(self._last_good.stop)
+        start = self.layout.manifold_state.start
+        self._first_output = slice(start, start + m)
+        self._safe_stop = SafeStop(law.robot, law.limits, law.safe_state, period)
+        self._supervision = None
+        if supervision is not None:
+            effort = law.limits if r > 1 else law.robot.gather("effort_limit")
+            self._supervision = Supervision(law.robot, effort, supervision, period)
+        watched = self._supervision.size if self._supervision else 0
+        widths = np.cumsum([m + 2, n, 4 * n, m, self._safe_stop.size, watched, n]).tolist()
+        parts = [slice(*ends) for ends in itertools.pairwise(widths)]
+        self._held, self._last, self._output_before, self._stop, *parts = parts
+        self._watch, self._saturated = parts
+        memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._manifold_point: InputPort = self.DeclareVectorInputPort(
             "manifold_point", linearization.manifold.layout.size
@@ -74,9 +107,21 @@ class FollowingController(LeafSystem):
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
+        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", len(ALARMS))
+        sources.add(self._alarms.ticket())
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
             sources.add(self._tau_ext.ticket())
+        if self._supervision is not None:
+            self._watched: OutputPort = self.DeclareVectorOutputPort(
+                "supervision",
+                1 + 8 * n,
+                self._calc_supervision,
+                prerequisites_of_calc={
+                    self._joint_state.ticket(),
+                    self.discrete_state_ticket(memory),
+                },
+            )
         self._output: OutputPort = self.DeclareVectorOutputPort(
             "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
@@ -102,44 +147,102 @@ class FollowingController(LeafSystem):
         """Return the fault that holds at the present instant."""
         return Fault(int(self._output.Eval(context)[self.layout.status][0]))
 
+    def suspects(self, context: Context) -> np.ndarray:
+        """Return which measured values are not believed, nonzero if so, shape (4N,)."""
+        memory = context.get_discrete_state_vector().value()
+        latched = self._safe_stop.suspects(memory[self._stop])
+        return np.maximum(latched, self._suspects(context))
+
     def _calc_law(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
         state, tau_ext = self._joint_state.Eval(context), None
         if self._tau_ext is not None and self._tau_ext.HasValue(context):
             tau_ext = self._tau_ext.Eval(context)
+        known = memory[self._known]
         result = self._law.evaluate(
             state,
             self._manifold_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
-            memory[self._held] if memory[self._known] else None,
+            memory[self._held] if known else None,
             tau_ext,
+            memory[self._output_before],
         )
         status = self.layout.status.start
-        fault = memory[self._fault] or result[status]
+        latched = memory[self._fault]
+        fault = latched or self._found_fault(context, memory, result[status])
         if fault:
             result[status] = fault
-            result[self.layout.drive] = self._law.safe_drive(state, memory[self._last_good])
+            stop = memory[self._stop] if latched else self._start_stop(context, memory)
+            result[self.layout.drive] = 0.0
+            if self.relative_degree > 1:
+                result[self.layout.drive] = self._safe_stop.drive(stop, state)
         output.SetFromVector(result)
+
+    def _calc_supervision(self, context: Context, output: BasicVector) -> None:
+        assert self._supervision is not None
+        memory = context.get_discrete_state_vector().value()
+        state = self._joint_state.Eval(context)
+        output.SetFromVector(
+            self._supervision.evaluate(
+                state, memory[self._last], memory[self._watch], memory[self._known]
+            )
+        )
+
+    def _found_fault(self, context: Context, memory: np.ndarray, of_law: float) -> float:
+        """Return a fault of this instant, the root cause first."""
+        if of_law == Fault.INPUT_NOT_FINITE:
+            return of_law
+        if self._supervision is not None:
+            seen = self._watched.Eval(context)[0]
+            if seen:
+                return float(seen)
+            if memory[self._saturated].max() >= self._supervision.saturated_ticks:
+                return float(Fault.DRIVE_SATURATED)
+        if self._alarms.HasValue(context):
+            alarms = self._alarms.Eval(context)
+            if alarms.any():
+                raised = zip(ALARMS, alarms, strict=True)
+                return float(next(names[int(alarm)] for names, alarm in raised if alarm))
+        return of_law
+
+    def _suspects(self, context: Context) -> np.ndarray:
+        """Return which measured values are implausible, nonzero if so, shape (4N,)."""
+        if self._supervision is None:
+            return np.zeros(self._last.stop - self._last.start)
+        return self._supervision.suspects(self._watched.Eval(context))
+
+    def _start_stop(self, context: Context, memory: np.ndarray) -> np.ndarray:
+        last, state = memory[self._last], self._joint_state.Eval(context)
+        return self._safe_stop.start(last, state, self._suspects(context))
 
     def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
         memory = state.get_mutable_value()
         memory[:] = 0.0
         joint_state = self._joint_state.Eval(context)
-        memory[self._last_good] = np.where(np.isfinite(joint_state), joint_state, 0.0)
+        memory[self._last] = np.where(np.isfinite(joint_state), joint_state, 0.0)
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        result = self._output.Eval(context)
-        memory = state.get_mutable_value()
+        result, joint_state = self._output.Eval(context), self._joint_state.Eval(context)
+        before, memory = context.get_discrete_state_vector().value(), state.get_mutable_value()
+        if self._supervision is not None:
+            memory[self._watch] = self._supervision.next_memory(self._watched.Eval(context))
         fault = result[self.layout.status.start]
+        memory[self._last] = joint_state
         if fault:
+            stop = before[self._stop] if before[self._fault] else self._start_stop(context, before)
+            suspects = self._suspects(context)
             memory[self._fault] = fault
+            memory[self._stop] = self._safe_stop.advance(stop, joint_state, suspects)
             return
         memory[self._known] = 1.0
         memory[self._held] = result[self.layout.held]
-        memory[self._last_good] = self._joint_state.Eval(context)
+        memory[self._output_before] = result[self._first_output]
         saturated = result[self.layout.status.stop - 1]
+        if saturated or before[self._saturated].any():
+            at_limit = np.abs(result[self.layout.drive]) >= self._law.limits
+            memory[self._saturated] = np.where(at_limit, before[self._saturated] + 1.0, 0.0)
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error

@@ -5,7 +5,7 @@ import pytest
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.following_law import SafeState
+from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import ProjectionStatus
