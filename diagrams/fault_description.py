@@ -158,9 +158,7 @@ def _saturated(scene: FaultScene) -> str:
     before = scene.before or scene.now
     drive = np.abs(before.signals["law"][scene.law.layout.drive])
     axes = map(str, np.flatnonzero(drive >= scene.law.limits * (1.0 - 1e-9)) + 1)
-    return (
-        f"{Fault.DRIVE_SATURATED.explanation}: {listed(axes)} {_place(scene)}"
-    )
+    return f"{Fault.DRIVE_SATURATED.explanation}: {listed(axes)} {_place(scene)}"
 
 
 def _turned_away(scene: FaultScene) -> str:

@@ -84,6 +84,7 @@ def run_scenario(
     figures: bool,
     recording: bool,
     progress: ProgressListener,
+    after_fault: float = 0.0,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
 
@@ -94,6 +95,7 @@ def run_scenario(
         figures: Whether to draw figures.
         recording: Whether to record the motion.
         progress: Told how far the run is.
+        after_fault: How long to go on after a fault [s], so that one sees how it ends.
 
     Raises:
         InputError: If the scenario is wrong or the folder cannot be used; nothing has moved then.
@@ -104,7 +106,7 @@ def run_scenario(
     prepared = prepare(scenario, duration, recording=recording, progress=progress)
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
-        measured = _measure(prepared, scenario.name, results, progress, interrupted)
+        measured = _measure(prepared, scenario.name, results, progress, interrupted, after_fault)
         page = None
         if recording and len(measured.motion.times) > 1 and not interrupted():
             progress(measured.end, "recording")
@@ -130,12 +132,15 @@ def _measure(
     results: ResultsFolder,
     progress: ProgressListener,
     interrupted: Callable[[], bool],
+    after_fault: float,
 ) -> _Measured:
     """Simulate, and write the log and the metrics."""
     settings, station = prepared.settings, prepared.station
     progress.expect(settings.duration)
     with _steady_clock():
-        result = simulate(station, settings.simulation, settings.duration, progress, interrupted)
+        result = simulate(
+            station, settings.simulation, settings.duration, progress, interrupted, after_fault
+        )
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
         log.attributes = standard_attributes(name) | {
@@ -144,6 +149,8 @@ def _measure(
         }
         if result.fault is not None:
             log.attributes["fault"] = result.fault
+            if result.fault_time is not None:
+                log.attributes["fault_time"] = f"{result.fault_time:.6f}"
         if interrupted():
             log.attributes["interrupted"] = f"at t = {end:.3f} s"
         results.write("log.h5", log.to_hdf5())
@@ -164,8 +171,19 @@ def _measure(
     for metric, target in settings.targets.get(settings.controller.law, {}).items():
         metrics.set_target(metric, target.bound, target.source)
     results.write("metrics.json", metrics.to_json())
-    warnings = [*prepared.warnings, *limits.warnings(log)]
+    warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
     return _Measured(log, motion, metrics, warnings, result.fault, end)
+
+
+def _sensor_warnings(log: RunLog) -> list[str]:
+    """Return what there is to say about a force sensor that was never of use."""
+    if "tared" not in log or log["tared"].values.any() or not log.time.size:
+        return []
+    return [
+        "the force/torque sensor was never tared: what should yield has rested, and no metric of "
+        "compliance counts; its residual did not rest within sensor.taring_spread for "
+        "sensor.taring_time, or its mean was above sensor.taring_bias"
+    ]
 
 
 def _report(

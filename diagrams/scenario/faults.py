@@ -45,7 +45,7 @@ class FaultParameters:
     plausibility: float = 2e-3
     joint_limits: bool = True
     saturation_time: float = 0.0
-    hold_bandwidth: float = 25.0
+    hold_bandwidth: float = 60.0
     effort_share: float = 0.7
     brakes: BrakeParameters | None = None
 

@@ -52,6 +52,8 @@ class SimulationParameters:
         accuracy: Accuracy of error control, 1e-10 to 0.1; 0 for fixed steps.
         frame_period: Time between the frames of the recording, 1e-3 to 1e3 [s].
         sensor_failure: A sensor that fails on the way.
+        force_sensor_failure: The same for the force/torque sensor; ``component`` is an index in
+            ``[force, torque]``, of which ``whole_joint`` takes all.
     """
 
     integrator: str = AUTO
@@ -59,6 +61,9 @@ class SimulationParameters:
     accuracy: float = 0.0
     frame_period: float = 0.032
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
+    force_sensor_failure: SensorFailureParameters = dc.field(
+        default_factory=SensorFailureParameters
+    )
 
     def __post_init__(self) -> None:
         schemes = [AUTO, *GetIntegrationSchemes()]

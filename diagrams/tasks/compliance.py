@@ -49,7 +49,8 @@ def add_compliance(
             ``desired_reference`` with derivatives up to :func:`reference_order`.
 
     Returns:
-        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``.
+        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``;
+        ``compliance_status``, an :class:`ImpedanceStatus`.
 
     Raises:
         InputError: If the compliance does not suit the law.
@@ -82,4 +83,5 @@ def add_compliance(
         "reference": reference,
         "desired_reference": desired,
         "manifold_force": force,
+        "compliance_status": impedance.GetOutputPort("status"),
     }

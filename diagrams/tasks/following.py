@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
@@ -123,6 +124,7 @@ def add_law(
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
         made |= add_compliance(builder, scenario, law.linearization, inputs)
+    _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     if scenario.controller.external_torque.source != "none":
         add_external_torque(builder, following.robot, scenario, controller, signals)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
@@ -157,3 +159,21 @@ def _add_smooth_start(
         controller.GetOutputPort("manifold_state"), start.GetInputPort("manifold_state")
     )
     return start.GetOutputPort("reference")
+
+
+def _connect_alarms(
+    builder: DiagramBuilder,
+    controller: FollowingController,
+    forces: dict[str, OutputPort],
+    compliance_status: OutputPort | None,
+) -> None:
+    """Let the robot stop for faults of the force sensor and of the compliance, if there are any."""
+    if "sensor_fault" not in forces:
+        return
+    alarms = builder.AddNamedSystem("alarms", Multiplexer([1, 1, 1]))
+    if compliance_status is None:
+        none = builder.AddNamedSystem("no_compliance", ConstantVectorSource([0.0]))
+        compliance_status = none.get_output_port()
+    for i, port in enumerate([forces["sensor_fault"], forces["tared"], compliance_status]):
+        builder.Connect(port, alarms.get_input_port(i))
+    builder.Connect(alarms.get_output_port(), controller.GetInputPort("alarms"))

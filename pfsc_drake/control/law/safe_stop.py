@@ -21,7 +21,9 @@ _LARGEST_STEP = 0.3
 # 1/s, by which an integrated motor position is drawn to what the link side says
 _CORRECTION = 10.0
 # weight of the newest difference quotient of a position
-_NEWEST = 0.3
+_NEWEST = 0.6
+# of the damping where the velocity is differentiated, which takes its time
+_DIFFERENTIATED = 0.5
 # of the gains where only the link side of an elastic joint is seen
 _FAR_SIDE = 0.1
 
@@ -39,7 +41,7 @@ class SafeState:
     """
 
     damping: np.ndarray
-    bandwidth: float = 25.0
+    bandwidth: float = 60.0
     effort_share: float = 0.7
 
     def check(self, num_joints: int) -> None:
@@ -76,7 +78,8 @@ class SafeStop:
         tau_J = D_E a_r + n_E,   q_M,r = q_J,r + tau_J / K_s + (its error at the fault) s'
 
     with everything believed, ``K_p = D omega^2``, ``K_v = 2 D omega`` of the joint's whole
-    inertia D, within what sampling bears. At rest that is (constant) gravity compensation and a
+    inertia D, within what sampling bears and up to ``sqrt(K_s (D - D_M))``, where the
+    springs' swinging dies out fastest. At rest that is (constant) gravity compensation and a
     PD law on the motors, which is stable for rigid and elastic joints alike; the torque is
     continuous where the motion ends.
 
@@ -111,6 +114,7 @@ class SafeStop:
         self._D_M, self._viscous = robot.D_M, robot.viscous_damping
         self._elastic = np.isfinite(robot.K_s)
         self._compliance = np.where(self._elastic, 1.0 / robot.K_s, 0.0)
+        self._stiffness = np.where(self._elastic, robot.K_s, 0.0)
         self._mass_matrix = BoundFunction(_mass_matrix_function(robot))
         self._torque = BoundFunction(_torque_function(robot))
         widths = [1, 1, n, n, n, n, n, n, n, 4 * n, 4 * n]
@@ -257,6 +261,9 @@ class SafeStop:
         # what a torque that is held over a period moves at once
         nearest = np.where(self._elastic, self._D_M, inertia)
         K_v = np.minimum(damping, _LARGEST_STEP * nearest / self._period)
+        # a motor that is all but clamped lets the link swing on its spring
+        swinging = np.sqrt(self._stiffness * np.maximum(inertia - self._D_M, 0.0))
+        K_v = np.where(self._elastic, np.minimum(K_v, swinging), K_v)
         K_p = inertia * np.minimum(omega, K_v / (2.0 * inertia)) ** 2
         return K_p, K_v
 
@@ -281,7 +288,9 @@ class SafeStop:
         far = ~known & has_q_J
         velocity = np.where(moving | (far & has_v_J), velocity, 0.0)
         share = np.where(known, 1.0, np.where(far, _FAR_SIDE, 0.0))
-        braking = np.where(moving, 1.0, np.where(far & has_v_J, _FAR_SIDE, 0.0))
+        differentiated = near & ~has_v_M & ~(rigid & has_v_J)
+        braking = np.where(differentiated, _DIFFERENTIATED, np.where(moving, 1.0, 0.0))
+        braking = np.where(far & has_v_J, _FAR_SIDE, braking)
         return position, velocity, share, braking
 
 

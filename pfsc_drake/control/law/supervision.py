@@ -99,7 +99,12 @@ class Supervision:
         self._evaluate = bound.evaluate
 
     def evaluate(
-        self, state: np.ndarray, last: np.ndarray, memory: np.ndarray, known: float
+        self,
+        state: np.ndarray,
+        last: np.ndarray,
+        memory: np.ndarray,
+        known: float,
+        ignored: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return ``[fault, suspects, next memory]``, shape (1 + 8N,), an array that is reused.
 
@@ -111,12 +116,14 @@ class Supervision:
             last: The same one period before.
             memory: Of this object, shape (size,).
             known: Whether ``last`` is known, 1 or 0.
+            ignored: What is not compared any more, nonzero if so, shape (4N,).
         """
         arguments = self._arguments
         arguments["state"][:] = state
         arguments["last"][:] = last
         arguments["memory"][:] = memory
         arguments["known"][0] = known
+        arguments["ignored"][:] = 0.0 if ignored is None else ignored
         self._evaluate()
         return self._result
 
@@ -139,6 +146,7 @@ def _supervision_function(
     n, k_s = robot.dimension, robot.K_s
     state, last = ca.SX.sym("state", 4 * n), ca.SX.sym("last", 4 * n)
     memory, known = ca.SX.sym("memory", 4 * n), ca.SX.sym("known")
+    ignored = ca.SX.sym("ignored", 4 * n)
     speed = robot.gather("velocity_limit")
     speed = np.where(np.isfinite(speed), speed, 0.0)
     tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
@@ -150,7 +158,11 @@ def _supervision_function(
         moved = total + ca.if_else(known, step, 0.0)
         # what is no number contradicts nothing
         ways.append(ca.if_else(ca.fabs(moved) < ca.inf, moved, 0.0))
-    q_J, v_J, q_M, v_M = ways
+    used = [
+        ca.logic_and(ca.fabs(x) < ca.inf, skip == 0.0)
+        for x, skip in zip(now, ca.vertsplit(ignored, n), strict=True)
+    ]
+    q_J, v_J, q_M, v_M = _substituted(ways, used)
     wrong_J, wrong_M = ca.fabs(q_J - v_J) > tolerance, ca.fabs(q_M - v_M) > tolerance
     link, motor = (q_J + v_J) / 2.0, (q_M + v_M) / 2.0
     apart = ca.fabs(link - motor) > tolerance + bending
@@ -165,8 +177,7 @@ def _supervision_function(
     frozen = [neither * apart * link_rests, neither * apart * (1 - link_rests)]
     suspect = ca.vertcat(*[s + frozen[k // 2] for k, s in enumerate(suspects)])
     suspect = suspect if parameters.tolerance else 0.0 * suspect
-    finite = [ca.fabs(x) < ca.inf for x in now]
-    suspect *= ca.vertcat(*finite)
+    suspect *= ca.vertcat(*used)
     lower, upper = robot.gather("position_limits").T
     at_limit = ca.sum1((now[0] <= lower) + (now[0] >= upper)) if parameters.joint_limits else 0
     fault = ca.if_else(
@@ -178,8 +189,20 @@ def _supervision_function(
     result = ca.vertcat(fault, suspect, *[decay * way for way in ways])
     return ca.Function(
         "supervision",
-        [state, last, memory, known],
+        [state, last, memory, known, ignored],
         ca.cse([ca.densify(result)]),
-        ["state", "last", "memory", "known"],
+        ["state", "last", "memory", "known", "ignored"],
         ["result"],
     )
+
+
+def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
+    """Return four signals, each (N,); what is not used agrees with its side, or with the other."""
+    means = []
+    for side in (0, 2):
+        count = used[side] + used[side + 1]
+        total = ways[side] * used[side] + ways[side + 1] * used[side + 1]
+        means.append((count, total / ca.fmax(count, 1.0)))
+    (has_link, link), (has_motor, motor) = means
+    link, motor = ca.if_else(has_link, link, motor), ca.if_else(has_motor, motor, link)
+    return [ca.if_else(used[k], ways[k], link if k < 2 else motor) for k in range(4)]

@@ -14,16 +14,14 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
+from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 
-# what the alarms mean, in order; each is the index of one, from 1 on, or 0 for none
-ALARMS = (
-    {1: Fault.FORCE_SENSOR_LOST, 2: Fault.FORCE_SENSOR_SATURATED},
-    dict.fromkeys(range(1, 8), Fault.COMPLIANCE_INVALID),
-)
+# attributes of an enumeration are looked up slowly
+_LOST, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
 
 
 class FollowingController(LeafSystem):
@@ -44,8 +42,9 @@ class FollowingController(LeafSystem):
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.
-        alarms (input, optional): Faults of others that the robot is to stop for, shape (2,): a
-            :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, and an
+        alarms (input, optional): What the robot is to stop for, shape (3,): a
+            :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
+            tared, before which its range does not matter, and an
             :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
@@ -107,7 +106,7 @@ class FollowingController(LeafSystem):
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
-        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", len(ALARMS))
+        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", 3)
         sources.add(self._alarms.ticket())
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
@@ -182,10 +181,14 @@ class FollowingController(LeafSystem):
     def _calc_supervision(self, context: Context, output: BasicVector) -> None:
         assert self._supervision is not None
         memory = context.get_discrete_state_vector().value()
-        state = self._joint_state.Eval(context)
+        ignored = self._safe_stop.suspects(memory[self._stop]) if memory[self._fault] else None
         output.SetFromVector(
             self._supervision.evaluate(
-                state, memory[self._last], memory[self._watch], memory[self._known]
+                self._joint_state.Eval(context),
+                memory[self._last],
+                memory[self._watch],
+                memory[self._known],
+                ignored,
             )
         )
 
@@ -200,10 +203,13 @@ class FollowingController(LeafSystem):
             if memory[self._saturated].max() >= self._supervision.saturated_ticks:
                 return float(Fault.DRIVE_SATURATED)
         if self._alarms.HasValue(context):
-            alarms = self._alarms.Eval(context)
-            if alarms.any():
-                raised = zip(ALARMS, alarms, strict=True)
-                return float(next(names[int(alarm)] for names, alarm in raised if alarm))
+            sensor, tared, compliance = self._alarms.Eval(context).tolist()
+            if sensor == _LOST:
+                return float(Fault.FORCE_SENSOR_LOST)
+            if sensor == _SATURATED and tared:
+                return float(Fault.FORCE_SENSOR_SATURATED)
+            if compliance:
+                return float(Fault.COMPLIANCE_INVALID)
         return of_law
 
     def _suspects(self, context: Context) -> np.ndarray:

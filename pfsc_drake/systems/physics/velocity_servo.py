@@ -126,7 +126,10 @@ class VelocityServo(LeafSystem):
         after, fault, seen = before.copy(), before[self._fault][0], None
         if self._supervision is not None:
             known = before[self._known][0]
-            seen = self._supervision.evaluate(state, before[self._last], before[self._watch], known)
+            ignored = self._safe_stop.suspects(before[self._stop])
+            seen = self._supervision.evaluate(
+                state, before[self._last], before[self._watch], known, ignored
+            )
             after[self._watch] = self._supervision.next_memory(seen)
         after[self._last], after[self._known] = state, 1.0
         fault = fault or self._found_fault(context, state, reference, seen)
