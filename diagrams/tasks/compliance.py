@@ -38,6 +38,7 @@ def add_compliance(
     scenario: Scenario,
     linearization: Linearization,
     ports: dict[str, OutputPort],
+    lap: float | None = None,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
@@ -47,6 +48,7 @@ def add_compliance(
         linearization: Of the law that follows the reference.
         ports: ``wrench_measured``, ``tared``, ``manifold_point``, ``manifold_state`` and
             ``desired_reference`` with derivatives up to :func:`reference_order`.
+        lap: Length of the path [m] if it is closed.
 
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``;
@@ -62,6 +64,7 @@ def add_compliance(
         linearization.relative_degree,
         period,
         desired_order=reference_order(scenario, linearization),
+        lap=lap,
     )
     impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
     transform = builder.AddNamedSystem(

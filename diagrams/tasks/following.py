@@ -123,7 +123,9 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        made |= add_compliance(builder, scenario, law.linearization, inputs)
+        path = following.task.path
+        lap = path.length if path.closed else None
+        made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     if scenario.controller.external_torque.source != "none":
         add_external_torque(builder, following.robot, scenario, controller, signals)

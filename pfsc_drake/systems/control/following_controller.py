@@ -52,6 +52,7 @@ class FollowingController(LeafSystem):
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
+        fault (output): A :class:`Fault`, shape (1,).
         law (output): All of these, laid out by the law's ``layout``; computed once per
             tick, the others are parts of it.
         supervision (output): What :meth:`Supervision.evaluate` returns; only with supervision.
@@ -128,6 +129,8 @@ class FollowingController(LeafSystem):
         self._declare_part(self.drive_port, self.layout.drive, sources)
         for name in ("manifold_state", "virtual_input", "status"):
             self._declare_part(name, getattr(self.layout, name), sources)
+        status = self.layout.status.start
+        self._declare_part("fault", slice(status, status + 1), sources)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
