@@ -25,7 +25,9 @@ _NEWEST = 0.6
 # of the damping where the velocity is differentiated, which takes its time
 _DIFFERENTIATED = 0.5
 # of the gains where only the link side of an elastic joint is seen
-_FAR_SIDE = 0.1
+_FAR_SIDE = 0.5
+# damping ratio by which a motor that is not seen is thought to follow its link
+_FOLLOWING = 0.3
 
 _Q_J, _V_J, _Q_M, _V_M = range(4)
 
@@ -85,8 +87,9 @@ class SafeStop:
 
     Each joint is held by what is still measured of it. Where the motor's position is lost, its
     velocity is integrated and drawn to what the link's position says; where its velocity is, the
-    position is differentiated; of a rigid joint either side does. An elastic joint of which
-    only the link is seen gets a tenth of the gains. A joint of which nothing is seen gets
+    position is differentiated; of a rigid joint either side does. Of an elastic joint
+    of which only the link is seen the motor is simulated, on its spring and with some damping,
+    and half the gains act on that. A joint of which nothing is seen gets
     ``tau_J`` alone: its weight is borne, but only a brake holds it. A value that is not finite
     is used again when it is back; one that was found implausible is not.
 
@@ -175,14 +178,18 @@ class SafeStop:
         # of the link's position, with the spring's deflection as it is planned
         reference, *_ = self._reference(memory)
         deflection = reference - self._link_reference(memory)[0]
-        far = np.where(good[_Q_J], q[_Q_J] + deflection - q_M, 0.0)
-        drawn = np.where(good[_Q_M], 0.0, self._period * _CORRECTION * far)
+        away = np.where(good[_Q_J], q[_Q_J] + deflection - q_M, 0.0)
+        drawn = np.where(good[_Q_M], 0.0, self._period * _CORRECTION * away)
         after[self._position] = q_M + self._period * v_M + drawn
+        far = self._is_far(good)
+        torque = self.drive(memory, state)
+        simulated = v_M + self._period * self._motor_acceleration(torque, q, q_M, v_M)
+        after[self._position] = np.where(far, q_M + self._period * simulated, after[self._position])
         quotient = (q - memory[self._last].reshape(4, -1))[[_Q_M, _Q_J]] / self._period
         # rigid joints have their motors' positions on either side
         newest = np.where(good[_Q_M] | self._elastic, quotient[0], quotient[1])
         rate = memory[self._rate] + _NEWEST * (newest - memory[self._rate])
-        after[self._rate] = np.where(np.isfinite(rate), rate, 0.0)
+        after[self._rate] = np.where(far, simulated, np.where(np.isfinite(rate), rate, 0.0))
         after[self._elapsed] += self._period
         after[self._suspect] = np.maximum(memory[self._suspect], suspect)
         after[self._last] = state
@@ -267,6 +274,21 @@ class SafeStop:
         K_p = inertia * np.minimum(omega, K_v / (2.0 * inertia)) ** 2
         return K_p, K_v
 
+    def _is_far(self, good: np.ndarray) -> np.ndarray:
+        """Return for which elastic joints only the link side is seen, shape (N,)."""
+        has_q_J, _, has_q_M, has_v_M = good
+        return np.asarray(self._elastic & has_q_J & ~has_q_M & ~has_v_M)
+
+    def _motor_acceleration(
+        self, torque: np.ndarray, q: np.ndarray, q_M: np.ndarray, v_M: np.ndarray
+    ) -> np.ndarray:
+        """Return the acceleration of motors that are not seen, shape (N,)."""
+        D_M = np.where(self._D_M > 0.0, self._D_M, np.inf)
+        damping = 2.0 * _FOLLOWING * np.sqrt(self._stiffness * self._D_M)
+        spring = self._stiffness * (q_M - q[_Q_J])
+        following = damping * (v_M - np.where(np.isfinite(q[_V_J]), q[_V_J], 0.0))
+        return np.asarray((torque - self._viscous * v_M - spring - following) / D_M)
+
     def _good(self, memory: np.ndarray, state: np.ndarray) -> np.ndarray:
         """Return what of a state is used, shape (4N,)."""
         return np.asarray(np.isfinite(state) & (memory[self._suspect] == 0.0))
@@ -285,12 +307,12 @@ class SafeStop:
         velocity = np.where(has_v_M, v_M, velocity)
         moving = has_v_M | (rigid & has_v_J) | near
         known = near | has_v_M | (rigid & has_v_J)
-        far = ~known & has_q_J
-        velocity = np.where(moving | (far & has_v_J), velocity, 0.0)
+        far = self._is_far(good)
+        velocity = np.where(far, memory[self._rate], np.where(moving, velocity, 0.0))
         share = np.where(known, 1.0, np.where(far, _FAR_SIDE, 0.0))
         differentiated = near & ~has_v_M & ~(rigid & has_v_J)
         braking = np.where(differentiated, _DIFFERENTIATED, np.where(moving, 1.0, 0.0))
-        braking = np.where(far & has_v_J, _FAR_SIDE, braking)
+        braking = np.where(far, _FAR_SIDE, braking)
         return position, velocity, share, braking
 
 

@@ -12,6 +12,9 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 # 1/s, by which differences of what is compared are forgotten
 _FORGETTING = 20.0
+# ticks without any change after which a value may be frozen, and the part of the tolerance by
+# which the other side must have moved
+_UNCHANGED, _MOVED = 5.0, 0.25
 # how far a spring may be bent, over what the drive's limit bends it
 _BENDING = 2.0
 
@@ -52,8 +55,9 @@ class Supervision:
     between them do not count. Position and velocity of one side must agree up to the tolerance;
     the sides up to what the drive's torque, twice, bends the spring of an elastic joint.
 
-    What disagrees is found by the other side: of position and velocity the one that is farther
-    from it. If the sides disagree, but none with itself, the one that has moved less is taken for
+    What disagrees is found by the other side: of position and velocity the one that has not
+    changed at all for some ticks while the other side moved, else the one that is farther from
+    it. If the sides disagree, but none with itself, the one that has moved less is taken for
     frozen. If both sides disagree with themselves, their velocities are suspected.
 
     So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
@@ -83,7 +87,7 @@ class Supervision:
         period: float,
     ) -> None:
         n = robot.dimension
-        self.size = 4 * n
+        self.size = 8 * n
         resolution = np.asarray(parameters.resolution, dtype=float)
         if resolution.shape not in ((1,), (n,)):
             raise InputError(
@@ -106,7 +110,7 @@ class Supervision:
         known: float,
         ignored: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Return ``[fault, suspects, next memory]``, shape (1 + 8N,), an array that is reused.
+        """Return ``[fault, suspects, next memory]``, shape (1 + 12N,), an array that is reused.
 
         The fault is MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT or NONE; suspects, shape (4N,), are 1
         where a component of the state is not to be believed.
@@ -145,13 +149,15 @@ def _supervision_function(
 ) -> ca.Function:
     n, k_s = robot.dimension, robot.K_s
     state, last = ca.SX.sym("state", 4 * n), ca.SX.sym("last", 4 * n)
-    memory, known = ca.SX.sym("memory", 4 * n), ca.SX.sym("known")
+    memory, known = ca.SX.sym("memory", 8 * n), ca.SX.sym("known")
     ignored = ca.SX.sym("ignored", 4 * n)
     speed = robot.gather("velocity_limit")
     speed = np.where(np.isfinite(speed), speed, 0.0)
     tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
     bending = np.where(np.isfinite(k_s), _BENDING * np.minimum(limits, 1e300) / k_s, 0.0)
-    now, before, sums = (ca.vertsplit(x, n) for x in (state, last, memory))
+    now, before, sums = (ca.vertsplit(x, n) for x in (state, last, memory[: 4 * n]))
+    unchanged = ca.if_else(state == last, memory[4 * n :] + known, 0.0)
+    still = [count >= _UNCHANGED for count in ca.vertsplit(unchanged, n)]
     ways = []
     for k, (x, x_0, total) in enumerate(zip(now, before, sums, strict=True)):
         step = x - x_0 if k % 2 == 0 else period / 2.0 * (x + x_0)
@@ -168,12 +174,15 @@ def _supervision_function(
     apart = ca.fabs(link - motor) > tolerance + bending
     neither, both = ca.logic_not(wrong_J + wrong_M), wrong_J * wrong_M
     link_rests = ca.fabs(link) < ca.fabs(motor)
-    suspects = [
-        (1 - both) * wrong_J * (ca.fabs(q_J - motor) >= ca.fabs(v_J - motor)),
-        both + (1 - both) * wrong_J * (ca.fabs(q_J - motor) < ca.fabs(v_J - motor)),
-        (1 - both) * wrong_M * (ca.fabs(q_M - link) >= ca.fabs(v_M - link)),
-        both + (1 - both) * wrong_M * (ca.fabs(q_M - link) < ca.fabs(v_M - link)),
-    ]
+    suspects = []
+    for wrong, q, v, other, (q_rests, v_rests) in (
+        (wrong_J, q_J, v_J, motor, still[:2]),
+        (wrong_M, q_M, v_M, link, still[2:]),
+    ):
+        told = (ca.fabs(other) > _MOVED * tolerance) * ca.fabs(q_rests - v_rests)
+        farther = ca.fabs(q - other) >= ca.fabs(v - other)
+        of_position = ca.if_else(told, q_rests, farther)
+        suspects += [(1 - both) * wrong * of_position, wrong * (1 - (1 - both) * of_position)]
     frozen = [neither * apart * link_rests, neither * apart * (1 - link_rests)]
     suspect = ca.vertcat(*[s + frozen[k // 2] for k, s in enumerate(suspects)])
     suspect = suspect if parameters.tolerance else 0.0 * suspect
@@ -186,7 +195,7 @@ def _supervision_function(
         ca.if_else(at_limit > 0, Fault.JOINT_LIMIT, Fault.NONE),
     )
     decay = np.exp(-_FORGETTING * period)
-    result = ca.vertcat(fault, suspect, *[decay * way for way in ways])
+    result = ca.vertcat(fault, suspect, *[decay * way for way in ways], unchanged)
     return ca.Function(
         "supervision",
         [state, last, memory, known, ignored],

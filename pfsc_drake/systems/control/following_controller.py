@@ -115,7 +115,7 @@ class FollowingController(LeafSystem):
         if self._supervision is not None:
             self._watched: OutputPort = self.DeclareVectorOutputPort(
                 "supervision",
-                1 + 8 * n,
+                1 + 12 * n,
                 self._calc_supervision,
                 prerequisites_of_calc={
                     self._joint_state.ticket(),
