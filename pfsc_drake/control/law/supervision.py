@@ -12,9 +12,8 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 # 1/s, by which differences of what is compared are forgotten
 _FORGETTING = 20.0
-# ticks without any change after which a value may be frozen, and the part of the tolerance by
-# which the other side must have moved
-_UNCHANGED, _MOVED = 5.0, 0.25
+# part of the tolerance that tells a jump within a tick, or a rest for some ticks
+_AT_ONCE = 0.5
 # how far a spring may be bent, over what the drive's limit bends it
 _BENDING = 2.0
 
@@ -55,10 +54,11 @@ class Supervision:
     between them do not count. Position and velocity of one side must agree up to the tolerance;
     the sides up to what the drive's torque, twice, bends the spring of an elastic joint.
 
-    What disagrees is found by the other side: of position and velocity the one that has not
-    changed at all for some ticks while the other side moved, else the one that is farther from
-    it. If the sides disagree, but none with itself, the one that has moved less is taken for
-    frozen. If both sides disagree with themselves, their velocities are suspected.
+    Of a side that disagrees with itself the position is suspected if it jumped, by half the
+    tolerance within this tick, or if it has rested, to the last bit, while the velocity told of
+    half the tolerance; else the velocity. If the sides disagree, but none with itself, the one
+    that has moved less is taken for frozen. If both disagree with themselves, their velocities
+    are suspected.
 
     So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
     as position and integrated velocity part by the tolerance: a jump of a position in the same
@@ -157,11 +157,12 @@ def _supervision_function(
     bending = np.where(np.isfinite(k_s), _BENDING * np.minimum(limits, 1e300) / k_s, 0.0)
     now, before, sums = (ca.vertsplit(x, n) for x in (state, last, memory[: 4 * n]))
     unchanged = ca.if_else(state == last, memory[4 * n :] + known, 0.0)
-    still = [count >= _UNCHANGED for count in ca.vertsplit(unchanged, n)]
-    ways = []
+    rests = ca.vertsplit(unchanged, n)
+    ways, steps = [], []
     for k, (x, x_0, total) in enumerate(zip(now, before, sums, strict=True)):
         step = x - x_0 if k % 2 == 0 else period / 2.0 * (x + x_0)
-        moved = total + ca.if_else(known, step, 0.0)
+        steps.append(ca.if_else(known, step, 0.0))
+        moved = total + steps[-1]
         # what is no number contradicts nothing
         ways.append(ca.if_else(ca.fabs(moved) < ca.inf, moved, 0.0))
     used = [
@@ -175,14 +176,13 @@ def _supervision_function(
     neither, both = ca.logic_not(wrong_J + wrong_M), wrong_J * wrong_M
     link_rests = ca.fabs(link) < ca.fabs(motor)
     suspects = []
-    for wrong, q, v, other, (q_rests, v_rests) in (
-        (wrong_J, q_J, v_J, motor, still[:2]),
-        (wrong_M, q_M, v_M, link, still[2:]),
-    ):
-        told = (ca.fabs(other) > _MOVED * tolerance) * ca.fabs(q_rests - v_rests)
-        farther = ca.fabs(q - other) >= ca.fabs(v - other)
-        of_position = ca.if_else(told, q_rests, farther)
-        suspects += [(1 - both) * wrong * of_position, wrong * (1 - (1 - both) * of_position)]
+    for side, wrong in ((0, wrong_J), (2, wrong_M)):
+        slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
+        at_once = _AT_ONCE * tolerance
+        jumped = (ca.fabs(slip) > at_once) * (period * ca.fabs(change) < ca.fabs(slip))
+        rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
+        of_position = (1 - both) * ca.fmax(jumped, rested)
+        suspects += [wrong * of_position, wrong * (1 - of_position)]
     frozen = [neither * apart * link_rests, neither * apart * (1 - link_rests)]
     suspect = ca.vertcat(*[s + frozen[k // 2] for k, s in enumerate(suspects)])
     suspect = suspect if parameters.tolerance else 0.0 * suspect
