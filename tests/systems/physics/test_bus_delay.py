@@ -10,6 +10,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.physics.bus_delay import BusDelay, add_bus_delay
 
 T = 1e-3
+PORTS = {BusDelay: "delivered", ZeroOrderHold: "y0"}
 
 
 class Clock(LeafSystem):
@@ -54,7 +55,7 @@ def test_delay_for_readers_between_and_at_the_ticks(periods):
         simulator.AdvanceTo(k * T + 0.4 * T)
         # between the ticks, and as sampled by a discrete update at the tick before
         for system in (bus, hold):
-            got = system.get_output_port().Eval(system.GetMyContextFromRoot(root))
+            got = system.GetOutputPort(PORTS[type(system)]).Eval(system.GetMyContextFromRoot(root))
             sent = max(k - periods, 0) * T
             assert np.allclose(got, [7.0 + sent, -sent], rtol=0, atol=1e-12)
 
@@ -120,3 +121,20 @@ def test_delay_must_be_whole_periods(delay, period):
 def test_period_must_be_positive():
     with pytest.raises(InputError, match=r"period = 0.0 s; must be positive"):
         BusDelay(1, 2e-3, 0.0)
+
+
+def test_lost_frames():
+    """What was sent from 3 ms to 6 ms never arrives; what arrived last is delivered on."""
+    builder = DiagramBuilder()
+    clock = builder.AddSystem(Clock())
+    bus = add_bus_delay(builder, clock.get_output_port(), 2 * T, T, lost=(2.5 * T, 5.5 * T))
+    simulator = Simulator(builder.Build())
+    simulator.Initialize()
+    delivered, silence = [], []
+    for k in range(12):
+        simulator.AdvanceTo(k * T + 0.4 * T)
+        context = bus.GetMyContextFromRoot(simulator.get_context())
+        delivered.append(-bus.GetOutputPort("delivered").Eval(context)[1] / T)
+        silence.append(bus.GetOutputPort("silence").Eval(context)[0] / T)
+    np.testing.assert_allclose(delivered, [0, 0, 0, 1, 2, 2, 2, 2, 6, 7, 8, 9], atol=1e-9)
+    np.testing.assert_allclose(silence, [0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0], atol=1e-9)
