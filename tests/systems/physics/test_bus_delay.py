@@ -10,7 +10,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.physics.bus_delay import BusDelay, add_bus_delay
 
 T = 1e-3
-PORTS = {BusDelay: "delivered", ZeroOrderHold: "y0"}
+PORTS = {BusDelay: "delivered", ZeroOrderHold: "y"}
 
 
 class Clock(LeafSystem):
@@ -64,13 +64,13 @@ def test_delivers_the_present_input_from_the_start():
     simulator, bus, _ = build(2e-3)
     simulator.get_mutable_context().SetTime(3.0)
     simulator.Initialize()
-    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    got = bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(simulator.get_context()))
     assert np.allclose(got, [10.0, -3.0], rtol=0, atol=1e-12)
     # a run may start between two ticks
     simulator.get_mutable_context().SetTime(3.0004)
     simulator.Initialize()
     simulator.AdvanceTo(3.0008)
-    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    got = bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(simulator.get_context()))
     assert np.allclose(got, [10.0004, -3.0004], rtol=0, atol=1e-12)
 
 
@@ -83,7 +83,7 @@ def test_what_a_sender_had_before_it_was_initialized_is_never_delivered():
     for k in range(6):
         simulator.AdvanceTo((k + 0.4) * T)
         context = bus.GetMyContextFromRoot(simulator.get_context())
-        assert bus.get_output_port().Eval(context)[0] == 5.0
+        assert bus.GetOutputPort("delivered").Eval(context)[0] == 5.0
 
 
 def test_no_direct_feedthrough():
@@ -98,7 +98,7 @@ def test_contexts_do_not_share_samples():
         bus.GetInputPort("sent").FixValue(context, [float(value)])
         simulator.Initialize()
     for value, simulator in enumerate(simulators):
-        assert bus.get_output_port().Eval(simulator.get_context())[0] == value
+        assert bus.GetOutputPort("delivered").Eval(simulator.get_context())[0] == value
 
 
 @pytest.mark.parametrize(
