@@ -103,10 +103,11 @@ def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
         InputError: If the encoders do not suit the robot.
     """
     faults, encoders = scenario.faults, scenario.encoders
+    late = scenario.controller.sampling_time if encoders.difference_quotient else 0.0
     return SupervisionParameters(
         tolerance=faults.plausibility,
         resolution=np.maximum(*encoder_resolution(robot, encoders)),
-        filter_time=encoders.filter_time,
+        filter_time=encoders.filter_time + late,
         joint_limits=faults.joint_limits,
         saturation_time=faults.saturation_time,
     )

@@ -179,7 +179,10 @@ def _supervision_function(
     for side, wrong in ((0, wrong_J), (2, wrong_M)):
         slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
         at_once = _AT_ONCE * tolerance
-        jumped = (ca.fabs(slip) > at_once) * (period * ca.fabs(change) < ca.fabs(slip))
+        # a velocity that jumped has let them part in the ticks before, too
+        agreed = ca.fabs(sums[side] - sums[side + 1]) < at_once / 2.0
+        sudden = period * ca.fabs(change) < ca.fabs(slip)
+        jumped = (ca.fabs(slip) > at_once) * agreed * sudden
         rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
         of_position = (1 - both) * ca.fmax(jumped, rested)
         suspects += [wrong * of_position, wrong * (1 - of_position)]
