@@ -149,6 +149,17 @@ class FollowingController(LeafSystem):
         """Return the fault that holds at the present instant."""
         return Fault(int(self._output.Eval(context)[self.layout.status][0]))
 
+    def set_last_state(self, context: Context, joint_state: np.ndarray) -> None:
+        """Let a state be that of the last tick, before which nothing has been compared.
+
+        Args:
+            context: The controller's own.
+            joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        """
+        memory = context.get_discrete_state_vector().value().copy()
+        memory[self._last], memory[self._watch] = joint_state, 0.0
+        context.SetDiscreteState(memory)
+
     def suspects(self, context: Context) -> np.ndarray:
         """Return which measured values are not believed, nonzero if so, shape (4N,)."""
         memory = context.get_discrete_state_vector().value()
