@@ -1,5 +1,6 @@
 """One builder of stations: a robot, a task and surroundings, each chosen independently."""
 
+from functools import cache
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -11,7 +12,7 @@ from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.delta import DeltaPart, add_delta, is_delta
-from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.drives import add_drives, add_friction, believed_friction
 from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
@@ -29,6 +30,7 @@ from diagrams.tasks.path import require_orientation
 from diagrams.tasks.path_following import make_task
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
+from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.geometry.paths.smoothing import Progress
 
 
@@ -57,10 +59,13 @@ def build_station(
     part = _add_robot(builder, scenario, folder, workpiece)
     require_orientation(task.path, part.robot.dimension)
     believed = part.belief.robot
-    law = make_law(scenario.controller, believed, task.manifold, scenario.faults)
-    start, initial_state = _start(scenario, task, part, workpiece)
+    begin = cache(lambda: _start(scenario, task, part, workpiece))
+    rest = cache(lambda: _rest(task, part, *begin()))
+    law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
+    start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
-    following = Following(scenario, believed, task, law, on_motors)
+    friction = believed_friction(part, scenario, folder)
+    following = Following(scenario, believed, task, law, on_motors, friction)
 
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(builder, true_state, part.robot, scenario)
@@ -99,7 +104,7 @@ def build_station(
         + part.start_warnings(
             scenario.start, link_state[: part.robot.dimension], start.R_e is not None
         )
-        + law_warnings(scenario, believed, law, link_state)
+        + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),
         workpiece,
     )
@@ -140,6 +145,12 @@ def _start(
     for position, where in task.way():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)
+
+
+def _rest(task: Task, part: RobotPart, start: StartPoint, state: np.ndarray) -> RestPosture:
+    """Return where the robot starts, as the law sees it."""
+    q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
+    return RestPosture(q_J, task.point(start))
 
 
 def draw_station(settings: Scenario, folder: FilePath, station: Station) -> RobotDrawing | None:

@@ -10,7 +10,7 @@ import dataclasses
 import json
 import logging
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -93,6 +93,9 @@ def run_command(
             metavar="SECONDS", help="Go on for that long after a fault, to see how it ends."
         ),
     ] = "0",
+    margins: Annotated[
+        bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
+    ] = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
     from experiments.catalog.scenario_file import read_scenario
@@ -114,6 +117,7 @@ def run_command(
                 recording=recording,
                 progress=progress,
                 after_fault=further,
+                margins=margins,
             )
         _print_outcome(console, outcome)
         raise typer.Exit(_judge(outcome, folder, progress.simulated_time))
@@ -203,18 +207,78 @@ def sweep_command(
 
 @app.command("study")
 def study_command(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
+            "all laws on robots that are not their models; tracking: path following against "
+            "trajectory tracking."
+        ),
+    ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Which law when: all laws on joints of rising stiffness, on all cores (about a minute)."""
+    """Many runs on one page, on all cores: one minute (stiffness) to ten (robustness)."""
+    from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
+    from experiments.studies.tracking import write_tracking
 
+    studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
+        "stiffness": write_study,
+        "robustness": write_robustness,
+        "tracking": write_tracking,
+    }
+    if name not in studies:
+        raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
     with _interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
-        report = write_study(
+        report = studies[name](
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
         raise typer.Exit(_show("study", report))
+
+
+@app.command("margins")
+def margins_command(
+    scenario: Annotated[
+        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+    ],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the page. Default: out/SCENARIO_margins")
+    ] = None,
+    mass: Annotated[
+        float, typer.Option(help="Relative error of masses and inertias to be borne.")
+    ] = 0.05,
+    stiffness: Annotated[
+        float, typer.Option(help="Relative error of joint stiffnesses to be borne.")
+    ] = 0.05,
+    rotor: Annotated[
+        float, typer.Option(help="Relative error of rotor inertias to be borne.")
+    ] = 0.0,
+    tool: Annotated[float, typer.Option(help="Error of the tool's mass to be borne [kg].")] = 0.1,
+) -> None:
+    """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
+    from experiments.catalog.scenario_file import read_scenario
+    from experiments.studies.margins.box import Box
+    from experiments.studies.margins.page import write_margins
+    from experiments.studies.margins.table import case_table, place_table, summary
+
+    with _interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console, box = Console(), Box(mass, stiffness, rotor, tool)
+        with ProgressDisplay(console, loaded.name, None) as progress:
+            outcome = write_margins(loaded, folder, box, progress)
+        for table in (place_table(outcome.analysis), case_table(outcome.analysis)):
+            console.print(table)
+            console.print()
+        console.print(summary(outcome.analysis), highlight=False)
+        raise typer.Exit(_show("margins", outcome.report))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -275,6 +339,8 @@ def _print_outcome(console: Console, outcome: "RunOutcome") -> None:
     console.print(_metrics_table(outcome.metrics))
     for warning in outcome.warnings:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    if outcome.margins is not None:
+        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
     _print_page(console, "\nOpen the report", outcome.report)
 
 

@@ -63,7 +63,7 @@ def prepare(
     """
     settings = load_typed(Scenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
-    with _naming(scenario.path):
+    with naming(scenario.path):
         station = _build(settings, folder, progress)
         check_targets(settings, station)
         settings.name = settings.name or scenario.name
@@ -103,7 +103,7 @@ def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Sta
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def naming(path: Path) -> Iterator[None]:
     """Name the scenario's file in what is said against it."""
     try:
         yield

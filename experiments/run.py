@@ -20,6 +20,7 @@ from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import PreparedRun, prepare
 from experiments.progress import ProgressListener
 from experiments.results.folder import ResultsFolder, check_folder, open_results
+from experiments.results.friction_metrics import friction_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
@@ -29,6 +30,9 @@ from experiments.results.run_signals import collect_log, collect_motion
 from experiments.results.shape_metrics import shape_metrics
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
+from experiments.studies.margins.analysis import MarginAnalysis, analyse
+from experiments.studies.margins.box import Box
+from experiments.studies.margins.words import metrics_of, one_line
 
 _PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
@@ -45,6 +49,7 @@ class RunOutcome:
         warnings: What may not have gone as well as hoped, one sentence each.
         interrupted: Whether the user stopped it.
         problem: Which results could not be written, why, and where they are instead; or None.
+        margins: What the loop bears at the start, in one line; None if nobody asked.
     """
 
     fault: str | None
@@ -53,6 +58,7 @@ class RunOutcome:
     warnings: list[str]
     interrupted: bool = False
     problem: str | None = None
+    margins: str | None = None
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,7 @@ def run_scenario(
     figures: bool,
     recording: bool,
     progress: ProgressListener,
+    margins: bool = False,
     after_fault: float = 0.0,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
@@ -95,6 +102,7 @@ def run_scenario(
         figures: Whether to draw figures.
         recording: Whether to record the motion.
         progress: Told how far the run is.
+        margins: Whether to tell the margins of the loop at the start.
         after_fault: How long to go on after a fault [s], so that one sees how it ends.
 
     Raises:
@@ -104,9 +112,12 @@ def run_scenario(
     inputs = scenario.inputs()
     check_folder(out, "run", inputs)
     prepared = prepare(scenario, duration, recording=recording, progress=progress)
+    analysis = _analyse(prepared, scenario.path.parent, progress) if margins else None
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
-        measured = _measure(prepared, scenario.name, results, progress, interrupted, after_fault)
+        measured = _measure(
+            prepared, scenario.name, results, progress, interrupted, analysis, after_fault
+        )
         page = None
         if recording and len(measured.motion.times) > 1 and not interrupted():
             progress(measured.end, "recording")
@@ -123,7 +134,26 @@ def run_scenario(
             measured.warnings,
             interrupted(),
             report.problem,
+            None if analysis is None else one_line(analysis),
         )
+
+
+def _analyse(prepared: PreparedRun, folder: Path, progress: ProgressListener) -> MarginAnalysis:
+    """Tell the margins of the loop at the start."""
+    return analyse(prepared.settings, folder, Box(), _BeforeStart(progress), only_start=True)
+
+
+class _BeforeStart:
+    """Tells what goes on before the run's own time begins."""
+
+    def __init__(self, progress: ProgressListener) -> None:
+        self._progress = progress
+
+    def expect(self, duration: float) -> None:
+        """Leave it to the run."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        self._progress(0.0, phase)
 
 
 def _measure(
@@ -132,6 +162,7 @@ def _measure(
     results: ResultsFolder,
     progress: ProgressListener,
     interrupted: Callable[[], bool],
+    analysis: MarginAnalysis | None,
     after_fault: float,
 ) -> _Measured:
     """Simulate, and write the log and the metrics."""
@@ -147,6 +178,8 @@ def _measure(
             "integration": str(prepared.integration),
             "start_posture": posture_text(station.robot, station.start_posture),
         }
+        if analysis is not None:
+            log.attributes["margins"] = one_line(analysis)
         if result.fault is not None:
             log.attributes["fault"] = result.fault
             if result.fault_time is not None:
@@ -161,6 +194,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape))
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
@@ -168,8 +202,12 @@ def _measure(
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")
     metrics.add("controller_tick_us_p99", float(p99), "us")
+    if analysis is not None:
+        metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     for metric, target in settings.targets.get(settings.controller.law, {}).items():
-        metrics.set_target(metric, target.bound, target.source)
+        # what another choice of the controller would tell has been checked, and is no metric here
+        if metric in metrics:
+            metrics.set_target(metric, target.bound, target.source)
     results.write("metrics.json", metrics.to_json())
     warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
     return _Measured(log, motion, metrics, warnings, result.fault, end)

@@ -148,7 +148,9 @@ def add_friction(
     resistances, signals = [], {}
     if coefficients is not None:
         bristles = _bristles(scenario, *coefficients, drives)
-        friction = builder.AddNamedSystem("joint_friction", JointFriction(bristles))
+        friction = builder.AddNamedSystem(
+            "joint_friction", JointFriction(bristles, scenario.friction.drift)
+        )
         builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
         resistances.append(friction.GetOutputPort("resistance"))
         signals["friction_torque"] = friction.GetOutputPort("friction_torque")
@@ -200,10 +202,43 @@ def _add_brakes(
     return brakes
 
 
+def believed_friction(
+    part: RobotPart, scenario: Scenario, folder: FilePath
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the coefficients f_c and f_v that the controller believes, each (N,), if any.
+
+    Those of ``controller.friction.believed``, else those of the plant with the belief's error.
+
+    Args:
+        part: The robot.
+        scenario: The scenario.
+        folder: Where relative file names start.
+
+    Raises:
+        InputError: If they do not suit the robot.
+    """
+    given = scenario.controller.friction.believed
+    if given.is_given:
+        return _given_coefficients(given, part.robot, folder, "controller.friction.believed")
+    true = _coefficients(scenario, part, folder)
+    if true is None:
+        return None
+    factors = part.belief.friction
+    return factors[0] * true[0], factors[1] * true[1]
+
+
 def _bristles(
     scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
-    """Return friction whose bristles suit how the plant is integrated."""
+    """Return friction whose bristles suit how the plant is integrated, however it drifts."""
+    drift = scenario.friction.drift
+    stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
+    return replace(_bristles_now(scenario, stiffest, f_v, drives), coulomb=f_c)
+
+
+def _bristles_now(
+    scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+) -> BristleFriction:
     if drives.step is not None:
         return bristles_for_step(
             f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP
@@ -228,12 +263,12 @@ def _coefficients(
     allowed = "null; the parameters of this robot tell no friction, 'friction' does"
     require(own is not None or wanted is None, "drive_friction", wanted, allowed)
     if scenario.friction.is_given:
-        return _given_coefficients(scenario.friction, part.robot, folder)
+        return _given_coefficients(scenario.friction, part.robot, folder, "friction")
     return None if wanted is False else own
 
 
 def _given_coefficients(
-    parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath
+    parameters: JointFrictionParameters, chain: RobotModel, folder: FilePath, block: str
 ) -> tuple[np.ndarray, np.ndarray]:
     n = chain.dimension
     if parameters.file:
@@ -241,13 +276,13 @@ def _given_coefficients(
         known = load_parameters(folder / file if FilePath(file).suffix else file).friction
         if known.coulomb.size < n:
             raise InputError(
-                f"friction.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
+                f"{block}.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
             )
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):
         given = getattr(parameters, key) or [0.0] * n
         if len(given) != n:
-            raise InputError(f"friction.{key}: {len(given)} values; the robot has {n} joints")
+            raise InputError(f"{block}.{key}: {len(given)} values; the robot has {n} joints")
         values.append(np.array(given, dtype=float))
     return values[0], values[1]

@@ -89,7 +89,7 @@ def _split(
 
 def sensor_warnings(scenario: Scenario) -> list[str]:
     """Return what may keep a scenario's sensor from being tared, or make it too late."""
-    if not scenario.compliance.is_given:
+    if not scenario.compliance.needs_sensor:
         return []
     warnings, sensor, dwell = [], scenario.sensor, scenario.reference.dwell
     if scenario.encoders.difference_quotient and sensor.inertia != "none":

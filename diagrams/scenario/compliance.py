@@ -4,10 +4,34 @@ import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import require
+from diagrams.scenario.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
+
+SOURCES = ("sensor", "observed")
+
+
+@dc.dataclass
+class ObservedForceParameters:
+    """Forces on the tool from the torques in the joints, without a sensor.
+
+    Attributes:
+        rate: Of the observer [1/s].
+        damping: Of the inverse of the Jacobian in singular postures.
+        force_dead_band: [N]; friction and model errors are taken for forces below it.
+        torque_dead_band: [Nm].
+    """
+
+    rate: float = 100.0
+    damping: float = 0.02
+    force_dead_band: float = 0.0
+    torque_dead_band: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("rate", self.rate)
+        for key in ("damping", "force_dead_band", "torque_dead_band"):
+            require_not_negative(key, getattr(self, key))
 
 
 @dc.dataclass
@@ -15,16 +39,29 @@ class ComplianceParameters:
     """How the tool yields to measured forces (3.42), (3.44); what is not given stays rigid.
 
     Attributes:
+        source: Where the forces come from: the ``sensor``, or ``observed`` from how the joints
+            move, for robots that can be moved at their links.
+        observed: How they are observed.
         tangential: Of eta.
         transversal: Of xi_1 and xi_2.
         rotational: Of the three angles; oriented paths only.
         with_turning: Whether torques act along eta where the path's orientation turns.
     """
 
+    source: str = "sensor"
+    observed: ObservedForceParameters = dc.field(default_factory=ObservedForceParameters)
     tangential: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     transversal: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     rotational: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     with_turning: bool = False
+
+    def __post_init__(self) -> None:
+        require(self.source in SOURCES, "source", self.source, ", ".join(SOURCES))
+
+    @property
+    def needs_sensor(self) -> bool:
+        """Whether anything yields to what a sensor measures."""
+        return self.is_given and self.source == "sensor"
 
     @property
     def is_given(self) -> bool:

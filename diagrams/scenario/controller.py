@@ -2,11 +2,15 @@
 
 import dataclasses as dc
 
+import numpy as np
+
 from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 MANIFOLDS = ("path", "trajectory")
-_TORQUE_SOURCES = ("none", "known", "measured")
+_TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
 @dc.dataclass
@@ -14,22 +18,48 @@ class GainParameters:
     """Gains of one kind of coordinate, by poles or by the dissertation's coefficients.
 
     Attributes:
-        poles: Real poles [1/s], r of them.
+        poles: Real poles [1/s], r of them; ``auto`` to have them chosen for a bandwidth: two slow
+            ones for the convergence, faster ones for the robustness. A run's resolved scenario
+            names what was chosen.
+        bandwidth: Magnitude of the slow poles [1/s] that ``auto`` chooses.
+        bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
         coefficients: ``a_1 .. a_r``, alternatively.
         integral: ``a_0``; needs coefficients.
+        integral_pole: With poles, one more pole [1/s] and with it an integral part, which takes
+            away what wrong masses leave at rest; 0 for none.
     """
 
-    poles: list[float] = dc.field(default_factory=list)
+    poles: list[float] = dc.field(default_factory=list, metadata=AUTO_OR_MANY)
     coefficients: list[float] = dc.field(default_factory=list)
     integral: float = 0.0
+    integral_pole: float = 0.0
+    bandwidth: float = 0.0
+    bears: float = 0.05
 
     def __post_init__(self) -> None:
+        require_not_negative("bandwidth", self.bandwidth)
+        good = self.integral_pole <= 0.0 and bool(np.isfinite(self.integral_pole))
+        require(good, "integral_pole", self.integral_pole, "zero or a negative number")
+        alone = self.integral_pole != 0.0 and bool(self.coefficients)
+        require(not alone, "integral_pole", self.integral_pole, "0 with coefficients; see integral")
+        require(0.0 <= self.bears <= 0.5, "bears", self.bears, "a fraction from 0 to 0.5")
+        require(
+            not (self.bandwidth and self.coefficients),
+            "bandwidth",
+            self.bandwidth,
+            "with poles: auto only, not with coefficients",
+        )
         require(
             not (self.poles and (self.coefficients or self.integral)),
             "poles",
             self.poles,
             "either poles, or coefficients with or without integral",
         )
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether poles are to be chosen."""
+        return self.bandwidth > 0.0 and not self.poles
 
 
 @dc.dataclass
@@ -53,9 +83,11 @@ class ExternalTorqueParameters:
 
     Attributes:
         source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
-            ``measured``: from the force/torque sensor.
+            ``measured``: from the force/torque sensor; ``observed``: from how the links move,
+            without a sensor.
         bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
-            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives.
+            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives,
+            which only an observer cannot do.
     """
 
     source: str = "none"
@@ -65,6 +97,8 @@ class ExternalTorqueParameters:
         known = self.source in _TORQUE_SOURCES
         require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
         require_not_negative("bandwidth", self.bandwidth)
+        possible = self.source != "observed" or self.bandwidth > 0.0
+        require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 
 
 @dc.dataclass
@@ -86,6 +120,7 @@ class ControllerParameters:
         external_torque: What it knows of forces on the tool.
         model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
             robot parameters; empty for the plant's own. ``model_error`` comes on top.
+        friction: What it does about friction.
     """
 
     law: str = "elastic"
@@ -99,6 +134,9 @@ class ControllerParameters:
     manifold: str = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
     model: str = ""
+    friction: FrictionCompensationParameters = dc.field(
+        default_factory=FrictionCompensationParameters
+    )
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))

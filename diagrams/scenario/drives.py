@@ -5,6 +5,7 @@ import dataclasses as dc
 import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
+from pfsc_drake.physics.friction import FrictionDrift
 
 _SHORTEST_PERIOD = 1e-6  # s
 _LARGEST = 1e9  # of friction; what it multiplies stays within a float
@@ -77,11 +78,13 @@ class JointFrictionParameters:
         f_v: Viscous friction of every joint [Nm s/rad or N s/m].
         file: Instead, name of a shipped robot or YAML file with robot parameters, whose
             friction of the first joints is taken.
+        drift: How it changes during the run; null for not at all.
     """
 
     f_c: list[float] = dc.field(default_factory=list)
     f_v: list[float] = dc.field(default_factory=list)
     file: str = ""
+    drift: FrictionDrift | None = None
 
     def __post_init__(self) -> None:
         for key in ("f_c", "f_v"):

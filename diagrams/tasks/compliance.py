@@ -46,8 +46,9 @@ def add_compliance(
         builder: Builder of the diagram.
         scenario: The scenario, with compliance.
         linearization: Of the law that follows the reference.
-        ports: ``wrench_measured``, ``tared``, ``manifold_point``, ``manifold_state`` and
-            ``desired_reference`` with derivatives up to :func:`reference_order`.
+        ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
+            ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
+            derivatives up to :func:`reference_order`.
         lap: Length of the path [m] if it is closed.
 
     Returns:
@@ -73,12 +74,15 @@ def add_compliance(
     )
     reference = impedance.GetOutputPort("reference")
     force = transform.GetOutputPort("manifold_force")
-    builder.Connect(ports["wrench_measured"], transform.GetInputPort("wrench"))
+    wrench, ready = "wrench_measured", "tared"
+    if scenario.compliance.source == "observed":
+        wrench, ready = "wrench_observed", "ready"
+    builder.Connect(ports[wrench], transform.GetInputPort("wrench"))
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
     builder.Connect(force, impedance.GetInputPort("manifold_force"))
-    builder.Connect(ports["tared"], impedance.GetInputPort("ready"))
+    builder.Connect(ports[ready], impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]

@@ -12,7 +12,7 @@ from pfsc_drake.systems.control.following_controller import FollowingController
 def needs_sensor(scenario: Scenario) -> bool:
     """Return whether something in the scenario acts on measured forces."""
     measured = scenario.controller.external_torque.source == "measured"
-    return measured or scenario.compliance.is_given
+    return measured or scenario.compliance.needs_sensor
 
 
 def add_external_torque(
@@ -21,8 +21,8 @@ def add_external_torque(
     scenario: Scenario,
     controller: FollowingController,
     ports: dict[str, OutputPort],
-) -> None:
-    """Tell the law the external torques in the joints, if it is to know them.
+) -> dict[str, OutputPort]:
+    """Tell the law the external torques in the joints, as far as they come from a wrench.
 
     Args:
         builder: Builder of the diagram.
@@ -31,10 +31,15 @@ def add_external_torque(
         controller: The controller.
         ports: ``joint_state``, and of ``wrench_ext`` and ``wrench_measured`` what there is.
 
+    Returns:
+        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the tool.
+
     Raises:
         InputError: If the law knows no external torques.
     """
     parameters = scenario.controller.external_torque
+    if parameters.source in ("none", "observed"):
+        return {}
     wrench = ports.get({"known": "wrench_ext", "measured": "wrench_measured"}[parameters.source])
     degree = controller.relative_degree
     if degree == 1:
@@ -43,7 +48,7 @@ def add_external_torque(
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
     if wrench is None:  # nothing acts on the tool
-        return
+        return {}
     torque = builder.AddNamedSystem(
         "external_torque",
         ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
@@ -51,3 +56,4 @@ def add_external_torque(
     builder.Connect(wrench, torque.GetInputPort("wrench"))
     builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
     builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))
+    return {"tau_ext": torque.GetOutputPort("tau_ext")}

@@ -9,7 +9,9 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
+from diagrams.tasks.friction import Coefficients, add_friction_compensation
 from diagrams.tasks.law import supervision
+from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
@@ -18,6 +20,9 @@ from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+
+# what an observer tells, for the log
+_OBSERVED = ("tau_ext_observed", "wrench_observed")
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ class Following:
         task: What it is to do.
         law: The law.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
+        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
     """
 
     scenario: Scenario
@@ -37,6 +43,7 @@ class Following:
     task: Task
     law: FollowingLaw
     on_motors: bool = False
+    friction: Coefficients | None = None
 
 
 @dataclass(frozen=True)
@@ -104,10 +111,12 @@ def add_law(
 
     Returns:
         The controller, and its signals ``reference`` and ``law``; with compliance also
-        ``desired_reference`` and ``manifold_force``.
+        ``desired_reference`` and ``manifold_force``, with what estimates friction
+        ``friction_estimate``, with what observes forces ``tau_ext_observed`` and
+        ``wrench_observed``.
 
     Raises:
-        InputError: If compliance or external torques do not suit the law.
+        InputError: If compliance, external torques or friction do not suit the law.
     """
     scenario, law, signals = following.scenario, following.law, place.signals | forces
     controller = builder.AddNamedSystem(
@@ -118,6 +127,15 @@ def add_law(
     )
     desired = _add_smooth_start(builder, following, controller, place.desired_reference)
     made = {"reference": desired, "law": controller.GetOutputPort("law")}
+    signals |= add_external_torque(builder, following.robot, scenario, controller, signals)
+    friction, logged = add_friction_compensation(
+        builder, following.robot, scenario, controller, following.friction, signals
+    )
+    made |= logged
+    if friction is not None:
+        signals["friction"] = friction
+    signals |= add_observed_forces(builder, following.robot, scenario, controller, signals)
+    made |= {name: signals[name] for name in _OBSERVED if name in signals}
     if scenario.compliance.is_given:
         inputs = signals | {
             "desired_reference": desired,
@@ -127,8 +145,6 @@ def add_law(
         lap = path.length if path.closed else None
         made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
-    if scenario.controller.external_torque.source != "none":
-        add_external_torque(builder, following.robot, scenario, controller, signals)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))
@@ -170,12 +186,12 @@ def _connect_alarms(
     compliance_status: OutputPort | None,
 ) -> None:
     """Let the robot stop for faults of the force sensor and of the compliance, if there are any."""
-    if "sensor_fault" not in forces:
+    ports = [forces.get("sensor_fault"), forces.get("tared"), compliance_status]
+    if ports == [None] * 3:
         return
     alarms = builder.AddNamedSystem("alarms", Multiplexer([1, 1, 1]))
-    if compliance_status is None:
-        none = builder.AddNamedSystem("no_compliance", ConstantVectorSource([0.0]))
-        compliance_status = none.get_output_port()
-    for i, port in enumerate([forces["sensor_fault"], forces["tared"], compliance_status]):
+    for i, port in enumerate(ports):
+        if port is None:
+            port = builder.AddSystem(ConstantVectorSource([0.0])).get_output_port()
         builder.Connect(port, alarms.get_input_port(i))
     builder.Connect(alarms.get_output_port(), controller.GetInputPort("alarms"))

@@ -1,13 +1,15 @@
 """The law of a scenario."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from diagrams.scenario import (
     ControllerParameters,
     FaultParameters,
-    GainParameters,
     Scenario,
 )
+from diagrams.tasks.gains import choose_poles, gains_of
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (
@@ -15,12 +17,10 @@ from pfsc_drake.control.law.linearization import (
     ActuationOptions,
     linearize,
 )
+from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import (
-    CoordinateGains,
     Stabilization,
-    check_gains,
-    gains_from_poles,
 )
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.manifold import Manifold
@@ -33,14 +33,16 @@ def make_law(
     parameters: ControllerParameters,
     robot: RobotModel,
     manifold: Manifold,
+    rest: Callable[[], RestPosture] | None = None,
     faults: FaultParameters | None = None,
 ) -> FollowingLaw:
     """Return the law that makes a robot follow a manifold.
 
     Args:
-        parameters: What the scenario says.
+        parameters: What the scenario says; poles that are to be chosen are filled in.
         robot: The robot.
         manifold: What to follow.
+        rest: Tells where the robot starts at rest; needed to choose poles.
         faults: What happens after a fault.
 
     Raises:
@@ -60,10 +62,11 @@ def make_law(
             f"write {law}: {{{example}}} with poles (1/s) of your choice"
         )
     by_kind = parameters.gains[law]
+    choose_poles(parameters, robot, linearization, rest)
     # coordinates of a kind share their gains
     names = [coordinate.kind.value for coordinate in manifold.coordinates]
     relative_degree = linearization.relative_degree
-    gains = [_gains(getattr(by_kind, name), relative_degree, law, name) for name in names]
+    gains = [gains_of(getattr(by_kind, name), relative_degree, law, name) for name in names]
     effort = robot.gather("effort_limit") * parameters.effort_scale
     limits = robot.gather("velocity_limit") if relative_degree == 1 else effort
     return FollowingLaw(
@@ -74,6 +77,7 @@ def make_law(
         limits,
         parameters.max_alpha,
         safe_state(parameters, robot, faults or FaultParameters()),
+        tells_reference_velocity=parameters.friction.needs_reference_velocity,
     )
 
 
@@ -111,20 +115,3 @@ def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
         joint_limits=faults.joint_limits,
         saturation_time=faults.saturation_time,
     )
-
-
-def _gains(
-    parameters: GainParameters, relative_degree: int, law: str, name: str
-) -> CoordinateGains:
-    key = f"controller.gains.{law}.{name}"
-    if parameters.poles:
-        gains = gains_from_poles(parameters.poles)
-    elif len(parameters.coefficients) == relative_degree:
-        gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
-    else:
-        raise InputError(
-            f"{key}: {len(parameters.coefficients)} coefficients and no poles; "
-            f"the law needs {relative_degree} of either"
-        )
-    check_gains(gains, relative_degree, key)
-    return gains

@@ -3,12 +3,17 @@
 import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
+from diagrams.tasks.gains import sampled_robot
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.robust_gains import RobotError
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.robot_model import RobotModel
 
+# relative, of masses and of stiffnesses, which gains should bear
+_BORNE_ERROR = 0.05
 # rad per sampling interval, up to which the exact elastic law keeps its accuracy
 _FASTEST_RESONANCE = 1.0
 # K_s epsilon D_b T_s / D_M, up to which the damping (3.71) only damps; sampled, it is unstable
@@ -21,7 +26,11 @@ _LARGEST_SOFTNESS = 1e-3
 
 
 def law_warnings(
-    scenario: Scenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
+    scenario: Scenario,
+    robot: RobotModel,
+    law: FollowingLaw,
+    link_state: np.ndarray,
+    rest: RestPosture,
 ) -> list[str]:
     """Return what a scenario's sampled law will not do well, one sentence each.
 
@@ -30,14 +39,20 @@ def law_warnings(
         robot: The robot.
         law: Its law.
         link_state: ``[q_J, v_J]`` at the start, shape (2N,).
+        rest: The start, and the manifold's point there.
     """
     parameters = scenario.controller
-    return [
+    causes = [
         *_fast_resonance(parameters, robot, link_state),
         *_fast_damping(parameters, robot),
         *_soft_joints(parameters, robot, law, link_state),
+    ]
+    return [
+        # where the law does not suit the robot, gains are not to blame
+        *(causes or _fragile_gains(parameters, robot, law, rest)),
         *_fast_servo(scenario, robot, link_state),
         *_unknown_forces(scenario, robot),
+        *_friction_behind_servos(parameters),
     ]
 
 
@@ -55,6 +70,31 @@ def _fast_resonance(
         f"{resonance * period:.2f} rad per sampling interval; above "
         f"{_FASTEST_RESONANCE:g} rad the law 'elastic' loses accuracy and then "
         "oscillates: sample faster, or take the law 'visco_elastic' or 'singular_perturbation'"
+    ]
+
+
+def _fragile_gains(
+    parameters: ControllerParameters, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+) -> list[str]:
+    """Warn of gains that do not bear a small error of the model, on the loop at rest."""
+    if law.linearization.relative_degree == 1:
+        return []
+    sampled = sampled_robot(parameters, robot, law.linearization, rest)
+    gains = law.stabilization
+    advice = "poles: auto with a bandwidth chooses some that do; 'margins' tells more"
+    if sampled.rate(gains, RobotError()) > 0.0:
+        return [
+            f"the loop of the law '{parameters.law}' with these gains is unstable at the start "
+            f"even on a perfect model, sampled at {1e3 * parameters.sampling_time:g} ms: lower "
+            "the gains or sample faster"
+        ]
+    unborne = sampled.unborne(gains, _BORNE_ERROR)
+    if unborne is None:
+        return []
+    return [
+        f"the gains of the law '{parameters.law}' do not bear {100.0 * _BORNE_ERROR:g} %: with "
+        f"{unborne} the loop is unstable at the start, and about "
+        f"{100.0 * sampled.borne(gains, unborne):.1f} % is borne; {advice}"
     ]
 
 
@@ -129,6 +169,15 @@ def _fast_servo(scenario: Scenario, robot: RobotModel, link_state: np.ndarray) -
         f"servo.bandwidth = {bandwidth:g} rad/s is above the lowest resonance of the joints, "
         f"{resonance:.0f} rad/s; servos that fast do not damp it, and the loop may oscillate: "
         "lower servo.bandwidth and the gains"
+    ]
+
+
+def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
+    if parameters.law != "velocity_servo" or not parameters.friction.is_given:
+        return []
+    return [
+        "controller.friction is not used: the servos of the law 'velocity_servo' overcome friction "
+        "themselves"
     ]
 
 

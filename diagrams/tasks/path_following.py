@@ -116,6 +116,10 @@ class PathTask(Task):
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
         return StartPoint(y_t, projection.theta, R_e)
 
+    def point(self, start: StartPoint) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.path.evaluator(self.relative_degree)(start.y_t.tolist(), start.theta)
+
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """See :class:`Task`."""
         points = self._scenario.reference.points
@@ -156,6 +160,10 @@ class TrajectoryTask(PathTask):
         )
         builder.Connect(reference, leader.GetInputPort("reference"))
         return PlaceFinder(projector, leader.GetOutputPort("manifold_point"))
+
+    def point(self, start: StartPoint) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.path.evaluator(self.relative_degree).evaluate_at(start.theta)
 
 
 TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}

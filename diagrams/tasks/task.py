@@ -90,6 +90,14 @@ class Task(ABC):
         """
 
     @abstractmethod
+    def point(self, start: StartPoint) -> np.ndarray:
+        """Return the point of the manifold that the law acts on at the start.
+
+        Args:
+            start: Where the tool starts.
+        """
+
+    @abstractmethod
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """Yield positions along the way of the tool [m], each (3,), with what to call them."""
 

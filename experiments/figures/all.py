@@ -18,6 +18,7 @@ from experiments.figures.drives import (
     draw_velocities,
 )
 from experiments.figures.forces import draw_forces, has_forces
+from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
 from experiments.figures.style import STYLE, Drawing, Figure, render
@@ -68,5 +69,7 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("v_J"), draw_velocities),
     (_has("tau_d"), draw_efforts),
     (_has("tau_f", "v_J"), draw_friction),
+    (_has("tau_f", "friction_estimate"), draw_friction_estimate),
+    (_has("f_c", "f_c_estimate", "f_v", "f_v_estimate"), draw_friction_coefficients),
     (_has("q_M", "q_J"), draw_deflection),
 ]

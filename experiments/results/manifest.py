@@ -29,6 +29,7 @@ RESULTS = (
     "metrics.json",
     "recording.html",
     "report.html",
+    "margins.json",
     "sweep.json",
     "sweep.csv",
     "sweep.parquet",

@@ -73,6 +73,13 @@ def optional_signals(station: Station) -> set[str]:
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
     if "desired_reference" in names:
         names.add("xi_d")
+    if "friction_torque" in names:
+        names.add("tau_f")
+    estimate = station.log.rows.get("friction_estimate")
+    if estimate is not None and estimate.stop - estimate.start > station.robot.dimension:
+        names |= {"f_c_estimate", "f_v_estimate"}
+        if "tau_f" in names:
+            names |= {"f_c", "f_v"}
     if station.on_motors:
         names.add("xi_M")
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
@@ -249,6 +256,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     known = {
         "wrench_ext": ("N, Nm", wrench),
         "wrench_measured": ("N, Nm", wrench),
+        "wrench_observed": ("N, Nm", wrench),
         "manifold_force": ("N, Nm", manifold),
         "tared": ("1", None),
         "sensor_fault": ("1", None),
@@ -259,6 +267,9 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     if "wrench_ext" in raw:
         labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
+    if "tau_ext_observed" in raw:
+        labels = [f"tau_ext_observed_{i + 1}" for i in range(station.robot.dimension)]
+        log.add("tau_ext_observed", raw["tau_ext_observed"], effort, labels)
     if "desired_reference" in raw:
         desired = raw["desired_reference"][:, :m]
         for kind, part, names in _kinds(station):
@@ -286,3 +297,26 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     if "friction_torque" in raw:
         labels = [f"tau_f_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_f", raw["friction_torque"], effort, labels)
+    if "friction_estimate" in raw:
+        _add_friction_estimate(log, station, raw["friction_estimate"])
+    if "f_c_estimate" in log and "friction_torque" in raw:
+        _add_coefficients(log, station)
+
+
+def _add_coefficients(log: RunLog, station: Station) -> None:
+    """Add the true coefficients of friction, in the units of what is estimated."""
+    friction = station.diagram.GetSubsystemByName("joint_friction")
+    for name, values in zip(("f_c", "f_v"), friction.coefficients(log.time), strict=True):
+        labels = [f"{name}_{i + 1}" for i in range(station.robot.dimension)]
+        log.add(name, values, log[f"{name}_estimate"].unit, labels)
+
+
+def _add_friction_estimate(log: RunLog, station: Station, estimate: np.ndarray) -> None:
+    """Add what is thought of friction: torques, and coefficients if they are estimated."""
+    _, speed, effort = _joint_units(station)
+    n = station.robot.dimension
+    names = {"friction_estimate": ("tau_f", effort), "f_c_estimate": ("f_c", effort)}
+    names["f_v_estimate"] = ("f_v", f"{effort} s/rad" if speed == "rad/s" else f"{effort} s/m")
+    parts = np.split(estimate, estimate.shape[1] // n, axis=1)
+    for (name, (symbol, unit)), values in zip(names.items(), parts, strict=False):
+        log.add(name, values, unit, [f"{symbol}_estimate_{i + 1}" for i in range(n)])

@@ -2,6 +2,7 @@
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
+from experiments.results.friction_metrics import friction_metric_names
 from experiments.results.joint_limits import JointLimits
 from experiments.results.path_metrics import metric_names
 from experiments.results.run_signals import optional_signals
@@ -10,6 +11,8 @@ from pfsc_drake.errors import InputError
 
 # signals that another law may log on the same robot
 _OF_OTHER_LAWS = {"xi_M"}
+# signals of an observer, which may be left out
+_OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
 
 
 def check_targets(settings: Scenario, station: Station) -> None:
@@ -27,6 +30,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
         other = set() if law == settings.controller.law else _OF_OTHER_LAWS
         known = [
             *metric_names(station.robot.dimension, signals | other),
+            *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape),
             *JointLimits.of(station.robot).metric_names(),
             "real_time_factor",

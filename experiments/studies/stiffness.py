@@ -13,14 +13,12 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
 from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.interruption import noticed_interruption
 from experiments.pages.report import Report, report_page, write_report
 from experiments.results.folder import open_results
 from experiments.results.metrics import Metrics
 from experiments.results.provenance import standard_attributes
-from experiments.sweep.many import run_many
+from experiments.studies.side_by_side import run_side_by_side
 from experiments.sweep.rows import COMPLETED, RunRow
-from experiments.sweep.worker import RunTask
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
@@ -128,23 +126,19 @@ def _run_all(
         KeyboardInterrupt: At Ctrl-C.
     """
     cases = [(float(stiffness), law) for stiffness in stiffnesses for law in laws]
-    points: dict[int, StudyPoint] = {}
-    with TemporaryDirectory() as folder, noticed_interruption() as interrupted:
-        scenarios = [_scenario(law, stiffness, Path(folder)) for stiffness, law in cases]
-        resonances = [_resonance(scenario) for scenario in scenarios[:: len(laws)]]
+    points: dict[tuple[float, str], StudyPoint] = {}
+    with TemporaryDirectory() as folder:
+        scenarios = {(k, law): _scenario(law, k, Path(folder)) for k, law in cases}
+        resonances = {k: _resonance(scenarios[k, laws[0]]) for k in dict(cases)}
 
-        def take(number: int, row: RunRow) -> None:
-            stiffness, law = cases[number]
-            point = _point(law, stiffness, resonances[number // len(laws)], row)
-            points[number] = point
+        def take(case: tuple[float, str], row: RunRow) -> None:
+            stiffness, law = case
+            point = points[case] = _point(law, stiffness, resonances[stiffness], row)
             result = point.fault or f"{point.deviation * 1e3:.3g} mm"
             progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
 
-        tasks = {number: RunTask.of(scenario) for number, scenario in enumerate(scenarios)}
-        run_many(tasks, take, interrupted=interrupted)
-        if interrupted():
-            raise KeyboardInterrupt
-    return [points[number] for number in range(len(cases))]
+        run_side_by_side(scenarios, take)
+    return [points[case] for case in cases]
 
 
 def _scenario(law: str, stiffness: float, folder: Path) -> ScenarioFile:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from experiments.sweep.worker import program_revision
 from pfsc_drake.errors import InputError, shortened
 
 if TYPE_CHECKING:
@@ -49,11 +50,13 @@ def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
 
     Args:
         address: Of a Dask scheduler, e.g. ``tcp://10.0.0.1:8786``; None for processes of this
-            machine, which listen on its loopback address alone.
+            machine, which listen on its loopback address alone. Scheduler and workers must find
+            the program: ``python -m dask scheduler`` and ``python -m dask worker ADDRESS
+            --nthreads 1`` in a clone of the same revision.
         workers: Number of processes; of this machine only.
 
     Raises:
-        InputError: If Dask is not installed, or no scheduler answers.
+        InputError: If Dask is not installed, no scheduler answers, or it lacks the program.
     """
     _require_dask()
     import dask
@@ -62,6 +65,7 @@ def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if address is not None:
         with _connect(address) as client:
+            _check_program(client, address)
             yield client
         return
     with (
@@ -98,11 +102,25 @@ def _connect(address: str) -> "Client":
         ) from None
 
 
+def _check_program(client: "Client", address: str) -> None:
+    """Refuses a scheduler or workers that cannot run the program; who comes later, is not asked."""
+    if not client.nthreads():
+        return
+    try:
+        client.submit(program_revision, pure=False).result()
+    except Exception as error:  # whatever they raise, they cannot
+        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
+        raise InputError(
+            f"--scheduler {shortened(address)}: it has not this program: {reason}; allowed: in a "
+            "clone of this revision python -m dask scheduler, python -m dask worker ADDRESS"
+        ) from None
+
+
 def _require_dask() -> None:
     try:
         import distributed  # noqa: F401
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"{error.name} is not installed; allowed: make setup, or its extra 'sweep'"
+            f"{error.name} is not installed; allowed: make setup, or the extra 'sweep'"
         ) from None

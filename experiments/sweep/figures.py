@@ -24,6 +24,8 @@ _COLUMNS, _PANEL_HEIGHT = 3, 2.7
 # values of one parameter up to which they stand side by side
 _FEW = 8
 _WIDE = 30.0  # ratio of largest and smallest value, from which on the scale is logarithmic
+# median of a parameter against its largest value, from which on its scale is logarithmic
+_CROWDED = 5.0
 _SCALES = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "s": (1.0, "s")}
 _MICRO = 1e-4  # m or rad
 _CROSS_HEIGHT = 0.97  # of a panel
@@ -124,13 +126,13 @@ def _draw_parameter(
     panel.margins(x=0.06)
     if not _is_numeric(parameter):
         kinds = _kinds(parameter)
-        texts = [_short(kind, 14) for kind in kinds]
+        texts = [_short(kind, 20) for kind in kinds]
         panel.set_xticks(range(len(kinds)), texts, rotation=20 if len(kinds) > 2 else 0)
         panel.set_xlim(-0.5, len(kinds) - 0.5)
         return
     numbers = np.array(parameter, dtype=float)
     ticks = np.unique(numbers)
-    if numbers.min() > 0.0 and numbers.max() > _WIDE * numbers.min():
+    if numbers.min() > 0.0 and np.median(numbers) < numbers.max() / _CROWDED:
         panel.set_xscale("log")
     elif len(set(parameter)) <= _FEW and np.diff(ticks).min(initial=np.inf) > np.ptp(ticks) / _FEW:
         panel.set_xticks(ticks, [f"{tick:.4g}" for tick in ticks])

@@ -77,6 +77,8 @@ class SweepProgress:
         """Takes the number of processes that run."""
         if not number and self._processes != number and self._bar is None:
             self._console.print(f"{self._title}: no worker is left; waiting for one")
+        if not self._processes:
+            self._begin = time.monotonic()  # starting them is no part of a run's time
         self._processes = number
         self._show()
 

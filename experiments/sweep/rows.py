@@ -27,6 +27,7 @@ class RunRow:
         seconds: Wall clock time [s].
         host: Machine that ran it.
         revision: Of the program there.
+        memory: Of its process after the run [bytes]; not kept in files.
     """
 
     status: str
@@ -37,11 +38,12 @@ class RunRow:
     seconds: float = math.nan
     host: str = ""
     revision: str = ""
+    memory: float = 0.0
 
     @property
     def is_final(self) -> bool:
-        """Whether the same run would end in the same way; where its process died, who knows."""
-        return self.status != DIED
+        """Whether the same run would end in the same way; not if the machine is to blame."""
+        return self.status not in (FAILED, DIED)
 
     def to_data(self) -> dict[str, Any]:
         """Returns the row as data for JSON; NaN is null."""

@@ -30,7 +30,7 @@ from experiments.sweep.summary import (
     summary_metrics,
 )
 from experiments.sweep.table import table_columns, to_csv, to_parquet, units_of
-from experiments.sweep.worker import RunTask
+from experiments.sweep.worker import RunTask, program_revision
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
@@ -152,9 +152,11 @@ def run_sweep(
         metric: Metric to draw; None for the usual one.
 
     Raises:
-        InputError: If the folder cannot be used, no scheduler answers, or Dask is not installed;
-            nothing has been run then.
+        InputError: If the folder cannot be used, ``workers`` go with ``scheduler``, no scheduler
+            answers, or Dask is not installed; nothing has been run then.
     """
+    if scheduler is not None and workers is not None:
+        raise InputError(f"--workers {workers}: --scheduler brings its own; allowed: one of both")
     inputs = sweep.scenario.inputs()
     check_folder(out, _KIND, inputs)
     count_cores()  # without Dask the folder stays as it is
@@ -274,10 +276,10 @@ def _warnings(rows: dict[int, RunRow]) -> list[str]:
     if warned:
         example = f"run {warned[0]}: {rows[warned[0]].warnings[0]}"
         warnings.append(f"{len(warned)} of {len(rows)} runs have warnings, e.g. {example}")
-    revisions = sorted({row.revision for row in rows.values() if row.revision})
+    revisions = sorted({program_revision(), *(r.revision for r in rows.values() if r.revision)})
     if len(revisions) > 1:
         shown = ", ".join(revision[:12] for revision in revisions)
-        warnings.append(f"the runs are of different revisions of the program: {shown}")
+        warnings.append(f"program and runs are of different revisions: {shown}")
     return warnings
 
 

@@ -70,11 +70,14 @@ def run_task(task: RunTask) -> RunRow:
 
     Whatever is wrong with the run is said in its row.
     """
+    import psutil  # comes with Dask
+
     begin, clock = time.perf_counter(), _Clock()
     with _ONE_AT_A_TIME:
         row = _run(task, clock)
     row.end, row.seconds = clock.simulated_time, time.perf_counter() - begin
-    row.host, row.revision = socket.gethostname(), _revision()
+    row.host, row.revision = socket.gethostname(), program_revision()
+    row.memory = float(psutil.Process().memory_info().rss)
     return row
 
 
@@ -102,7 +105,8 @@ def _run(task: RunTask, clock: _Clock) -> RunRow:
 
 
 @cache
-def _revision() -> str:
+def program_revision() -> str:
+    """Returns the revision of the program in this process."""
     return git_revision()
 
 

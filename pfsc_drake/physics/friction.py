@@ -128,6 +128,40 @@ class BristleFriction:
         return np.clip(load / limit, -1.0, 1.0)
 
 
+@dataclass
+class FrictionDrift:
+    """Friction that changes during a run, as that of a gear that becomes warm, evenly.
+
+    Attributes:
+        factor: What it is in the end, in units of what it was, positive.
+        begin: Until when it is as it was [s].
+        end: From when on it is ``factor`` times that [s], after ``begin``.
+
+    Raises:
+        InputError: If a number is out of range.
+    """
+
+    factor: float = 1.0
+    begin: float = 0.0
+    end: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.factor < np.inf:
+            raise InputError(f"factor = {self.factor}; must be positive and finite")
+        if not 0.0 <= self.begin < self.end < np.inf:
+            raise InputError(
+                f"begin = {self.begin} s, end = {self.end} s; must be 0 <= begin < end, finite"
+            )
+
+    def scale(self, t: float | np.ndarray) -> np.ndarray:
+        """Return the friction in units of that at the start.
+
+        Args:
+            t: Time or times [s].
+        """
+        return np.asarray(np.interp(t, [self.begin, self.end], [1.0, self.factor]))
+
+
 def bristles_for_step(
     coulomb: np.ndarray,
     viscous: np.ndarray,

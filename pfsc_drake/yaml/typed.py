@@ -15,9 +15,10 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml, read_yaml
 from pfsc_drake.yaml.schema_check import REQUIRED, check_schema
 
-__all__ = ["ONE_OR_MANY", "REQUIRED", "load_file", "load_typed"]
+__all__ = ["AUTO_OR_MANY", "ONE_OR_MANY", "REQUIRED", "load_file", "load_typed"]
 
 ONE_OR_MANY = {"one_or_many": True}  # metadata of a list whose only item may be given without list
+AUTO_OR_MANY = {"empty_word": "auto"}  # metadata of a list for which ``auto`` says that it is empty
 
 Schema = TypeVar("Schema")
 
@@ -69,13 +70,21 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
 
 
 def _listed(schema: Any, data: Any) -> Any:
-    """Returns data in which single items stand in lists where the schema allows them without."""
-    if not (dataclasses.is_dataclass(schema) and isinstance(data, dict)):
+    """Returns data with lists wherever the schema allows a single item or a word for a list."""
+    if not isinstance(data, dict):
+        return data
+    if typing.get_origin(schema) is dict:
+        kind = typing.get_args(schema)[1]
+        return {key: _listed(kind, item) for key, item in data.items()}
+    if not dataclasses.is_dataclass(schema):
         return data
     hints, listed = typing.get_type_hints(schema), dict(data)
     for field in dataclasses.fields(schema):
         if field.name in data:
             item = data[field.name]
+            if item == field.metadata.get("empty_word", ...):
+                listed[field.name] = []
+                continue
             single = field.metadata.get("one_or_many") and isinstance(item, (int, float, str))
             listed[field.name] = [item] if single else _listed(hints[field.name], item)
     return listed

@@ -12,6 +12,8 @@ from pydrake.systems.primitives import MatrixGain
 from scipy.optimize import least_squares
 
 from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, link_momentum
+from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -29,6 +31,7 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
@@ -39,16 +42,20 @@ THETA = 0.7
 COUNT = 64
 NAMES = ["eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3"]
 CASES = {
-    "6R elastic oriented": ("comau_racer_1_4_elastic", "elastic", True),
-    "3R elastic": ("comau_racer_1_4_elastic_3r", "elastic", False),
-    "6R rigid oriented": ("comau_racer_1_4", "rigid", True),
+    "6R elastic oriented": ("comau_racer_1_4_elastic", "elastic", True, False),
+    "6R elastic oriented observed": ("comau_racer_1_4_elastic", "elastic", True, True),
+    "3R elastic": ("comau_racer_1_4_elastic_3r", "elastic", False, False),
+    "6R rigid oriented": ("comau_racer_1_4", "rigid", True, False),
 }
 
 
 class Chain:
-    """The controller's chain of systems, and the plant's states of successive ticks."""
+    """The controller's chain of systems, and the plant's states of successive ticks.
 
-    def __init__(self, model, law, oriented):
+    ``observed``: with observers of friction and of external torques.
+    """
+
+    def __init__(self, model, law, oriented, observed):
         plant = MultibodyPlant(0.0)
         Parser(plant).AddModels(str(resolve_model(model)))
         plant.Finalize()
@@ -57,7 +64,7 @@ class Chain:
         self.path = make_path(oriented)
         self.law = make_law(self.robot, law, oriented)
         self.states = self._states(plant, tool)
-        self._build()
+        self._build(observed)
 
     def _states(self, plant, tool):
         """States along the path at 1.5 m/s, each a tick after the one before."""
@@ -84,7 +91,7 @@ class Chain:
         velocities = np.gradient(motion, PERIOD, axis=0)
         return [plant_state(q, v) for q, v in zip(motion, velocities, strict=True)]
 
-    def _build(self):
+    def _build(self, observed):
         r, m = self.law.linearization.relative_degree, self.law.linearization.num_outputs
         builder = DiagramBuilder()
         rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
@@ -101,6 +108,19 @@ class Chain:
         builder.Connect(projector.get_output_port(), controller.GetInputPort("manifold_point"))
         builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))
         builder.ExportOutput(controller.GetOutputPort("drive_torque"), "drive")
+        self.observers = []
+        if observed:
+            friction = MomentumObserver(drive_momentum(self.robot), 300.0, PERIOD)
+            forces = MomentumObserver(link_momentum(self.robot), 100.0, PERIOD, r - 2)
+            for observer, port in ((friction, "friction_torque"), (forces, "tau_ext")):
+                system = builder.AddSystem(DisturbanceObserver(observer, PERIOD))
+                for name, source in (
+                    ("joint_state", measured.get_output_port()),
+                    ("drive_torque", controller.GetOutputPort("drive_torque")),
+                ):
+                    builder.Connect(source, system.GetInputPort(name))
+                builder.Connect(system.get_output_port(), controller.GetInputPort(port))
+                self.observers.append((system, observer))
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self.controller, self.projector = controller, projector
@@ -112,7 +132,27 @@ class Chain:
         """Do what the discrete updates of the last tick did: remember where the tool was."""
         inner = self.projector.GetMyMutableContextFromRoot(self.context)
         self.projector.set_parameter(inner, self.thetas[self._tick])
+        self.remember_torques()
         self._tick = (self._tick + 1) % COUNT
+
+    def remember_torques(self):
+        """Do what the observers' discrete updates of the last tick did."""
+        for memory, inner in self.updated_memories():
+            inner.SetDiscreteState(0, memory)
+
+    def updated_memories(self):
+        """Return what the observers remember of this tick, with their contexts."""
+        updated = []
+        for system, observer in self.observers:
+            inner = system.GetMyMutableContextFromRoot(self.context)
+            memory = inner.get_discrete_state_vector().CopyToVector()
+            observer.remember(
+                memory,
+                system.GetInputPort("joint_state").Eval(inner),
+                system.GetInputPort("drive_torque").Eval(inner),
+            )
+            updated.append((memory, inner))
+        return updated
 
     def tick(self):
         """Take a measurement and return the drive torques."""
@@ -156,6 +196,14 @@ def test_whole_tick(chain, benchmark):
     assert np.all(np.isfinite(drive))
     # every measurement is another one, nothing comes from the cache
     assert not np.array_equal(drive, before)
+
+
+def test_updates_of_the_observers(chain, benchmark):
+    """What comes on top of a tick, once the drives have their torques."""
+    chain.tick()
+    benchmark(chain.updated_memories)
+    inner = chain.controller.GetMyContextFromRoot(chain.context)
+    assert chain.controller.fault(inner) == Fault.NONE
 
 
 def test_projection_and_manifold_point(chain, benchmark):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
+from pfsc_drake.physics.friction import BristleFriction, FrictionDrift, bristles_for_step
 
 LAW = BristleFriction([4.0], [0.5], [2e-5], [2e-3])
 deflections = st.floats(-1.0, 1.0)
@@ -111,3 +111,23 @@ def test_wrong_step(change, named):
     good = {"coulomb": [1.0], "viscous": [1.0], "inertia": [1.0], "step": 1e-3}
     with pytest.raises(InputError, match=named):
         bristles_for_step(**{**good, **change})
+
+
+def test_drift_goes_evenly_from_one_to_the_factor():
+    drift = FrictionDrift(1.3, 2.0, 6.0)
+    scale = drift.scale(np.array([0.0, 2.0, 3.0, 6.0, 9.0]))
+    np.testing.assert_allclose(scale, [1.0, 1.0, 1.075, 1.3, 1.3], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ((0.0, 0.0, 1.0), "factor = 0"),
+        ((np.nan, 0.0, 1.0), "factor = nan"),
+        ((1.3, 2.0, 2.0), "begin = 2.0 s, end = 2.0 s"),
+        ((1.3, -1.0, 2.0), "begin = -1.0 s"),
+    ],
+)
+def test_wrong_drifts_are_refused(arguments, part):
+    with pytest.raises(InputError, match=part):
+        FrictionDrift(*arguments)

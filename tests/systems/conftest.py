@@ -58,7 +58,7 @@ def path():
 def make_law(arm):
     """Return the rigid law of the arm with poles at -20."""
 
-    def make(integral=0.0, law="rigid", limit=2000.0):
+    def make(integral=0.0, law="rigid", limit=2000.0, **changes):
         options = ActuationOptions(1e-3)
         linearization = linearize(
             arm.chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=False), options
@@ -74,6 +74,7 @@ def make_law(arm):
             limits=np.full(3, limit),
             max_alpha=0.8,
             safe_state=SafeState(np.full(3, 30.0)),
+            **changes,
         )
 
     return make

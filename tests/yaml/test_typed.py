@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pfsc_drake import InputError
 from pfsc_drake.yaml.reading import parse_yaml
-from pfsc_drake.yaml.typed import ONE_OR_MANY, REQUIRED, load_file, load_typed
+from pfsc_drake.yaml.typed import AUTO_OR_MANY, ONE_OR_MANY, REQUIRED, load_file, load_typed
 
 
 @dataclass
@@ -354,3 +354,29 @@ def test_one_value_that_is_none_and_lists_that_must_be_lists():
         load_typed(Holder, {"several": {"values": "abc"}}, "here")
     with pytest.raises(InputError, match=r"here: .*'plain' is 3"):
         load_typed(Holder, {"plain": 3}, "here")
+
+
+@dataclass
+class Chosen:
+    """A list that may be left to somebody else."""
+
+    poles: list[float] = field(default_factory=list, metadata=AUTO_OR_MANY)
+
+
+@dataclass
+class ByName:
+    """Dataclasses by name."""
+
+    gains: dict[str, Chosen] = field(default_factory=dict)
+
+
+@pytest.mark.parametrize(("written", "values"), [("auto", []), ([-1, -2], [-1.0, -2.0])])
+def test_a_word_for_a_list_that_is_empty(written, values):
+    assert load_typed(Chosen, {"poles": written}, "a.yaml").poles == values
+    nested = load_typed(ByName, {"gains": {"rigid": {"poles": written}}}, "a.yaml")
+    assert nested.gains["rigid"].poles == values
+
+
+def test_no_other_word_stands_for_a_list():
+    with pytest.raises(InputError, match="poles"):
+        load_typed(Chosen, {"poles": "automatic"}, "a.yaml")

@@ -32,14 +32,20 @@ class LawLayout:
         status: Fault (:class:`Fault`), reciprocal condition number of the decoupling
             matrix, number of drives at their limit; shape (3,).
         held: The part of the drive input that is extrapolated over the hold, shape (N,).
+        reference_velocity: Joint velocities that the reference asks for [rad/s or m/s], shape
+            (N,), or (0,) of a law that does not tell them.
         size: Length of the whole array.
     """
 
-    def __init__(self, num_joints: int, num_outputs: int, relative_degree: int) -> None:
+    def __init__(
+        self, num_joints: int, num_outputs: int, relative_degree: int, num_velocities: int = 0
+    ) -> None:
         sizes = [num_joints, relative_degree * num_outputs, num_outputs, 3, num_joints]
+        sizes.append(num_velocities)
         ends = np.cumsum(sizes).tolist()
         fields = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-        self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields
+        self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields[:5]
+        self.reference_velocity = fields[5]
         self.size: int = ends[-1]
 
 
@@ -63,6 +69,8 @@ class FollowingLaw:
         limits: Magnitude limits of the drive input, shape (N,).
         max_alpha: Where the feasible neighbourhood (3.9) ends for the controller, below 1.
         safe_state: What the drives do after a fault.
+        tells_reference_velocity: Whether the results tell the joint velocities that the
+            reference asks for, ``q' - A^-1 (yhat' - yhat_p')``; for r > 1.
 
     Attributes:
         layout: Layout of the results.
@@ -82,6 +90,8 @@ class FollowingLaw:
         limits: np.ndarray,
         max_alpha: float,
         safe_state: SafeState,
+        *,
+        tells_reference_velocity: bool = False,
     ) -> None:
         n = linearization.num_joints
         if np.shape(limits) != (n,) or not np.all(np.asarray(limits) > 0.0):
@@ -106,7 +116,13 @@ class FollowingLaw:
         self.limits = np.asarray(limits, dtype=float)
         self._inverse = inverse
         self._max_alpha = max_alpha
-        self.layout = LawLayout(n, linearization.num_outputs, linearization.relative_degree)
+        self._tells_velocity = tells_reference_velocity
+        self.layout = LawLayout(
+            n,
+            linearization.num_outputs,
+            linearization.relative_degree,
+            n if tells_reference_velocity else 0,
+        )
         self.function = _law_function(linearization, stabilization)
         self._completion = _completion_function(linearization, self.limits)
         self._fault_index = self.layout.status.start
@@ -124,6 +140,7 @@ class FollowingLaw:
         self._state, self._point = arrays["state"], arrays["manifold_point"]
         self._reference, self._integral = arrays["reference"], arrays["integral"]
         self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
+        self._friction = arrays["friction"]
         self._lead, self._rhs = arrays["lead"], arrays["rhs"]
         # CasADi stores by columns
         self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
@@ -139,6 +156,7 @@ class FollowingLaw:
         integral: np.ndarray,
         last_held: np.ndarray | None = None,
         tau_ext: np.ndarray | None = None,
+        friction: np.ndarray | None = None,
         last_output: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the drive input of one tick and all that belongs to it.
@@ -152,6 +170,8 @@ class FollowingLaw:
             last_held: ``held`` of the last tick, shape (N,); if omitted nothing is
                 extrapolated.
             tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
+            friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,);
+                zero if omitted.
             last_output: Virtual output of the last tick, shape (m,), from which angles go on;
                 if omitted they lie within half a turn of zero.
 
@@ -164,6 +184,7 @@ class FollowingLaw:
         self._integral[:] = integral
         self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
         self._last_output[:] = 0.0 if last_output is None else last_output
+        self._friction[:] = 0.0 if friction is None else friction
         self._linearize()
         solution = self._inverse.solve(self._A, self._rhs)
         self._solution[:] = solution.x
@@ -176,7 +197,15 @@ class FollowingLaw:
         self._complete()
         result = self._result.copy()
         result[self._fault_index] = self._judge(solution)
-        return result
+        return np.append(result, self._reference_velocity()) if self._tells_velocity else result
+
+    def _reference_velocity(self) -> np.ndarray:
+        """Return the joint velocities that the reference asks for, shape (N,)."""
+        m, velocity = self.linearization.num_outputs, self.linearization.velocity
+        error = self._result[self.layout.manifold_state][m : 2 * m]
+        if not self.linearization.manifold.follows_time:
+            error = error - self._reference[m : 2 * m]
+        return self._state[velocity] - self._inverse.solve(self._A, error).x
 
     def _judge(self, solution: DecouplingSolution) -> Fault:
         """Return what forbids the use of a result, the root cause first."""
@@ -190,7 +219,7 @@ class FollowingLaw:
             and self._angle[0] < _LARGEST_ANGLE
         ):
             return _NO_FAULT
-        inputs = (self._state, self._reference, self._integral, self._tau_ext)
+        inputs = (self._state, self._reference, self._integral, self._tau_ext, self._friction)
         if not all(np.isfinite(values).all() for values in inputs):
             return Fault.INPUT_NOT_FINITE
         if status == _NOT_CONVERGED:
@@ -255,11 +284,11 @@ def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca
     n, m = linearization.num_joints, linearization.num_outputs
     r = linearization.relative_degree
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    solution, drift, offset, last_held = (ca.SX.sym(name, n) for name in "xdol")
+    solution, drift, offset, last_held, friction = (ca.SX.sym(name, n) for name in "xdolf")
     gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
     v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
     held = gain @ solution + drift
-    wanted = held + lead * (held - last_held) + offset
+    wanted = held + lead * (held - last_held) + offset + friction
     drive = ca.fmin(ca.fmax(wanted, -limits), limits)
     saturated = ca.sum1(ca.fabs(wanted) > limits)
     # the fault is judged outside
@@ -270,6 +299,7 @@ def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca
         "gain": gain,
         "drift": drift,
         "offset": offset,
+        "friction": friction,
         "last_held": last_held,
         "lead": lead,
         "Y": Y,

@@ -57,6 +57,8 @@ class Linearization:
         num_joints: ``N``.
         lead: By how many sampling intervals ``gain q^(r) + drift`` is to be extrapolated:
             to the middle of the interval (``elastic``) or to its end (``visco_elastic``).
+        velocity: Which part of the state is ``q'`` of the motion that is linear: ``v_J``, or
+            ``v_M`` where the law acts on motors.
     """
 
     function: ca.Function
@@ -64,6 +66,7 @@ class Linearization:
     manifold: Manifold
     num_joints: int
     lead: float
+    velocity: slice
 
     @property
     def num_outputs(self) -> int:
@@ -134,7 +137,9 @@ def linearize(
         ["Y", "A", "b", "gain", "drift", "offset"],
     )
     ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
-    return Linearization(function, r, manifold, n, ahead)
+    on_motors = law == "rigid" and not robot.is_rigid
+    velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
+    return Linearization(function, r, manifold, n, ahead, velocity)
 
 
 def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Function:

@@ -37,18 +37,29 @@ class CoordinateGains:
         return np.roots(self.polynomial)
 
 
-def gains_from_poles(poles: Sequence[float | complex]) -> CoordinateGains:
-    """Return the gains that place r poles, without integral part.
+def gains_from_poles(
+    poles: Sequence[float | complex], integral_pole: float = 0.0
+) -> CoordinateGains:
+    """Return the gains that place r poles, and one more where there is an integral part.
+
+    Args:
+        poles: Without the integral part's [1/s].
+        integral_pole: Of the integral part, which takes constant errors away at this rate
+            [1/s]; 0 for none.
 
     Raises:
         InputError: If there are no poles, or complex ones do not come in conjugate pairs.
     """
     if len(poles) == 0:
         raise InputError("poles: none given; a law of relative degree r needs r")
-    polynomial = np.poly(np.array(poles, dtype=complex))
+    every = [*poles, integral_pole] if integral_pole else list(poles)
+    polynomial = np.poly(np.array(every, dtype=complex))
     if np.max(np.abs(polynomial.imag)) > 1e-9 * np.max(np.abs(polynomial)):
         raise InputError(f"poles {list(poles)}: complex poles must come in conjugate pairs")
-    return CoordinateGains(tuple(float(a) for a in polynomial.real[:0:-1]))
+    coefficients = [float(a) for a in polynomial.real[:0:-1]]
+    if integral_pole:
+        return CoordinateGains(tuple(coefficients[1:]), coefficients[0])
+    return CoordinateGains(tuple(coefficients))
 
 
 def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None:

@@ -42,6 +42,8 @@ class FollowingController(LeafSystem):
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
             Only for r > 1.
+        friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
+            [Nm or N], shape (N,); zero if not connected, and in the safe state. Only for r > 1.
         alarms (input, optional): What the robot is to stop for, shape (3,): a
             :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
             tared, before which its range does not matter, and an
@@ -53,6 +55,9 @@ class FollowingController(LeafSystem):
         virtual_input (output): ``v``, shape (m,).
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
         fault (output): A :class:`Fault`, shape (1,).
+        reference_velocity (output): Joint velocities that the reference asked for at the last
+            tick, shape (N,) [rad/s or m/s], zero before; only of a law that tells them. It
+            depends on the state alone: what is told the law may depend on it.
         law (output): All of these, laid out by the law's ``layout``; computed once per
             tick, the others are parts of it.
         supervision (output): What :meth:`Supervision.evaluate` returns; only with supervision.
@@ -62,7 +67,8 @@ class FollowingController(LeafSystem):
         the next is known, shape (1,); part of the drive input that is extrapolated over
         the hold, shape (N,); ``joint_state`` of the last tick, shape (4N,); virtual output of
         the last tick, shape (m,); memory of the safe stop, and of the supervision; for how many
-        ticks each drive has been at its limit, shape (N,).
+        ticks each drive has been at its limit, shape (N,); the reference velocity, if the law
+        tells it.
 
     Args:
         law: The law.
@@ -90,10 +96,12 @@ class FollowingController(LeafSystem):
             effort = law.limits if r > 1 else law.robot.gather("effort_limit")
             self._supervision = Supervision(law.robot, effort, supervision, period)
         watched = self._supervision.size if self._supervision else 0
-        widths = np.cumsum([m + 2, n, 4 * n, m, self._safe_stop.size, watched, n]).tolist()
+        told = self.layout.reference_velocity
+        sizes = [n, 4 * n, m, self._safe_stop.size, watched, n, told.stop - told.start]
+        widths = np.cumsum([m + 2, *sizes]).tolist()
         parts = [slice(*ends) for ends in itertools.pairwise(widths)]
         self._held, self._last, self._output_before, self._stop, *parts = parts
-        self._watch, self._saturated = parts
+        self._watch, self._saturated, self._velocity = parts
         memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._manifold_point: InputPort = self.DeclareVectorInputPort(
@@ -101,6 +109,7 @@ class FollowingController(LeafSystem):
         )
         self._reference: InputPort = self.DeclareVectorInputPort("reference", (r + 1) * m)
         self._tau_ext: InputPort | None = None
+        self._friction: InputPort | None = None
         sources = {
             self._joint_state.ticket(),
             self._manifold_point.ticket(),
@@ -111,7 +120,8 @@ class FollowingController(LeafSystem):
         sources.add(self._alarms.ticket())
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
-            sources.add(self._tau_ext.ticket())
+            self._friction = self.DeclareVectorInputPort("friction_torque", n)
+            sources |= {self._tau_ext.ticket(), self._friction.ticket()}
         if self._supervision is not None:
             self._watched: OutputPort = self.DeclareVectorOutputPort(
                 "supervision",
@@ -131,6 +141,13 @@ class FollowingController(LeafSystem):
             self._declare_part(name, getattr(self.layout, name), sources)
         status = self.layout.status.start
         self._declare_part("fault", slice(status, status + 1), sources)
+        if told.stop > told.start:
+            self.DeclareVectorOutputPort(
+                "reference_velocity",
+                n,
+                self._calc_reference_velocity,
+                prerequisites_of_calc={self.discrete_state_ticket(memory)},
+            )
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
@@ -168,17 +185,15 @@ class FollowingController(LeafSystem):
 
     def _calc_law(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
-        state, tau_ext = self._joint_state.Eval(context), None
-        if self._tau_ext is not None and self._tau_ext.HasValue(context):
-            tau_ext = self._tau_ext.Eval(context)
-        known = memory[self._known]
+        state = self._joint_state.Eval(context)
         result = self._law.evaluate(
             state,
             self._manifold_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
-            memory[self._held] if known else None,
-            tau_ext,
+            memory[self._held] if memory[self._known] else None,
+            _value(self._tau_ext, context),
+            _value(self._friction, context),
             memory[self._output_before],
         )
         status = self.layout.status.start
@@ -236,6 +251,9 @@ class FollowingController(LeafSystem):
         last, state = memory[self._last], self._joint_state.Eval(context)
         return self._safe_stop.start(last, state, self._suspects(context))
 
+    def _calc_reference_velocity(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().value()[self._velocity])
+
     def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
         memory = state.get_mutable_value()
         memory[:] = 0.0
@@ -259,6 +277,7 @@ class FollowingController(LeafSystem):
         memory[self._known] = 1.0
         memory[self._held] = result[self.layout.held]
         memory[self._output_before] = result[self._first_output]
+        memory[self._velocity] = result[self.layout.reference_velocity]
         saturated = result[self.layout.status.stop - 1]
         if saturated or before[self._saturated].any():
             at_limit = np.abs(result[self.layout.drive]) >= self._law.limits
@@ -266,3 +285,10 @@ class FollowingController(LeafSystem):
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error
+
+
+def _value(port: InputPort | None, context: Context) -> np.ndarray | None:
+    """Return the value of an optional port, or None if there is none."""
+    if port is None or not port.HasValue(context):
+        return None
+    return port.Eval(context)

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from pfsc_drake.physics.friction import BristleFriction
+from pfsc_drake.physics.friction import BristleFriction, FrictionDrift
 
 
 class JointFriction(LeafSystem):
@@ -33,21 +33,33 @@ class JointFriction(LeafSystem):
 
     Args:
         friction: The law with its parameters, N joints.
+        drift: How all of ``tau_f`` changes with time, if it does.
     """
 
-    def __init__(self, friction: BristleFriction) -> None:
+    def __init__(self, friction: BristleFriction, drift: FrictionDrift | None = None) -> None:
         super().__init__()
-        self._friction = friction
+        self._friction, self._drift = friction, drift
         n = friction.dimension
         self.DeclareContinuousState(n)
         self._velocity = self.DeclareVectorInputPort("velocity", n)
         sources = {self._velocity.ticket(), self.xc_ticket()}
+        if drift is not None:
+            sources.add(self.time_ticket())
         self._torque = self.DeclareVectorOutputPort(
             "friction_torque", n, self._calc_torque, prerequisites_of_calc=sources
         )
         self.DeclareVectorOutputPort(
             "resistance", n, self._calc_resistance, prerequisites_of_calc=sources
         )
+
+    def coefficients(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return f_c [Nm or N] and f_v [Nm s/rad or N s/m] over time, each (samples, N).
+
+        Args:
+            times: Shape (samples,) [s].
+        """
+        scale = np.ones(len(times)) if self._drift is None else self._drift.scale(times)
+        return np.outer(scale, self._friction.coulomb), np.outer(scale, self._friction.viscous)
 
     def set_load(self, context: Context, torque: np.ndarray) -> None:
         """Let friction carry a load from the start, as in a joint that has been stuck.
@@ -60,7 +72,10 @@ class JointFriction(LeafSystem):
 
     def _calc_torque(self, context: Context, output: BasicVector) -> None:
         s = context.get_continuous_state_vector().CopyToVector()
-        output.SetFromVector(self._friction.torque(s, self._velocity.Eval(context)))
+        torque = self._friction.torque(s, self._velocity.Eval(context))
+        if self._drift is not None:
+            torque = self._drift.scale(context.get_time()) * torque
+        output.SetFromVector(torque)
 
     def _calc_resistance(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(-self._torque.Eval(context))

@@ -107,3 +107,11 @@ def test_virtual_input_is_the_printed_law():
     )
     assert stabilization.has_integral_part
     assert not Stabilization(gains[1:], 2, ["xi_1"]).has_integral_part
+
+
+def test_an_integral_part_has_a_pole_of_its_own():
+    gains = gains_from_poles([-60, -60, -250, -350], integral_pole=-15.0)
+    check_gains(gains, 4, "here")
+    assert len(gains.proportional) == 4
+    np.testing.assert_allclose(np.sort(gains.poles.real), [-350, -250, -60, -60, -15], rtol=1e-5)
+    assert gains_from_poles([-60, -250]).integral == 0.0

@@ -6,6 +6,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
+from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.yaml.typed import load_file
@@ -109,3 +110,68 @@ def test_a_hand_that_the_elastic_law_does_not_know_of(scenario):
     scenario.hand = HandParameters()
     (warning,) = build_station(scenario, SCENARIOS).warnings
     assert "external_torque" in warning
+
+
+def with_gains(scenario, **kinds):
+    elastic = LawGains(**{kind: GainParameters(**given) for kind, given in kinds.items()})
+    scenario.controller.gains["elastic"] = elastic
+    return scenario
+
+
+def test_gains_that_do_not_bear_an_error_of_the_model():
+    """Four equal poles on six axes: unstable with masses 5 % off, by simulation as well."""
+    scenario = load_file(Scenario, SCENARIOS / "pfc_elastic_6r.yaml")
+    assert warnings(scenario) == []
+    equal = {"poles": [-55.0] * 4}
+    (warning,) = warnings(with_gains(scenario, eta=equal, xi=equal, phi=equal))
+    assert "do not bear 5 %" in warning
+    assert "joint stiffnesses believed 5 % too high" in warning
+    assert "about 1.9 % is borne" in warning
+    assert "poles: auto" in warning
+
+
+def test_gains_too_fast_for_the_sampling(scenario):
+    fast = {"poles": [-700.0] * 4}
+    (warning,) = warnings(with_gains(scenario, eta=fast, xi=fast))
+    assert "unstable at the start even on a perfect model" in warning
+
+
+def test_chosen_poles_bear_what_they_shall_and_are_written_down():
+    scenario = load_file(Scenario, SCENARIOS / "pfc_elastic_6r.yaml")
+    slow, quick = {"bandwidth": 40.0}, {"bandwidth": 60.0, "bears": 0.08}
+    given = with_gains(scenario, eta=slow, xi=quick, phi={"poles": [-50.0, -50.0, -200.0, -300.0]})
+    assert warnings(given) == []
+    gains = given.controller.gains["elastic"]
+    assert gains.eta.poles[:2] == [-40.0, -40.0]
+    assert gains.xi.poles[:2] == [-60.0, -60.0]
+    assert gains.eta.poles[2:] == gains.xi.poles[2:]
+    assert -400.0 < gains.xi.poles[2] < -200.0
+    assert gains.phi.poles == [-50.0, -50.0, -200.0, -300.0]
+    assert given.controller.gains["elastic"].xi.bandwidth == 60.0
+
+
+def test_chosen_poles_of_laws_without_fast_ones(scenario):
+    scenario.controller.law = "rigid"
+    gains = GainParameters(bandwidth=30.0)
+    scenario.controller.gains["rigid"] = LawGains(gains, gains)
+    build_station(scenario, SCENARIOS)
+    assert gains.poles == [-30.0, -30.0]
+
+
+def test_poles_are_not_chosen_without_a_bandwidth(scenario):
+    with pytest.raises(InputError, match=r"gains.elastic.eta: .* poles: auto with a bandwidth"):
+        build_station(with_gains(scenario, eta={}, xi={}), SCENARIOS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "key"),
+    [
+        ({"bandwidth": -1.0}, "bandwidth"),
+        ({"bandwidth": float("nan")}, "bandwidth"),
+        ({"bears": 0.7}, "bears"),
+        ({"bandwidth": 5.0, "coefficients": [1.0, 2.0]}, "bandwidth"),
+    ],
+)
+def test_refused_ways_to_choose_poles(wrong, key):
+    with pytest.raises(InputError, match=key):
+        GainParameters(**wrong)

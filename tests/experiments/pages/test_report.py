@@ -153,3 +153,16 @@ def test_works_without_metrics_and_figures(run):
     page, _ = read(report_page(**run))
     assert "All metrics" not in page.text
     assert "Scenario as resolved" in page.text
+
+
+def test_commands_and_cards_of_many_runs(run):
+    command = "python -m experiments run a --set 'b=<1>'"
+    page = Page(
+        report_page(**run, kind="Sweep", commands={"Worst <run>": command}, cards=["peak_torque_1"])
+    )
+    assert "Sweep" in page.text
+    assert "Simulation run" not in page.text
+    assert "Runs to look at" in page.text
+    assert command in page.text
+    assert "Worst <run>" in page.text
+    assert [attributes.get("class") for tag, attributes in page.tags].count("card") == 1

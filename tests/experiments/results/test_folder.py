@@ -280,3 +280,46 @@ def test_files_that_grow_too_large_are_whole_or_not_there(out, temporary):
     assert content(temporary) == {}
     reason = os.strerror(errno.EFBIG)
     assert results.explain_problems() == f"cannot write log.h5 into {out}: {reason}; lost: log.h5"
+
+
+def test_a_folder_is_gone_on_with(out):
+    before = content(out)
+    with open_results(out, "run", resume=True) as results:
+        assert content(out) == before
+        results.write("log.h5", b"second")
+        results.write("figures/path.png", b"second")
+        assert results.explain_problems() is None
+    assert content(out) | {MANIFEST: b""} == before | {
+        "log.h5": b"second",
+        "figures/path.png": b"second",
+        MANIFEST: b"",
+    }
+    check_folder(out, "run")
+    assert_refused(out, "it holds the results of a run", kind="sweep")
+
+
+def test_a_file_that_grows_is_there_at_every_moment(tmp_path):
+    out = tmp_path / "out"
+    for session in range(2):
+        with open_results(out, "sweep", resume=True) as results:
+            for part in range(3):
+                results.write("sweep.json", f"{session} {part}", growing=True)
+                assert (out / "sweep.json").read_text() == f"{session} {part}"
+                # as if the process ended in the middle of the next one
+                (out / ".unfinished").write_text("half of i")
+                check_folder(out, "sweep")
+    with open_results(out, "sweep", resume=True) as results:
+        results.write("sweep.json", "whole")
+        assert results.explain_problems() is None
+    check_folder(out, "sweep")
+    (out / "sweep.json").write_text("edited")
+    assert_refused(out, "its sweep.json was changed after the sweep that wrote it", kind="sweep")
+
+
+def test_a_link_is_no_file_that_grows(tmp_path):
+    out = tmp_path / "out"
+    with open_results(out, "sweep", resume=True) as results:
+        results.write("sweep.json", "part", growing=True)
+    (out / "sweep.json").rename(tmp_path / "moved.json")
+    (out / "sweep.json").symlink_to(tmp_path / "moved.json")
+    assert_refused(out, "its sweep.json was changed", kind="sweep")

@@ -186,7 +186,7 @@ def test_elastic_law_obeys_the_linear_dynamics(three_axes):
 
 
 def test_six_axes_obey_the_linear_dynamics(six_axes):
-    coefficients = np.poly([-55.0] * 4)[:0:-1]
+    coefficients = np.poly([-60.0, -60.0, -250.0, -350.0])[:0:-1]
     for signal, columns, start in (("xi", [0], 0.01), ("phi", [0, 1, 2], math.radians(1.0))):
         expected = predicted(coefficients, start, six_axes.t)
         for column in columns:

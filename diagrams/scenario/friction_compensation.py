@@ -1,0 +1,115 @@
+"""What the controller does about friction."""
+
+import dataclasses as dc
+
+import numpy as np
+
+from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.drives import JointFrictionParameters
+
+_SOURCES = ("none", "model", "observer")
+_OBSERVERS = ("disturbance", "kalman")
+_VELOCITIES = ("measured", "reference")
+
+
+@dc.dataclass
+class KalmanParameters:
+    """The friction Kalman filter, see :class:`FrictionKalmanFilter`.
+
+    Numbers of the same kind are one for all joints or one per joint.
+
+    Attributes:
+        intervals: ``mean``: what happens in a sampling interval enters by its mean; ``begin``:
+            by its value at the beginning, as printed in (A.5).
+        start: First estimates of f_c and f_v, as a fraction of what is believed.
+        momentum_noise: Variance that the momentum gains per sample [(Nm s)^2].
+        coulomb_noise: Variance that f_c gains per sample [Nm^2]; empty for the square of a
+            thousandth of what is believed.
+        viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2]; likewise.
+        measurement_noise: Variance of a measured momentum [(Nm s)^2].
+        initial_variance: Of all states at the start.
+        resting_velocity: Magnitude below which a drive counts as stuck and teaches nothing
+            [rad/s or m/s]; ``intervals: mean`` only.
+    """
+
+    intervals: str = "mean"
+    start: float = 1.0
+    momentum_noise: list[float] = dc.field(default_factory=lambda: [1e-6])
+    coulomb_noise: list[float] = dc.field(default_factory=list)
+    viscous_noise: list[float] = dc.field(default_factory=list)
+    measurement_noise: list[float] = dc.field(default_factory=lambda: [1e-3])
+    initial_variance: float = 1e3
+    resting_velocity: float = 0.01
+
+    def __post_init__(self) -> None:
+        known = self.intervals in ("mean", "begin")
+        require(known, "intervals", self.intervals, "mean, begin")
+        for key in ("start", "initial_variance", "resting_velocity"):
+            require_not_negative(key, getattr(self, key))
+        for key in ("momentum_noise", "coulomb_noise", "viscous_noise"):
+            good = all(0.0 <= x < np.inf for x in getattr(self, key))
+            require(good, key, getattr(self, key), "finite numbers, none negative")
+        require(bool(self.momentum_noise), "momentum_noise", [], "one number or one per joint")
+        noise = self.measurement_noise
+        good = bool(noise) and all(0.0 < x < np.inf for x in noise)
+        require(good, "measurement_noise", noise, "positive numbers")
+
+
+@dc.dataclass
+class FrictionCompensationParameters:
+    """Friction that the drive torques overcome, (2.42), (3.29), (3.58), (3.65).
+
+    What is believed of it is what the plant has, unless ``believed`` says otherwise. Nothing of
+    it is used with the law ``velocity_servo``.
+
+    Attributes:
+        source: ``none``; ``model``: Coulomb and viscous friction as believed; ``observer``: what
+            an observer makes of how the joints move.
+        velocity: On which friction with known coefficients acts: ``measured``, or the
+            ``reference`` velocity of the joints, which has no noise but is a tick old.
+        smoothing: Velocity around zero over which Coulomb friction changes its sign [rad/s or
+            m/s].
+        observer: ``disturbance``: of first order, the torque without a model of friction;
+            ``kalman``: of the coefficients.
+        rate: L of the disturbance observer [1/s].
+        kalman: The friction Kalman filter.
+        watched: Whether the observer runs beside ``none`` or ``model``, only to be logged.
+        believed: Coefficients that are believed.
+    """
+
+    source: str = "none"
+    velocity: str = "measured"
+    smoothing: float = 0.02
+    observer: str = "disturbance"
+    rate: float = 300.0
+    kalman: KalmanParameters = dc.field(default_factory=KalmanParameters)
+    watched: bool = False
+    believed: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
+
+    def __post_init__(self) -> None:
+        require(self.source in _SOURCES, "source", self.source, ", ".join(_SOURCES))
+        require(self.velocity in _VELOCITIES, "velocity", self.velocity, ", ".join(_VELOCITIES))
+        require(self.observer in _OBSERVERS, "observer", self.observer, ", ".join(_OBSERVERS))
+        require_positive("smoothing", self.smoothing)
+        require_positive("rate", self.rate)
+        told = self.velocity == "measured" or self.source == "none" or self.has_coefficients
+        allowed = "measured; the disturbance observer knows no friction that acts on a velocity"
+        require(told, "velocity", self.velocity, allowed)
+        drift = self.believed.drift
+        require(drift is None, "believed.drift", drift, "null; what is believed does not drift")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether anything is done about friction, or an observer of it is watched."""
+        return self.source != "none" or self.watched
+
+    @property
+    def has_coefficients(self) -> bool:
+        """Whether what is compensated is friction with coefficients."""
+        kalman = self.source == "observer" and self.observer == "kalman"
+        return kalman or self.source == "model"
+
+    @property
+    def needs_reference_velocity(self) -> bool:
+        """Whether the law has to tell the velocities that the reference asks for."""
+        return self.velocity == "reference" and self.has_coefficients

@@ -1,0 +1,166 @@
+"""What the law is told about friction."""
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.scenario import Scenario
+from diagrams.scenario.friction_compensation import FrictionCompensationParameters
+from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
+from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
+from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.control.friction_compensation import FrictionCompensation
+from pfsc_drake.systems.control.friction_estimator import FrictionEstimator
+
+# f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
+Coefficients = tuple[np.ndarray, np.ndarray]
+# by which part of itself a coefficient is thought to change from sample to sample
+_DRIFT = 1e-3
+
+
+def add_friction_compensation(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    scenario: Scenario,
+    controller: FollowingController,
+    believed: Coefficients | None,
+    ports: dict[str, OutputPort],
+) -> tuple[OutputPort | None, dict[str, OutputPort]]:
+    """Let the law overcome friction, if it is to.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot as it is believed.
+        scenario: The scenario.
+        controller: The controller.
+        believed: Coefficients of friction, if any are believed.
+        ports: ``joint_state`` as measured, and ``tau_ext`` if the law is told of it.
+
+    Returns:
+        The friction torque that is compensated, if any is, shape (N,); and for the log
+        ``friction_estimate``, torques of shape (N,), or from the Kalman filter of shape (3N,),
+        ``[tau_f, f_c, f_v]``, if there is any.
+
+    Raises:
+        InputError: If the compensation does not suit the robot, or lacks coefficients.
+    """
+    parameters = scenario.controller.friction
+    # servos overcome friction themselves, and do not tell their torques; law_warnings says so
+    if not parameters.is_given or controller.relative_degree == 1:
+        return None, {}
+    signals = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
+    if parameters.needs_reference_velocity:
+        signals["velocity"] = controller.GetOutputPort("reference_velocity")
+    logged, compensated = {}, None
+    if parameters.source == "model":
+        compensated = _add_model(builder, parameters, robot, believed, signals)
+        logged = {"friction_estimate": compensated}
+    if parameters.source == "observer" or parameters.watched:
+        torque, estimate = _add_observer(builder, scenario, robot, believed, signals)
+        logged = {"friction_estimate": estimate}
+        if parameters.source == "observer":
+            compensated = torque
+    if compensated is not None:
+        builder.Connect(compensated, controller.GetInputPort("friction_torque"))
+    return compensated, logged
+
+
+def _add_model(
+    builder: DiagramBuilder,
+    parameters: FrictionCompensationParameters,
+    robot: RobotModel,
+    believed: Coefficients | None,
+    ports: dict[str, OutputPort],
+) -> OutputPort:
+    """Add friction of believed coefficients, and return its torque."""
+    f_c, f_v = _required(believed, "source = model")
+    velocity = ports.get("velocity", ports["joint_state"])
+    model = builder.AddNamedSystem(
+        "friction_compensation",
+        FrictionCompensation(f_c, f_v, parameters.smoothing, velocity.size()),
+    )
+    builder.Connect(velocity, model.GetInputPort("velocity"))
+    return model.GetOutputPort("friction_torque")
+
+
+def _add_observer(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    robot: RobotModel,
+    believed: Coefficients | None,
+    ports: dict[str, OutputPort],
+) -> tuple[OutputPort, OutputPort]:
+    """Add an observer of friction, and return the torque and all that it tells."""
+    parameters, period = scenario.controller.friction, scenario.controller.sampling_time
+    momentum = drive_momentum(robot).with_delay(velocity_delay(scenario))
+    system: DisturbanceObserver | FrictionEstimator
+    torque = "estimate"
+    if parameters.observer == "kalman":
+        coefficients = _required(believed, "observer = kalman")
+        system = FrictionEstimator(_kalman(parameters, momentum, coefficients, period), period)
+        torque = "friction_torque"
+    else:
+        first_order = MomentumObserver(momentum, parameters.rate, period)
+        system = DisturbanceObserver(first_order, period)
+    observer = builder.AddNamedSystem("friction_observer", system)
+    for name in ("joint_state", "drive_torque", "velocity"):
+        if name in ports and observer.HasInputPort(name):
+            builder.Connect(ports[name], observer.GetInputPort(name))
+    if "tau_ext" in ports and momentum.known_weight.any():
+        # laws for rigid joints are told torques without derivatives
+        builder.Connect(ports["tau_ext"], observer.GetInputPort("known_torque"))
+    return observer.GetOutputPort(torque), observer.GetOutputPort("estimate")
+
+
+def velocity_delay(scenario: Scenario) -> float:
+    """Return how old measured velocities are [s]; a difference quotient is that of mid-interval."""
+    return scenario.controller.sampling_time / 2.0 if scenario.encoders.difference_quotient else 0.0
+
+
+def _required(believed: Coefficients | None, choice: str) -> Coefficients:
+    """Return coefficients, or say where they can be written."""
+    if believed is None:
+        raise InputError(
+            f"controller.friction.{choice}: nothing is believed of friction; write "
+            "controller.friction.believed: {f_c: [..], f_v: [..]} or {file: ..}"
+        )
+    return believed
+
+
+def _kalman(
+    parameters: FrictionCompensationParameters,
+    momentum: MomentumModel,
+    believed: Coefficients,
+    period: float,
+) -> FrictionKalmanFilter:
+    kalman, n = parameters.kalman, momentum.dimension
+
+    def values(key: str, believed: np.ndarray | None = None) -> np.ndarray:
+        given = getattr(kalman, key)
+        if believed is not None and not given:
+            return (_DRIFT * believed) ** 2
+        if len(given) not in (1, n):
+            raise InputError(
+                f"controller.friction.kalman.{key}: {len(given)} values; allowed: 1 or {n}, the "
+                "robot's joints"
+            )
+        return np.broadcast_to(np.array(given, dtype=float), n)
+
+    return FrictionKalmanFilter(
+        momentum,
+        kalman.start * np.array(believed),
+        FrictionNoise(
+            values("momentum_noise"),
+            values("coulomb_noise", believed[0]),
+            values("viscous_noise", believed[1]),
+            values("measurement_noise"),
+            kalman.initial_variance,
+        ),
+        period,
+        intervals=kalman.intervals,
+        resting_velocity=kalman.resting_velocity,
+        smoothing=parameters.smoothing,
+    )

@@ -1,0 +1,118 @@
+"""Forces on the tool without a sensor, from how the links move."""
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer
+
+from diagrams.scenario import Scenario
+from diagrams.tasks.friction import velocity_delay
+from pfsc_drake.control.estimation.generalized_momentum import link_momentum
+from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.control.tool_wrench import ToolWrench
+
+
+def add_observed_forces(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    scenario: Scenario,
+    controller: FollowingController,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Observe external torques, for the law and for compliance, whichever is to know them.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot as it is believed.
+        scenario: The scenario.
+        controller: The controller.
+        ports: ``joint_state`` as measured, and ``friction`` if friction is compensated.
+
+    Returns:
+        ``tau_ext_observed`` of shape (N,), with compliance without a sensor also
+        ``wrench_observed`` and ``ready``; empty if nothing is observed.
+
+    Raises:
+        InputError: If the law, the robot or what is done about friction does not allow it.
+    """
+    told = scenario.controller.external_torque
+    yields = scenario.compliance.is_given and scenario.compliance.source == "observed"
+    if told.source != "observed" and not yields:
+        return {}
+    key = "compliance.source" if told.source != "observed" else "controller.external_torque.source"
+    _check(scenario, robot, controller, key)
+    inputs = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
+    made: dict[str, OutputPort] = {}
+    if told.source == "observed":
+        order = controller.relative_degree - 2
+        torque = _add_observer(
+            builder, "external_torque_observer", robot, scenario, inputs, told.bandwidth, order
+        )
+        builder.Connect(torque, controller.GetInputPort("tau_ext"))
+        made["tau_ext_observed"] = _first(builder, torque, robot.dimension)
+    if yields:
+        parameters = scenario.compliance.observed
+        torque = _add_observer(
+            builder, "tool_force_observer", robot, scenario, inputs, parameters.rate, 0
+        )
+        bands = (parameters.force_dead_band, parameters.torque_dead_band)
+        wrench = builder.AddNamedSystem("tool_wrench", ToolWrench(robot, parameters.damping, bands))
+        builder.Connect(torque, wrench.GetInputPort("tau_ext"))
+        builder.Connect(ports["joint_state"], wrench.GetInputPort("joint_state"))
+        ready = builder.AddNamedSystem("no_taring", ConstantVectorSource(np.ones(1)))
+        made |= {"wrench_observed": wrench.GetOutputPort("wrench")}
+        made |= {"ready": ready.get_output_port()}
+        made.setdefault("tau_ext_observed", torque)
+    return made
+
+
+def _check(
+    scenario: Scenario, robot: RobotModel, controller: FollowingController, key: str
+) -> None:
+    if controller.relative_degree == 1:
+        raise InputError(
+            f"{key} = observed with the law '{scenario.controller.law}'; its servos do not tell "
+            "the torques that an observer needs"
+        )
+    friction = scenario.controller.friction
+    if friction.source == "observer" and not robot.is_elastic:
+        raise InputError(
+            f"{key} = observed with controller.friction.source = observer: in rigid joints forces "
+            "and friction cannot be told apart; allowed: controller.friction.source model or none"
+        )
+
+
+def _add_observer(
+    builder: DiagramBuilder,
+    name: str,
+    robot: RobotModel,
+    scenario: Scenario,
+    ports: dict[str, OutputPort],
+    rate: float,
+    num_derivatives: int,
+) -> OutputPort:
+    """Add an observer of external torques, and return them with their derivatives by rows."""
+    period = scenario.controller.sampling_time
+    model = link_momentum(robot).with_delay(velocity_delay(scenario))
+    observer = builder.AddNamedSystem(
+        name, DisturbanceObserver(MomentumObserver(model, rate, period, num_derivatives), period)
+    )
+    builder.Connect(ports["joint_state"], observer.GetInputPort("joint_state"))
+    builder.Connect(ports["drive_torque"], observer.GetInputPort("drive_torque"))
+    if "friction" in ports and model.known_weight.any():
+        builder.Connect(ports["friction"], observer.GetInputPort("known_torque"))
+    return observer.GetOutputPort("estimate")
+
+
+def _first(builder: DiagramBuilder, torque: OutputPort, size: int) -> OutputPort:
+    """Return the torques without their derivatives."""
+    if torque.size() == size:
+        return torque
+    split = builder.AddNamedSystem(
+        "external_torque_rows", Demultiplexer([size, torque.size() - size])
+    )
+    builder.Connect(torque, split.get_input_port())
+    return split.get_output_port(0)

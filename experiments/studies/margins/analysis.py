@@ -1,0 +1,308 @@
+"""Margins of a scenario's closed loop along its way, nominal and over a box of model errors."""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.scenario import Scenario
+from experiments.progress import ProgressListener
+from experiments.studies.margins.box import Box, Error, corners, single_errors
+from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
+from experiments.studies.margins.smooth import smooth, without_error
+from experiments.studies.margins.walk import Instant, Walk, walk
+from pfsc_drake.control.margins.delay import delay_margin
+from pfsc_drake.control.margins.disc import DiscMargin, common_disc_margin, disc_margins
+from pfsc_drake.control.margins.modes import Modes, modes
+from pfsc_drake.errors import InputError
+
+# instants at which all corners of the box are tried: the weakest ones
+_CORNER_INSTANTS = 2
+
+
+@dataclass(frozen=True)
+class Place:
+    """A loop at one instant.
+
+    Attributes:
+        instant: When and where.
+        modes: Its modes; None where the law goes to its safe state.
+    """
+
+    instant: Instant
+    modes: Modes | None
+
+    @property
+    def rate(self) -> float:
+        """Rate of the slowest or fastest growing mode [1/s]; infinite where the law gives up."""
+        return np.inf if self.modes is None else self.modes.slowest
+
+    @property
+    def damping(self) -> float:
+        """The smallest damping ratio of a mode; -1 where the law gives up."""
+        return -1.0 if self.modes is None else self.modes.smallest_damping
+
+
+@dataclass(frozen=True)
+class Case:
+    """A loop along its way, with what is believed wrongly.
+
+    Attributes:
+        error: What is believed wrongly beside what the scenario says.
+        key: The parameter, if it is one alone.
+        places: Where it was looked at.
+    """
+
+    error: Error
+    key: str
+    places: list[Place]
+
+    @property
+    def worst(self) -> Place:
+        """Where it is slowest, or grows fastest."""
+        return max(self.places, key=lambda place: place.rate)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether nothing grows anywhere."""
+        return self.worst.rate <= 0.0
+
+
+@dataclass(frozen=True)
+class DriveMargins:
+    """What the drives bear at one instant, the model being as the scenario says.
+
+    Attributes:
+        instant: When and where.
+        drives: Of each drive alone, N of them.
+        common: Of all at once.
+        delay: Further sampling intervals of delay that are borne, -1 for none.
+    """
+
+    instant: Instant
+    drives: list[DiscMargin]
+    common: DiscMargin
+    delay: int
+
+    @property
+    def smallest(self) -> float:
+        """The smallest disc margin of a drive."""
+        return min(margin.alpha for margin in self.drives)
+
+
+@dataclass
+class MarginAnalysis:
+    """All that is known of a loop before it runs.
+
+    Attributes:
+        period: Sampling time [s].
+        joints: Names of the drives.
+        box: Errors that it is to bear.
+        nominal: The loop as the scenario says.
+        singles: One parameter wrong at a time.
+        corners: All wrong, at the weakest instants.
+        margins: What the drives bear, as the scenario says.
+        drives_are_servos: Whether the drives are servos that take velocities.
+        remarks: What was left out of the loop, and why, one sentence each.
+    """
+
+    period: float
+    joints: Sequence[str]
+    box: Box
+    nominal: Case
+    singles: list[Case] = field(default_factory=list)
+    corners: list[Case] = field(default_factory=list)
+    margins: list[DriveMargins] = field(default_factory=list)
+    drives_are_servos: bool = False
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def cases(self) -> list[Case]:
+        """All loops that were looked at, the scenario's own first."""
+        return [self.nominal, *self.singles, *self.corners]
+
+    @property
+    def weakest(self) -> Case:
+        """The slowest of the loops, or the one that grows fastest."""
+        return max(self.cases, key=lambda case: case.worst.rate)
+
+    @cached_property
+    def worst_by_key(self) -> dict[str, Case]:
+        """The worse sign of each parameter, the parameter that hurts most first."""
+        keys = dict.fromkeys(case.key for case in self.singles)
+        found = {
+            key: max((c for c in self.singles if c.key == key), key=lambda case: case.worst.rate)
+            for key in keys
+        }
+        return dict(sorted(found.items(), key=lambda item: -item[1].worst.rate))
+
+    @property
+    def least_damped(self) -> Place | None:
+        """Where the loop, as the scenario says, is damped least."""
+        known = [place for place in self.nominal.places if place.modes is not None]
+        return min(known, key=lambda place: place.damping, default=None)
+
+    @property
+    def tightest(self) -> DriveMargins | None:
+        """Where a drive bears least."""
+        return min(self.margins, key=lambda margins: margins.smallest, default=None)
+
+    @property
+    def delay(self) -> int:
+        """Further sampling intervals of delay that are borne everywhere."""
+        return min((margins.delay for margins in self.margins), default=-1)
+
+
+def analyse(
+    settings: Scenario,
+    folder: Path,
+    box: Box,
+    progress: ProgressListener,
+    *,
+    only_start: bool = False,
+) -> MarginAnalysis:
+    """Linearize a scenario's loop along its way and over a box of model errors.
+
+    Args:
+        settings: The scenario as read.
+        folder: Where its relative file names start.
+        box: Errors that it is to bear beside the scenario's own.
+        progress: Told how far it is.
+        only_start: Whether to look at the start alone, and at no corner of the box; takes a
+            third of the time.
+
+    Raises:
+        InputError: If the scenario cannot be built.
+    """
+    smoothed, removed = smooth(settings)
+    progress(0.0, "building")
+    true_loop = StationLoop(without_error(smoothed), folder)
+    station = true_loop.station
+    duration = settings.duration or station.reference_duration
+    progress.expect(duration)
+    way = walk(
+        true_loop,
+        duration,
+        lambda time: progress(time, "walking the path"),
+        only_start=only_start,
+    )
+    if not way.instants:
+        raise InputError("the law gives up before its first tick; run the scenario to see why")
+    study = _Study(smoothed, folder, true_loop, way, progress, duration)
+    errs = smoothed.model_error.is_given or bool(smoothed.controller.model)
+    own = study.build(Error()) if errs else true_loop
+    looked_at = [way.instants[i] for i in {0, len(way.instants) // 2}]
+    study.chosen = own.variables_in_loop([study.section(own, instant) for instant in looked_at])
+    nominal, loops = study.case(own, Error(), way.instants)
+    analysis = MarginAnalysis(
+        period=own.map.period,
+        joints=station.robot.names,
+        box=box,
+        nominal=nominal,
+        drives_are_servos=own.drives_are_servos,
+        remarks=_remarks(removed, way, station.workpiece is not None),
+    )
+    progress(duration, "margins of the drives")
+    analysis.margins = [
+        _drive_margins(instant, loop, own.map.period)
+        for instant, loop in zip(way.instants, loops, strict=True)
+        if loop is not None
+    ]
+    elastic = not station.robot.is_rigid
+    for key, error in single_errors(box, elastic):
+        with _saying(key, analysis.remarks):
+            case, _ = study.case(study.build(error), error, way.instants)
+            analysis.singles.append(Case(error, key, case.places))
+    weak = _weakest_instants(analysis)
+    known = {case.key for case in analysis.singles}
+    for error in () if only_start else corners(box, elastic):
+        if all(key in known for key, _ in error.parts):
+            analysis.corners.append(study.case(study.build(error), error, weak)[0])
+    progress(duration, "done")
+    return analysis
+
+
+@dataclass
+class _Study:
+    """What all loops of a study share."""
+
+    settings: Scenario
+    folder: Path
+    walked: StationLoop
+    way: Walk
+    progress: ProgressListener
+    duration: float
+    chosen: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def build(self, error: Error) -> StationLoop:
+        self.progress(self.duration, f"linearizing, {error}")
+        return StationLoop(error.applied_to(self.settings), self.folder, self.walked.station.task)
+
+    def section(self, loop: StationLoop, instant: Instant) -> Context:
+        """Return an instant as a state of a loop's own station."""
+        own = loop is self.walked
+        return instant.section if own else loop.map.adopted(instant.section)
+
+    def case(
+        self, loop: StationLoop, error: Error, instants: Sequence[Instant]
+    ) -> tuple[Case, list[LinearLoop | None]]:
+        """Return a loop along its way, and what it is at each instant."""
+        sections = [self.section(loop, instant) for instant in instants]
+        loops = [linearize(loop, section, self.chosen) for section in sections]
+        places = [
+            Place(instant, None if linear is None else modes(linear.A, loop.map.period))
+            for instant, linear in zip(instants, loops, strict=True)
+        ]
+        return Case(error, "", places), loops
+
+
+def _drive_margins(instant: Instant, loop: LinearLoop, period: float) -> DriveMargins:
+    A, holds = loop.A, loop.holds
+    return DriveMargins(
+        instant,
+        disc_margins(A, holds, period),
+        common_disc_margin(A, holds, period),
+        delay_margin(A, holds, period),
+    )
+
+
+def _weakest_instants(analysis: MarginAnalysis) -> list[Instant]:
+    """Instants at which some single error hurts most, and the first at rest."""
+    instants = [place.instant for place in analysis.nominal.places]
+    cases = [analysis.nominal, *analysis.singles]
+    rates = np.max([[place.rate for place in case.places] for case in cases], axis=0)
+    order = np.argsort(-rates)[:_CORNER_INSTANTS]
+    return [instants[i] for i in sorted({0, *order.tolist()})]
+
+
+@contextlib.contextmanager
+def _saying(key: str, remarks: list[str]) -> Iterator[None]:
+    """Leave out a parameter that a robot does not have, and say so."""
+    try:
+        yield
+    except InputError as error:
+        remarks.append(f"model_error.{key} is left out: {error}")
+
+
+def _remarks(removed: Sequence[str], way: Walk, touches: bool) -> list[str]:
+    remarks = []
+    if touches:
+        remarks.append(
+            "Contact forces are those of the plant's last step, which it remembers beside its "
+            "state; that lag is left out, so that rates near zero tell little."
+        )
+    if removed:
+        remarks.append(
+            f"Taken off, because it has no slope or acts from outside: {', '.join(removed)}."
+        )
+    if way.fault:
+        time = way.instants[-1].time
+        remarks.append(
+            f"With a perfect model the run ends with a fault soon after t = {time:.3g} s; "
+            "later places were not looked at."
+        )
+    return remarks

@@ -1,0 +1,67 @@
+"""What of a scenario has a slope: the rest is taken off before a loop is linearized."""
+
+from copy import deepcopy
+
+from diagrams.robots.delta import is_delta
+from diagrams.scenario import (
+    HoldBackParameters,
+    JointFrictionParameters,
+    Scenario,
+    SensorFailureParameters,
+)
+from diagrams.scenario.model_error import ModelErrorParameters
+from diagrams.tasks.external_torque import needs_sensor
+
+
+def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
+    """Return a scenario without what has no slope or acts from outside, and what was taken off.
+
+    Difference quotients, filters, disturbance observers, delays and the operator's hand stay:
+    they are part of the loop.
+
+    Args:
+        settings: The scenario; unchanged.
+    """
+    result, removed = deepcopy(settings), []
+    rubs = settings.drive_friction is not False and is_delta(settings.robot.model)
+    if settings.friction.is_given or rubs:
+        result.friction = JointFrictionParameters()
+        if is_delta(settings.robot.model):
+            result.drive_friction = False
+        removed.append("friction of the drives")
+    compensation = result.controller.friction
+    if compensation.has_coefficients or (
+        compensation.watched and compensation.observer == "kalman"
+    ):
+        # it answers friction that is not there any more; around rest it would push
+        compensation.source, compensation.watched = "none", False
+        removed.append("compensation of friction by its coefficients")
+    encoders = settings.encoders
+    if any(encoders.link_increments) or any(encoders.motor_increments):
+        result.encoders.link_increments, result.encoders.motor_increments = [], []
+        removed.append("increments of the encoders")
+    if needs_sensor(settings) and any(settings.sensor.noise):
+        result.sensor.noise = 0.0 * settings.sensor.noise
+        removed.append("noise of the force sensor")
+    if result.hand is not None and result.hand.tremor > 0.0:
+        result.hand.tremor = 0.0
+        removed.append("tremor of the hand")
+    if settings.forces or settings.hold_back.force != 0.0:
+        result.forces, result.hold_back = [], HoldBackParameters()
+        removed.append("forces on the tool")
+    if any(settings.start.offset) or any(settings.start.rotation_deg):
+        result.start.offset, result.start.rotation_deg = [0.0, 0.0], [0.0, 0.0, 0.0]
+        removed.append("start beside the path")
+    result.simulation.sensor_failure = SensorFailureParameters()
+    return result, removed
+
+
+def without_error(settings: Scenario) -> Scenario:
+    """Return a scenario whose controller believes the truth.
+
+    Args:
+        settings: The scenario; unchanged.
+    """
+    result = deepcopy(settings)
+    result.model_error, result.controller.model = ModelErrorParameters(), ""
+    return result

@@ -1,0 +1,115 @@
+"""Where on its way a loop is looked at: instants of a run without model error."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from diagrams.station import Station
+from experiments.studies.margins.loop import StationLoop
+
+# instants in motion, at equal distances along the way
+MOVING = 8
+_SAMPLES = 2000
+_SLOW = 1e-3  # of the fastest reference: slower is rest
+# s, between two looks at progress and faults
+_CHUNK = 0.05
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A state of the station on its way.
+
+    Attributes:
+        time: [s].
+        eta: Where on the path the reference is [m].
+        speed: Its speed [m/s].
+        section: Context right after the tick.
+    """
+
+    time: float
+    eta: float
+    speed: float
+    section: Context
+
+    @property
+    def place(self) -> str:
+        """In words."""
+        motion = f"at {abs(self.speed):.2g} m/s" if self.speed else "at rest"
+        return f"{motion}, eta = {self.eta:.3g} m"
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A run without model error.
+
+    Attributes:
+        instants: In order of time.
+        fault: Whether a fault ended it.
+    """
+
+    instants: list[Instant]
+    fault: bool
+
+
+def walk(
+    loop: StationLoop,
+    duration: float,
+    progress: Callable[[float], None],
+    *,
+    only_start: bool = False,
+) -> Walk:
+    """Run a station and keep its state at rest and in motion.
+
+    Args:
+        loop: Its loop.
+        duration: Length of the run [s].
+        progress: Told the simulated time [s].
+        only_start: Whether to keep the first instant alone.
+    """
+    station, simulator = loop.station, Simulator(loop.station.diagram)
+    loop.configure(simulator)
+    root, period = simulator.get_mutable_context(), loop.map.period
+    station.set_start(root)
+    simulator.Initialize()
+    instants: list[Instant] = []
+    chosen = _chosen_ticks(station, duration)
+    for tick, eta, speed in chosen[:1] if only_start else chosen:
+        now = round(root.get_time() / period)
+        stride = max(1, round(_CHUNK / period))
+        for goal in [*range(now + stride, tick, stride), tick]:
+            simulator.AdvanceTo(goal * period)
+            progress(root.get_time())
+            if loop.has_failed(root):
+                return Walk(instants, True)
+        simulator.AdvancePendingEvents()
+        instants.append(Instant(tick * period, eta, speed, root.Clone()))
+    return Walk(instants, False)
+
+
+def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, float, float]]:
+    """Return ticks with place [m] and speed [m/s] of the reference."""
+    motion, period = station.task.motion, station.controller.period
+    last = max(int(duration / period + 1e-6) - 1, 1)
+    times = np.linspace(period, last * period, _SAMPLES)
+    inside = np.clip(times, *motion.domain)
+    eta, speed = motion.derivatives(inside, 1)[:, :, 0].T
+    speed = np.where(times > motion.domain[1], 0.0, speed)
+    fastest = np.max(np.abs(speed))
+    moving = np.abs(speed) > _SLOW * fastest if fastest > 0.0 else np.zeros(_SAMPLES, dtype=bool)
+    # the end of every rest, where what came before has settled
+    rests = np.flatnonzero(np.diff(moving.astype(int)) == 1).tolist()
+    chosen = {*(rests or [0]), _SAMPLES - 1}
+    if moving.any():
+        way = np.cumsum(np.abs(speed))
+        quantiles = (np.arange(MOVING) + 0.5) / MOVING
+        chosen |= set(np.searchsorted(way, quantiles * way[-1]).tolist())
+    else:  # led by somebody else
+        chosen |= set(np.linspace(0, _SAMPLES - 1, MOVING + 2).astype(int).tolist())
+    result = {}
+    for sample in sorted(chosen):
+        tick = min(max(round(times[sample] / period), 1), last)
+        result[tick] = (tick, float(eta[sample]), float(speed[sample] if moving[sample] else 0.0))
+    return list(result.values())

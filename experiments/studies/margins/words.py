@@ -1,0 +1,229 @@
+"""What an analysis of margins says, in words and in numbers."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from experiments.results.metrics import Metrics
+from experiments.studies.margins.analysis import Case, MarginAnalysis, Place
+from pfsc_drake.control.margins.disc import DiscMargin
+
+# disc margin and damping ratio from which on a loop is robust and well damped by custom
+GOOD_DISC, GOOD_DAMPING = 0.75, 0.3
+_PARAMETERS = {
+    "mass": "the masses",
+    "stiffness": "the joint stiffnesses",
+    "rotor_inertia": "the rotor inertias",
+    "tool_mass": "the tool's mass",
+}
+
+
+def sentences(analysis: MarginAnalysis) -> list[str]:
+    """Return what a person should know, the most important first.
+
+    Args:
+        analysis: The analysis.
+    """
+    return [
+        _nominal(analysis.nominal),
+        _box(analysis),
+        *_parameters(analysis),
+        *_drives(analysis),
+        *analysis.remarks,
+    ]
+
+
+def one_line(analysis: MarginAnalysis) -> str:
+    """Return the margins of a loop in one line.
+
+    Args:
+        analysis: The analysis.
+    """
+    tightest = analysis.tightest
+    verdict = "stable" if analysis.nominal.is_stable else "UNSTABLE"
+    parts = [f"{verdict} {_where(analysis.nominal.worst)}, {_mode(analysis.nominal)}"]
+    if tightest is not None and analysis.nominal.is_stable:
+        drive = int(np.argmin([margin.alpha for margin in tightest.drives]))
+        parts.append(
+            f"drive {drive + 1} bears {_borne(tightest.drives[drive])}; "
+            f"all bear {_intervals(analysis.delay)} of delay"
+        )
+    unstable = [case for case in analysis.cases[1:] if not case.is_stable]
+    if unstable and analysis.nominal.is_stable:
+        worst = max(unstable, key=lambda case: case.worst.rate)
+        parts.append(f"unstable with {worst.error}")
+    elif len(analysis.cases) > 1:
+        parts.append(f"model errors of the box: slowest {_rate(analysis.weakest.worst.rate)}")
+    return "; ".join(parts)
+
+
+def metrics_of(analysis: MarginAnalysis) -> Metrics:
+    """Return the numbers of an analysis.
+
+    Args:
+        analysis: The analysis.
+    """
+    result = Metrics()
+    result.add("slowest_rate", analysis.nominal.worst.rate, "1/s", "< 0", "as the scenario says")
+    damped = analysis.least_damped
+    if damped is not None:
+        result.add("smallest_damping", damped.damping, "1", source=_where(damped))
+    if len(analysis.cases) > 1:
+        weakest = analysis.weakest
+        result.add(
+            "slowest_rate_in_box", weakest.worst.rate, "1/s", "< 0", source=str(weakest.error)
+        )
+    tightest = analysis.tightest
+    if tightest is not None:
+        margin = min(tightest.drives, key=lambda margin: margin.alpha)
+        result.add("disc_margin", margin.alpha, "1", source=tightest.instant.place)
+        result.add("gain_margin", margin.gain[1], "1", source="of the weakest drive, either way")
+        result.add("phase_margin", margin.phase, "rad", source="of the weakest drive")
+        common = min(margins.common.alpha for margins in analysis.margins)
+        result.add("disc_margin_of_all_drives", common, "1", source="all wrong at once")
+        result.add("delay_margin", analysis.delay, "samples", source="further delay of all drives")
+    return result
+
+
+def margins_json(analysis: MarginAnalysis) -> str:
+    """Return everything of an analysis as JSON; infinity and NaN are null.
+
+    Args:
+        analysis: The analysis.
+    """
+    content = {
+        "sampling_time": analysis.period,
+        "drives": list(analysis.joints),
+        "summary": sentences(analysis),
+        "loops": [_case_data(case) for case in analysis.cases],
+        "margins": [
+            {
+                **_instant_data(margins),
+                "disc_margins": [margin.alpha for margin in margins.drives],
+                "frequencies_rad_s": [margin.frequency for margin in margins.drives],
+                "disc_margin_of_all_drives": margins.common.alpha,
+                "delay_margin_samples": margins.delay,
+            }
+            for margins in analysis.margins
+        ],
+    }
+    return json.dumps(_finite(content), indent=2, allow_nan=False) + "\n"
+
+
+def _nominal(case: Case) -> str:
+    if case.is_stable:
+        return f"As the scenario says, the loop is stable: it {_mode(case)} ({_where(case.worst)})."
+    if math.isinf(case.worst.rate):
+        return f"As the scenario says, the law gives up {_where(case.worst)}."
+    return f"As the scenario says, the loop is unstable: it {_mode(case)} ({_where(case.worst)})."
+
+
+def _box(analysis: MarginAnalysis) -> str:
+    if len(analysis.cases) == 1:
+        return "No model errors were tried."
+    unstable = [case for case in analysis.cases[1:] if not case.is_stable]
+    worst = max(analysis.cases[1:], key=lambda case: case.worst.rate)
+    if not unstable:
+        return (
+            f"All {len(analysis.cases) - 1} model errors of the box are borne; the worst loop "
+            f"{_mode(worst)}: {worst.error} ({_where(worst.worst)})."
+        )
+    return (
+        f"{len(unstable)} of {len(analysis.cases) - 1} model errors of the box make the loop "
+        f"unstable; the worst loop {_mode(worst)}: {worst.error} ({_where(worst.worst)})."
+    )
+
+
+def _parameters(analysis: MarginAnalysis) -> list[str]:
+    ranked = analysis.worst_by_key
+    if not ranked:
+        return []
+    key, case = next(iter(ranked.items()))
+    others = ", ".join(
+        f"{_PARAMETERS[other]} {_rate(own.worst.rate)}" for other, own in [*ranked.items()][1:]
+    )
+    beside = f"; in comparison {others}" if others else ""
+    return [
+        f"What hurts most, by itself, is an error of {_PARAMETERS[key]}: {_rate(case.worst.rate)} "
+        f"with {case.error} ({_where(case.worst)}){beside}."
+    ]
+
+
+def _drives(analysis: MarginAnalysis) -> list[str]:
+    tightest = analysis.tightest
+    if tightest is None or not analysis.nominal.is_stable:
+        return []
+    drive = int(np.argmin([margin.alpha for margin in tightest.drives]))
+    margin, what = tightest.drives[drive], "torque"
+    if analysis.drives_are_servos:
+        what = "velocity command"
+    return [
+        f"The weakest drive is {analysis.joints[drive]}, {tightest.instant.place}: its {what} may "
+        f"be wrong by {_borne(margin)} (disc margin {margin.alpha:.3g} at "
+        f"{margin.frequency / (2.0 * np.pi):.3g} Hz). Beside what there is, all drives bear "
+        f"{_intervals(analysis.delay)} of delay."
+    ]
+
+
+def _mode(case: Case) -> str:
+    place = case.worst
+    if place.modes is None:
+        return "ends with a fault of the law"
+    frequency = place.modes.slowest_frequency / (2.0 * np.pi)
+    oscillates = f" at {frequency:.2g} Hz" if frequency > 0.01 else ""
+    verb = "decays with" if place.rate <= 0.0 else "grows with"
+    return f"{verb} {abs(place.rate):.3g} 1/s{oscillates}"
+
+
+def _rate(rate: float) -> str:
+    return "fault" if math.isinf(rate) else f"{rate:+.3g} 1/s"
+
+
+def _where(place: Place) -> str:
+    return place.instant.place
+
+
+def _borne(margin: DiscMargin) -> str:
+    low, high = margin.gain
+    degrees = math.degrees(margin.phase)
+    return f"{100.0 * (low - 1.0):+.3g} to {100.0 * (high - 1.0):+.3g} % or {degrees:.2g} deg"
+
+
+def _intervals(delay: int) -> str:
+    if delay <= 0:
+        return "no sampling interval"
+    return f"{delay} sampling interval{'s' if delay > 1 else ''}"
+
+
+def _instant_data(item: Any) -> dict[str, Any]:
+    instant = item.instant
+    return {"t": instant.time, "eta": instant.eta, "speed": instant.speed}
+
+
+def _case_data(case: Case) -> dict[str, Any]:
+    return {
+        "model_error": dict(case.error.parts),
+        "slowest_rate": case.worst.rate,
+        "stable": case.is_stable,
+        "places": [
+            {
+                **_instant_data(place),
+                "fault": place.modes is None,
+                "rates": [] if place.modes is None else place.modes.rate.tolist(),
+                "frequencies_rad_s": [] if place.modes is None else place.modes.frequency.tolist(),
+                "smallest_damping": place.damping,
+                "neutral_modes": None if place.modes is None else place.modes.neutral,
+            }
+            for place in case.places
+        ],
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

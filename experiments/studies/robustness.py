@@ -1,0 +1,225 @@
+"""What robots that are not their models do to every law, before and after the cures."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure as Canvas
+
+from experiments.catalog.scenario_file import ScenarioFile, read_scenario
+from experiments.figures.style import ALERT, COLOURS, STYLE, WIDTH, Drawing, Figure, render
+from experiments.pages.report import Report, report_page, write_report
+from experiments.results.folder import open_results
+from experiments.results.metrics import Metrics
+from experiments.results.provenance import standard_attributes
+from experiments.studies.side_by_side import run_side_by_side
+from experiments.sweep.rows import COMPLETED, RunRow
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scenario whose law is to bear disturbances.
+
+    Attributes:
+        scenario: Its name.
+        before: What it was before the cures, as overrides.
+        after: The cures beyond those that the scenario has.
+        elastic: Whether its joints have a stiffness.
+        metric: What is to stay small.
+    """
+
+    scenario: str
+    before: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    elastic: bool = True
+    metric: str = "max_path_deviation"
+
+
+def _equal_poles(law: str, **poles: float) -> str:
+    kinds = ", ".join(
+        f"{kind}: {{poles: [{', '.join([f'{p:g}'] * 4)}]}}" for kind, p in poles.items()
+    )
+    return f"controller.gains.{law}={{{kinds}}}"
+
+
+# nothing but the law between the plant and its model
+_BARE = ("model_error={}", "friction={}", "encoders={}")
+_OBSERVED = ("controller.friction.source=observer",)
+_UNOBSERVED = ("controller.friction.source=none",)
+SUBJECTS = (
+    Subject(
+        "pfc_elastic_6r",
+        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
+    ),
+    Subject(
+        "pfc_comau_6r_elastic",
+        (_equal_poles("elastic", eta=-40, xi=-60, phi=-50), "start.transition=0"),
+    ),
+    Subject("pfc_elastic_3r"),
+    Subject("pfc_viscoelastic_3r"),
+    Subject("pfc_comau_6r"),
+    Subject("pfc_delta", elastic=False),
+    Subject("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
+)
+_FRICTION = "friction.file=comau_racer_1_4"
+_ENCODERS = (
+    "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
+)
+DISTURBANCES: Mapping[str, tuple[str, ...]] = {
+    "as modelled": (),
+    "masses 10 % too low": ("model_error.mass=0.9",),
+    "masses 10 % too high": ("model_error.mass=1.1",),
+    "K_s 10 % too low": ("model_error.stiffness=0.9",),
+    "K_s 10 % too high": ("model_error.stiffness=1.1",),
+    "tool 0.5 kg too light": ("model_error.tool_mass=-0.5",),
+    "friction": (_FRICTION,),
+    "all at once": (
+        _FRICTION,
+        "model_error.mass=0.95",
+        "model_error.stiffness=1.05",
+        _ENCODERS,
+    ),
+}
+BEFORE, AFTER = "before", "after"
+_DESCRIPTION = (
+    "Every row believes its robot to be what the disturbance says, while the plant stays as it "
+    "is; friction is that of Tab. C.3 (of the drives, on the DELTA robot). Before: gains with "
+    "equal poles, nothing known of friction. After: the scenario's gains, and an observer of the "
+    "drives' disturbance torque (300 1/s). 'All at once' is friction, masses 5 % too low, K_s "
+    "5 % too high, and encoders of 4 million increments with difference quotients. Largest "
+    "distances after the transition from the start to the path; of pfc_compliant_6r from the "
+    "reference that yields."
+)
+# what one run is called by: scenario, disturbance, before or after
+Case = tuple[str, str, str]
+
+
+def write_robustness(
+    out: Path,
+    progress: Callable[[str], None],
+    subjects: Sequence[Subject] = SUBJECTS,
+    disturbances: Mapping[str, tuple[str, ...]] = DISTURBANCES,
+) -> Report:
+    """Run all scenarios under all disturbances, on all cores, and write a page.
+
+    Args:
+        out: Folder for the page.
+        progress: Told one line per run, in the order in which they end.
+        subjects: Scenarios.
+        disturbances: Overrides by name.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: If ``out`` cannot take the page (see
+            :func:`experiments.results.folder.open_results`); nothing has been run then.
+    """
+    with open_results(out, "study") as results:
+        metric = {subject.scenario: subject.metric for subject in subjects}
+
+        def tell(case: Case, row: RunRow) -> None:
+            progress(f"{case[0]:22s} {case[1]:22s} {case[2]:7s} {_said(row, metric[case[0]])}")
+
+        rows = run_side_by_side(_scenarios(subjects, disturbances), tell)
+        metrics = Metrics()
+        for (scenario, disturbance, when), row in rows.items():
+            own = metric[scenario]
+            known = row.status == COMPLETED
+            value = row.metrics[own].value if known else float("nan")
+            metrics.add(f"{scenario}, {disturbance}, {when}", value, "m", source=row.reason or None)
+        results.write("metrics.json", metrics.to_json())
+        figures = [_picture(rows, metric)]
+        page = report_page(
+            title="Robots that are not their models",
+            description=_DESCRIPTION,
+            scenario_yaml_text=_listing(subjects, disturbances),
+            metrics=metrics,
+            figures=figures,
+            log_attributes=standard_attributes("robustness"),
+        )
+        return write_report(results, figures, page)
+
+
+def _scenarios(
+    subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]
+) -> dict[Case, ScenarioFile]:
+    scenarios = {}
+    for subject in subjects:
+        for name, changes in disturbances.items():
+            if name.startswith("K_s") and not subject.elastic:
+                continue
+            for when, own in {
+                BEFORE: (*_UNOBSERVED, *subject.before),
+                AFTER: (*_OBSERVED, *subject.after),
+            }.items():
+                overrides = [*_bare(subject), *own, *_suited(subject, changes), "targets={}"]
+                scenarios[subject.scenario, name, when] = read_scenario(subject.scenario, overrides)
+    return scenarios
+
+
+def _bare(subject: Subject) -> tuple[str, ...]:
+    return (*_BARE, "drive_friction=false") if subject.scenario == "pfc_delta" else _BARE
+
+
+def _suited(subject: Subject, changes: tuple[str, ...]) -> tuple[str, ...]:
+    """Return changes as they are said of a robot; a DELTA robot brings its own friction."""
+    if subject.scenario != "pfc_delta":
+        return changes
+    return tuple("drive_friction=true" if x == _FRICTION else x for x in changes)
+
+
+def _said(row: RunRow, metric: str) -> str:
+    if row.status != COMPLETED:
+        return row.reason
+    return f"{row.metrics[metric].value * 1e3:8.3f} mm"
+
+
+def _listing(subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]) -> str:
+    lines = [f"{name}: {' '.join(changes) or '-'}" for name, changes in disturbances.items()]
+    lines += [f"{s.scenario}, before: {' '.join((*_UNOBSERVED, *s.before))}" for s in subjects]
+    return "\n".join([*lines, f"after: {' '.join(_OBSERVED)}"])
+
+
+def _picture(rows: Mapping[Case, RunRow], metric: Mapping[str, str]) -> Figure:
+    scenarios = list(dict.fromkeys(case[0] for case in rows))
+    names = list(dict.fromkeys(case[1] for case in rows))[::-1]
+    columns = min(4, len(scenarios))
+    lines = -(-len(scenarios) // columns)
+    with plt.rc_context(STYLE):
+        canvas = Canvas(figsize=(1.4 * WIDTH, 0.6 + 3.0 * lines))
+        panels = canvas.subplots(lines, columns, sharey=True, sharex=True, squeeze=False).ravel()
+        for panel, scenario in zip(panels, scenarios, strict=False):
+            for (own, name, when), row in rows.items():
+                if own != scenario:
+                    continue
+                after, height = when == AFTER, names.index(name)
+                colour = COLOURS[0] if after else COLOURS[1]
+                if row.status == COMPLETED:
+                    value = row.metrics[metric[scenario]].value * 1e3
+                    face = colour if after else "none"
+                    panel.plot(value, height, "o", color=colour, markerfacecolor=face, ms=7)
+                else:
+                    across = panel.get_yaxis_transform()
+                    panel.plot(0.97, height, "x", color=ALERT, ms=8, transform=across)
+            panel.set(title=scenario, xscale="log")
+            panel.set_yticks(range(len(names)), names)
+            panel.set_ylim(-0.6, len(names) - 0.4)
+        for panel in panels[len(scenarios) :]:
+            panel.set_visible(False)
+        for panel in panels[max(0, len(scenarios) - columns) : len(scenarios)]:
+            panel.set_xlabel("largest distance in mm")
+        handles = [
+            panels[0].plot([], [], "o", color=COLOURS[1], markerfacecolor="none")[0],
+            panels[0].plot([], [], "o", color=COLOURS[0])[0],
+            panels[0].plot([], [], "x", color=ALERT)[0],
+        ]
+        labels = [
+            "equal poles, friction unknown",
+            "fast pair of poles, observer",
+            "stopped by a fault",
+        ]
+        canvas.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        caption = "What believes wrongly of its robot, and by how much the tool leaves the path."
+        return render(Drawing("robustness", "Deviation under disturbances", caption, canvas))

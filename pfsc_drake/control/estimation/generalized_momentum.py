@@ -1,0 +1,141 @@
+"""Generalized momenta, and what changes them: observers without accelerations.
+
+The momentum of a robot's links ``p = D_E(q) q'`` obeys ``p' = tau + beta``, with whatever
+torques ``tau`` act on the links, and ``beta = C^T(q, q') q' - g(q)``, the gradient of the
+kinetic less the potential energy (A. De Luca, R. Mattone, ICRA 2003; App. A). Its rate needs
+no acceleration, and a difference of momenta tells the mean of all that acted in between.
+"""
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
+
+
+@dataclass(frozen=True)
+class MomentumModel:
+    """One momentum per joint, and the torques that change it.
+
+    ``p' = f + drive_weight tau_d + known_weight tau_k + sign z``: the forces f follow from the
+    state, ``tau_d`` is what the drives were told, ``tau_k`` what else is known to act, and z
+    the torque that is to be found.
+
+    Attributes:
+        state: Symbol ``[q_J, v_J, q_M, v_M]``, shape (4N, 1).
+        momentum: p as an expression of the state, shape (N, 1) [Nm s or N s].
+        forces: f as an expression of the state, shape (N, 1) [Nm or N].
+        drive_weight: Of each drive, 1 or 0, shape (N,).
+        known_weight: Of each known torque, shape (N,).
+        sign: 1 or -1.
+        delay: Age of the velocities when they are measured [s].
+    """
+
+    state: ca.SX
+    momentum: ca.SX
+    forces: ca.SX
+    drive_weight: np.ndarray
+    known_weight: np.ndarray
+    sign: float
+    delay: float = 0.0
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.momentum.numel()
+
+    def with_delay(self, delay: float) -> "MomentumModel":
+        """Return the momenta of a state whose velocities are older than its positions.
+
+        A difference quotient is the velocity half an interval ago. So that all is of one age,
+        positions are taken back, ``q - delay q'``; what acts has to be of the same age, too.
+
+        Args:
+            delay: Age of the velocities [s].
+        """
+        q_J, v_J, q_M, v_M = ca.vertsplit(self.state, self.dimension)
+        then = ca.vertcat(q_J - delay * v_J, v_J, q_M - delay * v_M, v_M)
+        momentum, forces = ca.substitute([self.momentum, self.forces], [self.state], [then])
+        return replace(self, momentum=momentum, forces=forces, delay=delay)
+
+    def function(self) -> ca.Function:
+        """Return ``state -> (p, f)``, shapes (4N,), (N,), (N,)."""
+        return ca.Function(
+            "momentum",
+            [self.state],
+            ca.cse([ca.densify(self.momentum), ca.densify(self.forces)]),
+            ["state"],
+            ["momentum", "forces"],
+        )
+
+
+def drive_momentum(robot: RobotModel) -> MomentumModel:
+    """Return the momenta on which friction of the drives acts; z is the friction torque.
+
+    Of an elastic joint the motor's alone, ``p = D_M v_M``, ``p' = tau_d - tau_J - tau_f``,
+    (2.65b): forces on the tool reach it only through the joint torque
+    ``tau_J = K_s (q_M - q_J) + K_d (v_M - v_J)``, which is measured. Of a rigid joint that of
+    the whole arm and the rotor, ``p = D_E v_J + D_M v_M``,
+    ``p' = tau_d + beta + tau_ext - tau_f``: what pushes the tool is taken for friction unless
+    it is known, ``tau_k = tau_ext``. The damping of the joints' own bearings is known.
+
+    Args:
+        robot: The robot; any of its N joints may be elastic.
+    """
+    elastic, state = np.isfinite(robot.K_s), ca.SX.sym("state", 4 * robot.dimension)
+    v_M = ca.vertsplit(state, robot.dimension)[3]
+    momentum, forces = robot.D_M * v_M, -ca.DM(robot.viscous_damping) * v_M
+    p_E, beta = _links(robot, state)
+    rigid = ca.DM(~elastic)
+    return MomentumModel(
+        state,
+        momentum + rigid * p_E,
+        forces + rigid * beta - _joint_torque(robot, state),
+        np.ones(robot.dimension),
+        1.0 - elastic,
+        -1.0,
+    )
+
+
+def link_momentum(robot: RobotModel) -> MomentumModel:
+    """Return the momenta on which forces on the tool act; z is the external torque.
+
+    Of elastic joints ``p = D_E v_J``, ``p' = tau_J + beta + tau_ext`` (2.65a), whatever the
+    friction of the drives. Of a rigid joint ``p = D_E v_J + D_M v_M``,
+    ``p' = tau_d + beta + tau_ext - tau_f``: friction is taken for a force unless it is known,
+    ``tau_k = tau_f``.
+
+    Args:
+        robot: The robot; any of its N joints may be elastic.
+    """
+    rigid, state = ~np.isfinite(robot.K_s), ca.SX.sym("state", 4 * robot.dimension)
+    v_M = ca.vertsplit(state, robot.dimension)[3]
+    p_E, beta = _links(robot, state)
+    rotors = ca.DM(rigid * robot.D_M) * v_M
+    damping = ca.DM(rigid * robot.viscous_damping) * v_M
+    return MomentumModel(
+        state,
+        p_E + rotors,
+        beta + _joint_torque(robot, state) - damping,
+        1.0 * rigid,
+        -1.0 * rigid,
+        1.0,
+    )
+
+
+def _links(robot: RobotModel, state: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return the links' momentum ``D_E q'`` and ``beta``, each (N, 1)."""
+    q, v = ca.vertsplit(state, robot.dimension)[:2]
+    position = ca.SX.sym("position", robot.dimension)
+    momentum = robot.mass_matrix(position) @ v
+    rate = ca.gradient(ca.dot(v, momentum) / 2.0, position) - gravity_torque(robot, position)
+    return tuple(ca.substitute([momentum, rate], [position], [q]))
+
+
+def _joint_torque(robot: RobotModel, state: ca.SX) -> ca.SX:
+    """Return ``tau_J`` (2.66) of the elastic joints, zero for the rigid ones, (N, 1)."""
+    q_J, v_J, q_M, v_M = ca.vertsplit(state, robot.dimension)
+    elastic = np.isfinite(robot.K_s)
+    K_s, K_d = (ca.sparsify(ca.DM(np.where(elastic, K, 0.0))) for K in (robot.K_s, robot.K_d))
+    return K_s * (q_M - q_J) + K_d * (v_M - v_J)

@@ -1,0 +1,157 @@
+"""The closed loop of a law and its robot near rest, linear and sampled.
+
+Near rest, and with weight that hardly changes, joints with ``q_M - q_J`` elastic obey::
+
+    D_E q_J'' = K_s (q_M - q_J) + K_d (v_M - v_J) - G q_J
+    D_M q_M'' = tau_d - K_s (q_M - q_J) - K_d (v_M - v_J) - f_v v_M
+
+with the weight's slope ``G = d g_L / d q``; of a rigid joint motor and link are one. Between two
+ticks ``tau_d`` is held, which integrates exactly. The law answers with
+``tau_d = gain A^-1 v + drift + offset``, extrapolated as :class:`FollowingLaw` does it; its slopes
+are differences of its own function :class:`Linearization`, so that no law is written down twice.
+The robot that moves may differ from the one that the law believes.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from scipy.linalg import expm
+
+from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
+
+_DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class RestPosture:
+    """Where a robot rests on a manifold.
+
+    Attributes:
+        q_J: Joint coordinates, shape (N,).
+        point: The manifold's point there, laid out by the manifold's layout.
+    """
+
+    q_J: np.ndarray
+    point: np.ndarray
+
+
+class LoopAtRest:
+    """A law on a robot at rest, with any gains and any factor on masses and stiffnesses.
+
+    For laws that command torques. External torques are left out.
+
+    Args:
+        robot: The robot, as the law believes it.
+        linearization: The law, of relative degree 2 or more.
+        rest: Where it rests.
+        period: Sampling time ``T_s`` [s].
+    """
+
+    def __init__(
+        self, robot: RobotModel, linearization: Linearization, rest: RestPosture, period: float
+    ) -> None:
+        n = robot.dimension
+        self._robot, self._n, self._period = robot, n, period
+        self._elastic = np.isfinite(robot.K_s)
+        q = ca.SX.sym("q", n)
+        weight = gravity_torque(robot, q)
+        dynamics = ca.Function("rest", [q], [robot.mass_matrix(q), weight, ca.jacobian(weight, q)])
+        self._D_E, g, self._G = (np.array(x) for x in dynamics(rest.q_J))
+        self._lead = linearization.lead
+        q_M = rest.q_J + g.ravel() / robot.K_s
+        zero = np.zeros(n)
+        state = np.concatenate([rest.q_J, zero, q_M, zero])
+        self._differentiate(linearization, state, rest.point)
+
+    def _differentiate(self, law: Linearization, state: np.ndarray, point: np.ndarray) -> None:
+        """Take the slopes of virtual output and drive input against the measured joint state."""
+        n, m, r = self._n, law.num_outputs, law.relative_degree
+        further = [np.zeros(r + 1)] if law.manifold.follows_time else []
+        no_torque = np.zeros(n * (r - 1))
+
+        def results(x: np.ndarray) -> list[np.ndarray]:
+            return [np.array(y) for y in law.function(x, no_torque, point, *further)]
+
+        _, A, _, gain, _, _ = results(state)
+        Y, held, offset = np.zeros((4 * n, r, m)), np.zeros((4 * n, n)), np.zeros((4 * n, n))
+        for i in range(4 * n):
+            shift = np.zeros(4 * n)
+            shift[i] = _DIFFERENCE
+            plus, minus = results(state + shift), results(state - shift)
+            Y[i] = ((plus[0] - minus[0]) / (2.0 * _DIFFERENCE)).T
+            held[i] = ((plus[4] - minus[4]) / (2.0 * _DIFFERENCE)).ravel()
+            offset[i] = ((plus[5] - minus[5]) / (2.0 * _DIFFERENCE)).ravel()
+        # the point is that of the posture, and what moves with the tool is in the decoupling matrix
+        acts_on_motors = r == 2 and np.any(Y[3 * n :, 1])
+        Y[:, 0] = 0.0
+        first = 2 * n if acts_on_motors else 0
+        Y[first : first + n, 0] = A.T
+        self._Y, self._drift, self._offset = Y, held.T, offset.T
+        self._per_output = gain @ np.linalg.pinv(A)
+
+    def closed(self, gains: Stabilization, mass: float = 1.0, stiffness: float = 1.0) -> np.ndarray:
+        """Return the map of one sampling interval, from right after a tick to right after the next.
+
+        Args:
+            gains: Of all coordinates.
+            mass: Of the robot that moves, in units of the believed one: links' masses and inertias.
+            stiffness: The same of joint stiffnesses.
+
+        Returns:
+            Shape (k, k); the last N variables are the held drive inputs.
+        """
+        n, period = self._n, self._period
+        F, B, C = self._plant(mass, stiffness)
+        size = len(F)
+        exponential = expm(np.block([[F, B], [np.zeros((n, size + n))]]) * period)
+        Phi, Gamma = exponential[:size, :size], exponential[:size, size:]
+        error = self._Y[:, 0].T @ C
+        v = -np.einsum("km,ikm->mi", gains.proportional, self._Y) @ C
+        held = self._per_output @ v + self._drift @ C
+        drive = held + self._offset @ C
+        summed = -self._per_output * gains.integral
+        # variables: motion, held part of the last tick, summed error, drive input
+        m = len(error)
+        motion, last, sums = np.split(np.eye(size + n + m + n)[:-n], [size, size + n])
+        motion[:, -n:] = 0.0
+        motion = Phi @ motion
+        motion[:, -n:] = Gamma
+        now_held = held @ motion + summed @ sums
+        told = drive @ motion + summed @ sums + self._lead * (now_held - last)
+        return np.vstack([motion, now_held, sums + period * error @ motion, told])
+
+    def _plant(self, mass: float, stiffness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return ``x' = F x + B tau_d``, ``[q_J, v_J, q_M, v_M] = C x`` of the moving robot."""
+        n, elastic, robot = self._n, self._elastic, self._robot
+        soft = np.flatnonzero(elastic)
+        # coordinates z: all links, and the motors that are not one with theirs
+        motors = np.eye(n, n + len(soft))
+        motors[soft] = 0.0
+        motors[soft, n + np.arange(len(soft))] = 1.0
+        links = np.eye(n, n + len(soft))
+        bend = (motors - links)[soft]
+        M = mass * links.T @ self._D_E @ links + motors.T @ (robot.D_M[:, None] * motors)
+        K = bend.T @ (stiffness * robot.K_s[soft][:, None] * bend)
+        K = K + mass * links.T @ self._G @ links
+        D = bend.T @ (robot.K_d[soft][:, None] * bend)
+        D = D + motors.T @ (robot.viscous_damping[:, None] * motors)
+        size = len(M)
+        zero, one = np.zeros((size, size)), np.eye(size)
+        F = np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+        B = np.vstack([np.zeros((size, n)), np.linalg.solve(M, motors.T)])
+        nothing = np.zeros((n, size))
+        C = np.vstack(
+            [
+                np.hstack(parts)
+                for parts in (
+                    [links, nothing],
+                    [nothing, links],
+                    [motors, nothing],
+                    [nothing, motors],
+                )
+            ]
+        )
+        return F, B, C

@@ -1,0 +1,115 @@
+"""Gains and what they bear: against the rule of the fast pair and the chain of integrators."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
+from pfsc_drake.control.law.robust_gains import (
+    RobotError,
+    SampledRobot,
+    choose_fast_pole,
+    rule_of_poles,
+)
+from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.margins.modes import modes
+from pfsc_drake.robot.resonance import joint_resonances
+
+THETA = 0.7
+
+
+@pytest.fixture(name="arm", scope="module")
+def fixture_arm(load_robot, position_path, make_law):
+    """Return a law on the three-axis arm at rest on a path, by sampling time, with its posture."""
+    robot = load_robot("comau_racer_1_4_elastic_3r")
+
+    def make(period, law="elastic"):
+        made = make_law(robot.chain, law, False, sampling_time=period)
+        y_t = position_path.position.derivatives(THETA, 0)[0]
+        q = robot.reach(y_t, guess=(0.2, 2.0, -0.2))
+        r = made.linearization.relative_degree
+        point = position_path.evaluator(r)(y_t.tolist(), THETA)
+        loop = LoopAtRest(robot.chain, made.linearization, RestPosture(q, point), period)
+        return SampledRobot(loop, period, is_elastic=True), joint_resonances(robot.chain, q)
+
+    return make
+
+
+def gains(*poles):
+    return Stabilization([gains_from_poles(poles)] * 3, len(poles), ["x"] * 3)
+
+
+@pytest.mark.parametrize(
+    ("law", "poles"), [("elastic", (-20, -25, -60, -80)), ("visco_elastic", (-20, -25, -60))]
+)
+def test_sampled_fast_the_modes_are_the_poles(arm, law, poles):
+    """Exact linearization: three coordinates, each with all the poles."""
+    period = 2e-5
+    robot, _ = arm(period, law)
+    found = modes(robot.loop.closed(gains(*poles)), period)
+    slow = found.rate > -150.0
+    assert np.sum(slow) == 3 * len(poles)
+    np.testing.assert_allclose(
+        np.sort(found.rate[slow]), np.repeat(np.sort(np.array(poles, dtype=float)), 3), rtol=0.02
+    )
+
+
+def test_integral_parts_add_a_mode_each(arm):
+    period = 2e-5
+    robot, _ = arm(period, "visco_elastic")
+    proportional = gains(-20, -25, -60)
+    proportional.integral = np.full(3, 20.0 * 25.0 * 60.0 * 5.0)
+    expected = np.roots([1.0, *proportional.proportional[::-1, 0], proportional.integral[0]])
+    found = modes(robot.loop.closed(proportional), period)
+    slow = found.rate > -150.0
+    np.testing.assert_allclose(
+        np.sort(found.rate[slow]), np.repeat(np.sort(expected.real), 3), rtol=0.03
+    )
+
+
+@pytest.mark.parametrize("fast", [25.0, 40.0])
+def test_the_borne_error_follows_the_rule(arm, fast):
+    """``p_3 p_4 = delta omega^2 / 1..3`` at the edge, omega the fastest resonance."""
+    robot, resonances = arm(1e-3)
+    poles = rule_of_poles(8.0, fast, 4)
+    borne = robot.borne(gains(*poles), RobotError(stiffness=1.01))
+    assert 0.0 < borne < 0.3
+    assert 0.8 < borne * resonances[-1] ** 2 / (poles[2] * poles[3]) < 3.5
+
+
+def test_what_is_borne_separates_stable_from_unstable(arm):
+    robot, _ = arm(1e-3)
+    slow = gains(*rule_of_poles(8.0, 25.0, 4))
+    for direction in (RobotError(mass=0.99), RobotError(stiffness=1.01)):
+        borne = robot.borne(slow, direction)
+        sign = np.sign([direction.mass - 1.0, direction.stiffness - 1.0])
+        inside, outside = (RobotError(*(1.0 + factor * borne * sign)) for factor in (0.97, 1.05))
+        assert robot.rate(slow, inside) <= 0.0 < robot.rate(slow, outside)
+    assert robot.unborne(slow, 0.9 * robot.borne(slow, RobotError(stiffness=1.01))) is None
+    assert robot.unborne(slow, 0.3) is not None
+
+
+def test_the_fast_pole_is_the_slowest_that_suffices(arm):
+    robot, _ = arm(1e-3)
+    bandwidth, error = 20.0, 0.1
+
+    def worst(fast):
+        tried = gains(*rule_of_poles(bandwidth, fast, 4))
+        return max(robot.rate(tried, wrong) for wrong in robot.corners(error))
+
+    fast = choose_fast_pole(
+        robot, lambda f: gains(*rule_of_poles(bandwidth, f, 4)), [bandwidth], error
+    )
+    assert bandwidth < fast < 450.0
+    assert worst(fast) <= -0.5 * bandwidth < worst(0.8 * fast)
+
+
+def test_rule_of_poles():
+    assert rule_of_poles(60.0, 250.0, 4) == [-60.0, -60.0, -250.0, -350.0]
+    assert rule_of_poles(60.0, 250.0, 3) == [-60.0, -60.0, -250.0]
+    assert rule_of_poles(60.0, 250.0, 2) == [-60.0, -60.0]
+    assert rule_of_poles(60.0, 250.0, 1) == [-60.0]
+
+
+def test_errors_in_words():
+    assert str(RobotError(mass=0.95)) == "masses believed 5 % too low"
+    assert str(RobotError(stiffness=1.05)) == "joint stiffnesses believed 5 % too high"

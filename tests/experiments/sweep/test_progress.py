@@ -1,0 +1,43 @@
+"""Lines of progress where there is no terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from experiments.sweep.progress import SweepProgress, spoken_time
+
+
+def lines_of(total, done, statuses, terminal=False):
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=terminal, width=100)
+    with SweepProgress(console, "arm", total, done) as progress:
+        progress.processes(2)
+        for status in statuses:
+            progress.advance(status)
+        progress.processes(0)
+        progress.processes(0)
+    return text.getvalue().splitlines()
+
+
+def test_ten_lines_with_what_went_wrong():
+    *lines, waiting = lines_of(100, 40, ["completed"] * 58 + ["fault", "died"])
+    assert lines[0] == "arm: 40 of 100 runs, starting"
+    assert [line.split(",")[0] for line in lines[1:]] == [
+        f"arm: {done} of 100 runs" for done in (50, 60, 70, 80, 90, 100)
+    ]
+    assert all(line.endswith(" left") for line in lines[1:-1])
+    assert lines[-1] == "arm: 100 of 100 runs, 1 died, 1 fault"
+    assert waiting == "arm: no worker is left; waiting for one"
+
+
+def test_a_bar_on_a_terminal():
+    assert "2 of 3 runs, 1 fault" in "".join(lines_of(3, 0, ["completed", "fault"], True))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "spoken"),
+    [(0.4, "0 s"), (59.0, "59 s"), (61.0, "1 min 1 s"), (4800.0, "1 h 20 min"), (2e5, "2 d 7 h")],
+)
+def test_times(seconds, spoken):
+    assert spoken_time(seconds) == spoken
