@@ -10,6 +10,7 @@ from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, Multipl
 from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions
 from experiments.catalog.scenario_catalog import find_scenario
+from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
@@ -138,8 +139,7 @@ def test_what_controls_is_made_of_the_belief(load_scenario, tmp_path, name, law)
 
 def _heavier(model, folder):
     """Write a model like a shipped one with heavier links, and return its file."""
-    from pfsc_drake.control.law.safe_stop import SafeStop
-from pfsc_drake.robot.models.parameters import load_parameters
+    from pfsc_drake.robot.models.parameters import load_parameters
     from pfsc_drake.robot.models.writer import write_sdf
 
     robot = load_parameters("comau_racer_1_4")
