@@ -1,6 +1,7 @@
 """The law that makes a robot follow a manifold, as a Drake system."""
 
 import itertools
+import math
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -229,7 +230,8 @@ class FollowingController(LeafSystem):
             seen = self._watched.Eval(context)[0]
             if seen:
                 return float(seen)
-            if memory[self._saturated].max() >= self._supervision.saturated_ticks:
+            ticks = self._supervision.saturated_ticks
+            if ticks < math.inf and memory[self._saturated].max() >= ticks:
                 return float(Fault.DRIVE_SATURATED)
         if self._alarms.HasValue(context):
             sensor, tared, compliance = self._alarms.Eval(context).tolist()
