@@ -61,7 +61,7 @@ def build_station(
     believed = part.belief.robot
     begin = cache(lambda: _start(scenario, task, part, workpiece))
     rest = cache(lambda: _rest(task, part, *begin()))
-    law = make_law(scenario.controller, believed, task.manifold, rest)
+    law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     friction = believed_friction(part, scenario, folder)
@@ -81,7 +81,9 @@ def build_station(
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     signals |= add_drives(builder, part, scenario, signals | drive, initial_state)
-    signals |= add_friction(builder, part, true_state, scenario, folder)
+    faults = [controller.GetOutputPort("fault")]
+    faults += [signals["servo_fault"]] if "servo_fault" in signals else []
+    signals |= add_friction(builder, part, true_state, scenario, folder, faults)
     signals |= states_to_log(scenario, true_state, joint_state)
     log = add_log(builder, signals, scenario.controller.sampling_time)
     diagram = builder.Build()

@@ -1,12 +1,12 @@
 """Why a station stopped, and where: from what its log knows of that instant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.signal_log import SignalLog
-from diagrams.wording import listed, posture_text
+from diagrams.wording import coordinate_text, listed, posture_text
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -50,6 +50,8 @@ class FaultScene:
         on_motors: Whether the law acts on the tool pose of the motors.
         now: The first instant with the fault.
         before: The last one without, if there is any.
+        suspects: Which components of the measured state are implausible, nonzero if so, shape
+            (4N,); empty if that is not known.
     """
 
     law: FollowingLaw
@@ -58,6 +60,7 @@ class FaultScene:
     on_motors: bool
     now: Instant
     before: Instant | None
+    suspects: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def first_instant(
@@ -99,15 +102,21 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.PROJECTION_FAILED: _projection_failed,
         Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: _outside,
         Fault.SINGULAR: _singular,
+        Fault.MEASUREMENT_IMPLAUSIBLE: _implausible,
+        Fault.JOINT_LIMIT: _joint_limit,
+        Fault.DRIVE_SATURATED: _saturated,
+        Fault.ORIENTATION_ERROR: _turned_away,
     }
-    return descriptions[fault](scene)
+    if fault in descriptions:
+        return descriptions[fault](scene)
+    return f"{fault.explanation} {_place(scene)}"
 
 
 def _not_finite(scene: FaultScene) -> str:
     """Name the signals, those first that others follow from."""
     n, signals = scene.robot.dimension, scene.now.signals
     wrong = np.flatnonzero(~np.isfinite(scene.now.measured_state))
-    names = [f"{_STATE[i // n]}_{i % n + 1}" for i in wrong]
+    names = _component_names(wrong, n)
     if names:
         return f"a measured value is not a finite number: {listed(names)} {_place(scene)}"
     known = {
@@ -122,6 +131,38 @@ def _not_finite(scene: FaultScene) -> str:
     ]
     what = f": {found[0]}" if found else ""
     return f"{Fault.INPUT_NOT_FINITE.explanation}{what} {_place(scene)}"
+
+
+def _component_names(components: np.ndarray, num_joints: int) -> list[str]:
+    """Return what components of the joint state are called, ``q_J_1`` and so on."""
+    return [f"{_STATE[i // num_joints]}_{i % num_joints + 1}" for i in components]
+
+
+def _implausible(scene: FaultScene) -> str:
+    names = _component_names(np.flatnonzero(scene.suspects), scene.robot.dimension)
+    what = f": {listed(names)}" if names else ""
+    return f"{Fault.MEASUREMENT_IMPLAUSIBLE.explanation}{what} {_place(scene)}"
+
+
+def _joint_limit(scene: FaultScene) -> str:
+    robot = scene.robot
+    q, limits = scene.now.measured_state[: robot.dimension], robot.gather("position_limits")
+    beyond = np.maximum(limits[:, 0] - q, q - limits[:, 1])
+    i = int(np.argmax(np.where(np.isfinite(beyond), beyond, -np.inf)))
+    limit = limits[i, int(q[i] > limits[i].mean())]
+    text = coordinate_text(float(limit), revolute=bool(robot.gather("is_revolute")[i]))
+    return f"joint {i + 1} '{robot.names[i]}' is at its limit of {text} {_place(scene)}"
+
+
+def _saturated(scene: FaultScene) -> str:
+    before = scene.before or scene.now
+    drive = np.abs(before.signals["law"][scene.law.layout.drive])
+    axes = map(str, np.flatnonzero(drive >= scene.law.limits * (1.0 - 1e-9)) + 1)
+    return f"{Fault.DRIVE_SATURATED.explanation}: {listed(axes)} {_place(scene)}"
+
+
+def _turned_away(scene: FaultScene) -> str:
+    return f"{Fault.ORIENTATION_ERROR.explanation} {_place(scene)}: {_map_state(scene)}"
 
 
 def _projection_failed(scene: FaultScene) -> str:

@@ -19,6 +19,23 @@ from pfsc_drake.systems.control.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 
+_SERVO = "velocity_servo"
+# logged signals of faults, by system
+_FAULT_SIGNALS = {_SERVO: "servo_fault"}
+
+
+@dataclass(frozen=True)
+class FoundFault:
+    """Why a station stopped.
+
+    Attributes:
+        sentence: What, and where.
+        time: Since when [s].
+    """
+
+    sentence: str
+    time: float
+
 
 @dataclass
 class Station:
@@ -104,27 +121,46 @@ class Station:
         Args:
             root: Context of the diagram.
         """
+        found = self.found_fault(root)
+        return None if found is None else found.sentence
+
+    def found_fault(self, root: Context) -> FoundFault | None:
+        """Return why a system of the station is in its safe state, and since when, if one is.
+
+        The controller, which is told of the others' faults, comes first.
+
+        Args:
+            root: Context of the diagram.
+        """
         for name, system in self._can_fail.items():
             fault = system.fault(system.GetMyContextFromRoot(root))
             if fault is Fault.NONE:
                 continue
             if system is self.controller:
                 return self._describe(fault, root, "law", self.law.layout.status.start)
-            return f"{name}: {self._describe(fault, root, 'servo_fault', 0)}"
+            signal = _FAULT_SIGNALS.get(name)
+            if signal is None:
+                return FoundFault(f"{name}: {fault.explanation}", root.get_time())
+            found = self._describe(fault, root, signal, 0)
+            return FoundFault(f"{name}: {found.sentence}", found.time)
         return None
 
     @cached_property
     def _can_fail(self) -> dict[str, FailingSystem]:
         """The systems with a safe state, by name; to look for them takes longer than to ask."""
         systems = {system.get_name(): system for system in self.diagram.GetSystems()}
-        return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
+        found = {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
+        return dict(sorted(found.items(), key=lambda item: item[1] is not self.controller))
 
-    def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> str:
-        """Return a sentence on a fault that is logged in a column of a signal."""
+    def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> FoundFault:
+        """Return what there is to say of a fault that is logged in a column of a signal."""
         now, before = first_instant(self.log, root, signal, column)
         place = self.task.place
-        scene = FaultScene(self.law, self.part.belief.robot, place, self.on_motors, now, before)
-        return describe(fault, scene)
+        system = self.controller if signal == "law" else self.diagram.GetSubsystemByName(_SERVO)
+        suspects = system.suspects(system.GetMyContextFromRoot(root))
+        robot = self.part.belief.robot
+        scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
+        return FoundFault(describe(fault, scene), now.time)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
         """Return what else is worth a look in a run, by name, if anything is.

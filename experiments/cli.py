@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 WRONG_INPUT = 2
 FAULT = 3
 NOT_WRITTEN = 4
+_LONGEST_AFTER_FAULT = 100.0  # s
 
 app = typer.Typer(
     add_completion=False,
@@ -86,6 +87,12 @@ def run_command(
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Record the motion.")
     ] = True,
+    after_fault: Annotated[
+        str,
+        typer.Option(
+            metavar="SECONDS", help="Go on for that long after a fault, to see how it ends."
+        ),
+    ] = "0",
     margins: Annotated[
         bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
     ] = False,
@@ -95,6 +102,7 @@ def run_command(
     from experiments.run import run_scenario
 
     seconds = None if duration is None else _read_duration(duration)
+    further = _read_after_fault(after_fault)
     with _interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / loaded.name
@@ -108,6 +116,7 @@ def run_command(
                 figures=figures,
                 recording=recording,
                 progress=progress,
+                after_fault=further,
                 margins=margins,
             )
         _print_outcome(console, outcome)
@@ -312,6 +321,16 @@ def _read_duration(text: str) -> float:
     seconds = float(text) if is_number(text) else math.nan
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
+    return seconds
+
+
+def _read_after_fault(text: str) -> float:
+    """The value of ``--after-fault`` in s."""
+    seconds = float(text) if is_number(text) else math.nan
+    if not 0.0 <= seconds <= _LONGEST_AFTER_FAULT:
+        raise InputError(
+            f"--after-fault {shortened(text)}: allowed: 0 to {_LONGEST_AFTER_FAULT:g} seconds"
+        )
     return seconds
 
 

@@ -91,6 +91,7 @@ def run_scenario(
     recording: bool,
     progress: ProgressListener,
     margins: bool = False,
+    after_fault: float = 0.0,
 ) -> RunOutcome:
     """Run a scenario and write everything that a run leaves into a folder.
 
@@ -102,6 +103,7 @@ def run_scenario(
         recording: Whether to record the motion.
         progress: Told how far the run is.
         margins: Whether to tell the margins of the loop at the start.
+        after_fault: How long to go on after a fault [s], so that one sees how it ends.
 
     Raises:
         InputError: If the scenario is wrong or the folder cannot be used; nothing has moved then.
@@ -113,7 +115,9 @@ def run_scenario(
     analysis = _analyse(prepared, scenario.path.parent, progress) if margins else None
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
-        measured = _measure(prepared, scenario.name, results, progress, interrupted, analysis)
+        measured = _measure(
+            prepared, scenario.name, results, progress, interrupted, analysis, after_fault
+        )
         page = None
         if recording and len(measured.motion.times) > 1 and not interrupted():
             progress(measured.end, "recording")
@@ -159,12 +163,15 @@ def _measure(
     progress: ProgressListener,
     interrupted: Callable[[], bool],
     analysis: MarginAnalysis | None,
+    after_fault: float,
 ) -> _Measured:
     """Simulate, and write the log and the metrics."""
     settings, station = prepared.settings, prepared.station
     progress.expect(settings.duration)
     with _steady_clock():
-        result = simulate(station, settings.simulation, settings.duration, progress, interrupted)
+        result = simulate(
+            station, settings.simulation, settings.duration, progress, interrupted, after_fault
+        )
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
         log.attributes = standard_attributes(name) | {
@@ -175,6 +182,8 @@ def _measure(
             log.attributes["margins"] = one_line(analysis)
         if result.fault is not None:
             log.attributes["fault"] = result.fault
+            if result.fault_time is not None:
+                log.attributes["fault_time"] = f"{result.fault_time:.6f}"
         if interrupted():
             log.attributes["interrupted"] = f"at t = {end:.3f} s"
         results.write("log.h5", log.to_hdf5())
@@ -200,8 +209,19 @@ def _measure(
         if metric in metrics:
             metrics.set_target(metric, target.bound, target.source)
     results.write("metrics.json", metrics.to_json())
-    warnings = [*prepared.warnings, *limits.warnings(log)]
+    warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
     return _Measured(log, motion, metrics, warnings, result.fault, end)
+
+
+def _sensor_warnings(log: RunLog) -> list[str]:
+    """Return what there is to say about a force sensor that was never of use."""
+    if "tared" not in log or log["tared"].values.any() or not log.time.size:
+        return []
+    return [
+        "the force/torque sensor was never tared: what should yield has rested, and no metric of "
+        "compliance counts; its residual did not rest within sensor.taring_spread for "
+        "sensor.taring_time, or its mean was above sensor.taring_bias"
+    ]
 
 
 def _report(

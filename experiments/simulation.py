@@ -23,11 +23,13 @@ class SimulationResult:
         root: Context of the diagram at the end.
         real_time_factor: Simulated over wall clock time.
         fault: Why it was stopped early, or None.
+        fault_time: When that was found [s], or None.
     """
 
     root: Context
     real_time_factor: float
     fault: str | None
+    fault_time: float | None = None
 
 
 def simulate(
@@ -36,8 +38,9 @@ def simulate(
     duration: float,
     progress: ProgressListener,
     interrupted: Callable[[], bool] = lambda: False,
+    after_fault: float = 0.0,
 ) -> SimulationResult:
-    """Simulate until the end, until a controller is in its safe state, or an interruption.
+    """Simulate until the end, until some time after a fault, or an interruption.
 
     Args:
         station: What to simulate.
@@ -45,6 +48,8 @@ def simulate(
         duration: Simulated time [s].
         progress: Told how far the run is.
         interrupted: Whether to stop as soon as the step that is being made is complete.
+        after_fault: How long to go on with a system in its safe state [s]; then the run may
+            be longer than its duration.
     """
     simulator = Simulator(station.diagram)
     configure(simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
@@ -53,8 +58,8 @@ def simulate(
     simulator.Initialize()
     period = station.controller.period
     last_tick, stride = int(duration / period + 1e-6), max(1, round(_CHUNK / period))
-    wall, tick, fault = 0.0, 0, None
-    while root.get_time() < duration and fault is None and not interrupted():
+    wall, tick, fault, fault_time = 0.0, 0, None, None
+    while root.get_time() < duration and not interrupted():
         tick += stride
         # ticks are products as in Drake's own schedule, so that rounding loses no last sample
         goal = tick * period if tick < last_tick else max(duration, last_tick * period)
@@ -62,11 +67,15 @@ def simulate(
         try:
             simulator.AdvanceTo(goal)
         except RuntimeError as error:
-            fault = f"simulation failed: {' '.join(str(error).split())}"
+            fault = station.fault(root) or f"simulation failed: {' '.join(str(error).split())}"
+            duration = root.get_time()
         wall += time.perf_counter() - begin
         progress(root.get_time(), "simulating")
-        fault = station.fault(root) or fault
-    return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault)
+        if fault is None and (found := station.found_fault(root)):
+            fault, fault_time = found.sentence, found.time
+            duration = root.get_time() + after_fault
+            last_tick = int(duration / period + 1e-6)
+    return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault, fault_time)
 
 
 def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: float = 0.0) -> None:

@@ -1,22 +1,25 @@
 """What is between the law's output and the plant's joints: hold, servo, bus, friction."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import MatrixGain, ZeroOrderHold
+from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer, ZeroOrderHold
 
 from diagrams.robots.part import Drives, RobotPart
-from diagrams.scenario import JointFrictionParameters, Scenario
+from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
+from diagrams.tasks.law import safe_state, supervision
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.physics.bus_delay import add_bus_delay
+from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
 
@@ -76,12 +79,23 @@ def _add_servo(
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
     effort = chain.gather("effort_limit") * scenario.controller.effort_scale
+    watched = replace(supervision(scenario, chain), joint_limits=False)
     system = builder.AddNamedSystem(
-        "velocity_servo", VelocityServo(chain, VelocityServoLaw(gains, effort))
+        "velocity_servo",
+        VelocityServo(
+            chain,
+            VelocityServoLaw(gains, effort),
+            safe_state(scenario.controller, chain, scenario.faults),
+            watched,
+            servo.watchdog or np.inf,
+        ),
     )
     velocity = ports["drive"]
     if servo.bus_delay > 0.0:
-        bus = add_bus_delay(builder, velocity, servo.bus_delay, tick)
+        bus = add_bus_delay(
+            builder, velocity, servo.bus_delay, tick, lost=(servo.lost.begin, servo.lost.end)
+        )
+        builder.Connect(bus.GetOutputPort("silence"), system.GetInputPort("silence"))
         velocity = bus.GetOutputPort("delivered")
     elif ratio > 1:
         # the law must not be evaluated between its own ticks
@@ -99,8 +113,9 @@ def add_friction(
     joint_state: OutputPort,
     scenario: Scenario,
     folder: FilePath,
+    faults: Sequence[OutputPort] = (),
 ) -> dict[str, OutputPort]:
-    """Add the scenario's friction, and return its signal for the log.
+    """Add the scenario's friction and brakes, and return the friction's signal for the log.
 
     Args:
         builder: Builder of the diagram.
@@ -108,6 +123,7 @@ def add_friction(
         joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
         scenario: The scenario.
         folder: Where relative file names start.
+        faults: Nonzero after a fault, for the brakes.
 
     Returns:
         ``friction_torque``, positive against positive velocities [Nm or N], shape (N,).
@@ -115,26 +131,75 @@ def add_friction(
     Raises:
         InputError: If the friction does not suit the robot or the integration.
     """
-    drives, n = part.drives, part.robot.dimension
+    drives, n, brakes = part.drives, part.robot.dimension, scenario.faults.brakes
     coefficients = _coefficients(scenario, part, folder)
-    if coefficients is None:
+    if coefficients is None and brakes is None:
         return {}
     if not np.all(drives.inertia > 0.0):
         names = zip(part.robot.names, drives.inertia, strict=True)
         without = ", ".join(name for name, inertia in names if not inertia > 0.0)
         raise InputError(
-            f"friction: needs a robot with rotor inertia in every drive, not so {without}: "
+            f"{'faults.brakes' if coefficients is None else 'friction'}: needs a robot with "
+            f"rotor inertia in every drive, not so {without}: "
             "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
         )
-    bristles = _bristles(scenario, *coefficients, drives)
-    friction = builder.AddNamedSystem(
-        "joint_friction", JointFriction(bristles, scenario.friction.drift)
-    )
     velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
     builder.Connect(joint_state, velocity.get_input_port())
-    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
-    part.connect_resistance(builder, friction.GetOutputPort("resistance"))
-    return {"friction_torque": friction.GetOutputPort("friction_torque")}
+    resistances, signals = [], {}
+    if coefficients is not None:
+        bristles = _bristles(scenario, *coefficients, drives)
+        friction = builder.AddNamedSystem(
+            "joint_friction", JointFriction(bristles, scenario.friction.drift)
+        )
+        builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+        resistances.append(friction.GetOutputPort("resistance"))
+        signals["friction_torque"] = friction.GetOutputPort("friction_torque")
+    if brakes is not None:
+        holding = _add_brakes(builder, part, scenario, brakes, faults)
+        builder.Connect(velocity.get_output_port(), holding.GetInputPort("velocity"))
+        resistances.append(holding.GetOutputPort("resistance"))
+    part.connect_resistance(builder, _sum(builder, resistances))
+    return signals
+
+
+def _sum(builder: DiagramBuilder, ports: list[OutputPort]) -> OutputPort:
+    """Return the sum of one or more ports."""
+    if len(ports) == 1:
+        return ports[0]
+    adder = builder.AddNamedSystem("all_resistances", Adder(len(ports), ports[0].size()))
+    for i, port in enumerate(ports):
+        builder.Connect(port, adder.get_input_port(i))
+    return adder.get_output_port()
+
+
+def _add_brakes(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    scenario: Scenario,
+    parameters: BrakeParameters,
+    faults: Sequence[OutputPort],
+) -> HoldingBrakes:
+    """Add holding brakes that close after a fault.
+
+    Raises:
+        InputError: If they do not suit the robot or the integration.
+    """
+    n, given = part.robot.dimension, np.array(parameters.torque, dtype=float)
+    if given.size not in (0, 1, n):
+        raise InputError(f"faults.brakes.torque: {given.size} values; the robot has {n} joints")
+    torque = np.broadcast_to(given, n) if given.size else part.robot.gather("effort_limit")
+    if not np.isfinite(torque).all():
+        raise InputError("faults.brakes.torque: the robot's drives have no limit; give numbers")
+    bristles = _bristles(scenario, np.array(torque), np.zeros(n), part.drives)
+    sizes, period = [port.size() for port in faults], scenario.controller.sampling_time
+    brakes = builder.AddNamedSystem(
+        "holding_brakes", HoldingBrakes(bristles, sum(sizes), parameters.delay, period)
+    )
+    together = builder.AddNamedSystem("all_faults", Multiplexer(sizes))
+    for i, port in enumerate(faults):
+        builder.Connect(port, together.get_input_port(i))
+    builder.Connect(together.get_output_port(), brakes.GetInputPort("fault"))
+    return brakes
 
 
 def believed_friction(

@@ -36,8 +36,12 @@ def add_joint_state(
         raise InputError(
             f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
         )
+    indices, period = [failure.component], scenario.controller.sampling_time
+    if failure.whole_joint:
+        indices = list(range(failure.component % robot.dimension, size, robot.dimension))
     broken = builder.AddNamedSystem(
-        "sensor_failure", SensorFailure(size, failure.component, failure.time)
+        "sensor_failure",
+        SensorFailure(size, indices, failure.time, period, failure.kind, failure.size),
     )
     builder.Connect(measured, broken.GetInputPort("measured"))
     return broken.GetOutputPort("delivered")
@@ -46,16 +50,16 @@ def add_joint_state(
 def states_to_log(
     scenario: Scenario, joint_state: OutputPort, measured: OutputPort
 ) -> dict[str, OutputPort]:
-    """Return ``joint_state`` for the log, and ``joint_state_measured`` with imperfect encoders.
+    """Return ``joint_state`` for the log, and ``joint_state_measured`` where it is not the truth.
 
-    Without, what is measured is the truth, until a sensor fails.
+    That is with imperfect encoders, and where a sensor is to fail.
 
     Args:
         scenario: The scenario.
         joint_state: The true one.
         measured: What the law gets, see :func:`add_joint_state`.
     """
-    if scenario.encoders == EncoderOptions():
+    if scenario.encoders == EncoderOptions() and scenario.simulation.sensor_failure.time < 0.0:
         return {"joint_state": measured}
     return {"joint_state": joint_state, "joint_state_measured": measured}
 

@@ -5,8 +5,10 @@ from pydrake.systems.primitives import Demultiplexer
 
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
+from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
+from pfsc_drake.systems.physics.sensor_failure import SensorFailure
 
 
 def add_sensor(
@@ -47,11 +49,32 @@ def add_sensor(
         ),
     )
     reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
+    reading = _fail(builder, reading, scenario)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     whole = compensation.GetOutputPort("compensation")
     parts = _split(builder, "sensor_signals", whole, [6, 1, 1])
     return dict(zip(("wrench_measured", "tared", "sensor_fault"), parts, strict=True))
+
+
+def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> OutputPort:
+    """Return what is left of the sensor's reading if it is to fail on the way."""
+    failure, period = scenario.simulation.force_sensor_failure, scenario.controller.sampling_time
+    if failure.time < 0.0:
+        return reading
+    size = reading.size()
+    if not 0 <= failure.component < size:
+        raise InputError(
+            f"simulation.force_sensor_failure.component: {failure.component}; allowed: 0 to "
+            f"{size - 1}"
+        )
+    indices = list(range(size)) if failure.whole_joint else [failure.component]
+    broken = builder.AddNamedSystem(
+        "force_sensor_failure",
+        SensorFailure(size, indices, failure.time, period, failure.kind, failure.size),
+    )
+    builder.Connect(reading, broken.GetInputPort("measured"))
+    return broken.GetOutputPort("delivered")
 
 
 def _split(

@@ -3,6 +3,7 @@
 from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.controller import ControllerParameters, GainParameters, LawGains
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
+from diagrams.scenario.faults import BrakeParameters, FaultParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -24,10 +25,12 @@ from pfsc_drake.systems.physics.joint_encoders import EncoderOptions
 
 __all__ = [
     "BentLemniscate",
+    "BrakeParameters",
     "Circle",
     "ComplianceParameters",
     "ControllerParameters",
     "EncoderOptions",
+    "FaultParameters",
     "ForcePulse",
     "GainParameters",
     "HandParameters",

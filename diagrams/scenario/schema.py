@@ -13,6 +13,7 @@ from diagrams.scenario.checks import (
 from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.controller import ControllerParameters
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
+from diagrams.scenario.faults import FaultParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -65,6 +66,7 @@ class Scenario:
         encoders: What the encoders do to the joint state.
         compliance: How the tool yields to measured forces.
         sensor: The force/torque sensor that measures them.
+        faults: What is a fault, and how it ends.
         notch: Workpiece with a notch along the path, and a ball on the tool that runs in it; it
             starts in the middle of the notch, ``start.offset`` beside. None without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
@@ -91,6 +93,7 @@ class Scenario:
     encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)
     compliance: ComplianceParameters = dc.field(default_factory=ComplianceParameters)
     sensor: SensorParameters = dc.field(default_factory=SensorParameters)
+    faults: FaultParameters = dc.field(default_factory=FaultParameters)
     notch: NotchParameters | None = None
     duration: float = 0.0
     settling_tolerance: float = 1e-4

@@ -2,12 +2,14 @@
 
 import dataclasses as dc
 
+import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes
 
 from diagrams.scenario.checks import (
     require,
     require_between,
 )
+from pfsc_drake.systems.physics.sensor_failure import KINDS
 
 # the integrator that is chosen for a robot before it runs
 AUTO = "auto"
@@ -15,15 +17,27 @@ AUTO = "auto"
 
 @dc.dataclass
 class SensorFailureParameters:
-    """A component of the measured joint state that becomes NaN.
+    """A component of the measured joint state that fails.
 
     Attributes:
         time: When [s]; negative for never.
         component: Index in ``[q_J, v_J, q_M, v_M]``.
+        kind: ``nan``: it is no number any more; ``frozen``: it rests at its last value;
+            ``jump``: it is off by ``size``.
+        size: Of the jump [rad, rad/s, m or m/s].
+        whole_joint: Whether everything fails that is measured of the component's joint, on
+            both sides.
     """
 
     time: float = -1.0
     component: int = 0
+    kind: str = "nan"
+    size: float = 0.0
+    whole_joint: bool = False
+
+    def __post_init__(self) -> None:
+        require(self.kind in KINDS, "kind", self.kind, ", ".join(KINDS))
+        require(bool(np.isfinite(self.size)), "size", self.size, "a finite number")
 
 
 @dc.dataclass
@@ -38,6 +52,8 @@ class SimulationParameters:
         accuracy: Accuracy of error control, 1e-10 to 0.1; 0 for fixed steps.
         frame_period: Time between the frames of the recording, 1e-3 to 1e3 [s].
         sensor_failure: A sensor that fails on the way.
+        force_sensor_failure: The same for the force/torque sensor; ``component`` is an index in
+            ``[force, torque]``, of which ``whole_joint`` takes all.
     """
 
     integrator: str = AUTO
@@ -45,6 +61,9 @@ class SimulationParameters:
     accuracy: float = 0.0
     frame_period: float = 0.032
     sensor_failure: SensorFailureParameters = dc.field(default_factory=SensorFailureParameters)
+    force_sensor_failure: SensorFailureParameters = dc.field(
+        default_factory=SensorFailureParameters
+    )
 
     def __post_init__(self) -> None:
         schemes = [AUTO, *GetIntegrationSchemes()]

@@ -38,6 +38,7 @@ def add_compliance(
     scenario: Scenario,
     linearization: Linearization,
     ports: dict[str, OutputPort],
+    lap: float | None = None,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
@@ -48,9 +49,11 @@ def add_compliance(
         ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
             ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
             derivatives up to :func:`reference_order`.
+        lap: Length of the path [m] if it is closed.
 
     Returns:
-        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``.
+        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``;
+        ``compliance_status``, an :class:`ImpedanceStatus`.
 
     Raises:
         InputError: If the compliance does not suit the law.
@@ -62,6 +65,7 @@ def add_compliance(
         linearization.relative_degree,
         period,
         desired_order=reference_order(scenario, linearization),
+        lap=lap,
     )
     impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
     transform = builder.AddNamedSystem(
@@ -86,4 +90,5 @@ def add_compliance(
         "reference": reference,
         "desired_reference": desired,
         "manifold_force": force,
+        "compliance_status": impedance.GetOutputPort("status"),
     }

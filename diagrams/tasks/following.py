@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.friction import Coefficients, add_friction_compensation
+from diagrams.tasks.law import supervision
 from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -118,7 +120,10 @@ def add_law(
     """
     scenario, law, signals = following.scenario, following.law, place.signals | forces
     controller = builder.AddNamedSystem(
-        "following_controller", FollowingController(law, scenario.controller.sampling_time)
+        "following_controller",
+        FollowingController(
+            law, scenario.controller.sampling_time, supervision(scenario, following.robot)
+        ),
     )
     desired = _add_smooth_start(builder, following, controller, place.desired_reference)
     made = {"reference": desired, "law": controller.GetOutputPort("law")}
@@ -136,7 +141,10 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        made |= add_compliance(builder, scenario, law.linearization, inputs)
+        path = following.task.path
+        lap = path.length if path.closed else None
+        made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
+    _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))
@@ -169,3 +177,21 @@ def _add_smooth_start(
         controller.GetOutputPort("manifold_state"), start.GetInputPort("manifold_state")
     )
     return start.GetOutputPort("reference")
+
+
+def _connect_alarms(
+    builder: DiagramBuilder,
+    controller: FollowingController,
+    forces: dict[str, OutputPort],
+    compliance_status: OutputPort | None,
+) -> None:
+    """Let the robot stop for faults of the force sensor and of the compliance, if there are any."""
+    ports = [forces.get("sensor_fault"), forces.get("tared"), compliance_status]
+    if ports == [None] * 3:
+        return
+    alarms = builder.AddNamedSystem("alarms", Multiplexer([1, 1, 1]))
+    for i, port in enumerate(ports):
+        if port is None:
+            port = builder.AddSystem(ConstantVectorSource([0.0])).get_output_port()
+        builder.Connect(port, alarms.get_input_port(i))
+    builder.Connect(alarms.get_output_port(), controller.GetInputPort("alarms"))

@@ -6,22 +6,27 @@ import numpy as np
 
 from diagrams.scenario import (
     ControllerParameters,
+    FaultParameters,
+    Scenario,
 )
 from diagrams.tasks.gains import choose_poles, gains_of
 from pfsc_drake.control.law.decoupling import DecouplingInverse
-from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
     ActuationOptions,
     linearize,
 )
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import (
     Stabilization,
 )
+from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.physics.joint_encoders import encoder_resolution
 
 
 def make_law(
@@ -29,6 +34,7 @@ def make_law(
     robot: RobotModel,
     manifold: Manifold,
     rest: Callable[[], RestPosture] | None = None,
+    faults: FaultParameters | None = None,
 ) -> FollowingLaw:
     """Return the law that makes a robot follow a manifold.
 
@@ -37,6 +43,7 @@ def make_law(
         robot: The robot.
         manifold: What to follow.
         rest: Tells where the robot starts at rest; needed to choose poles.
+        faults: What happens after a fault.
 
     Raises:
         InputError: If the law does not suit the robot, or its gains are missing or wrong.
@@ -69,6 +76,42 @@ def make_law(
         DecouplingInverse(parameters.min_rcond),
         limits,
         parameters.max_alpha,
-        SafeState(parameters.brake_damping * effort),
+        safe_state(parameters, robot, faults or FaultParameters()),
         tells_reference_velocity=parameters.friction.needs_reference_velocity,
+    )
+
+
+def safe_state(
+    parameters: ControllerParameters, robot: RobotModel, faults: FaultParameters
+) -> SafeState:
+    """Return how a robot is stopped and held after a fault.
+
+    Args:
+        parameters: Of the controller.
+        robot: The robot as it is believed.
+        faults: What the scenario says of faults.
+    """
+    effort = robot.gather("effort_limit") * parameters.effort_scale
+    damping = parameters.brake_damping * np.where(np.isfinite(effort), effort, 0.0)
+    return SafeState(damping, faults.hold_bandwidth, faults.effort_share)
+
+
+def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
+    """Return what is watched of a scenario's joints.
+
+    Args:
+        scenario: The scenario.
+        robot: The robot as it is believed.
+
+    Raises:
+        InputError: If the encoders do not suit the robot.
+    """
+    faults, encoders = scenario.faults, scenario.encoders
+    late = scenario.controller.sampling_time if encoders.difference_quotient else 0.0
+    return SupervisionParameters(
+        tolerance=faults.plausibility,
+        resolution=np.maximum(*encoder_resolution(robot, encoders)),
+        filter_time=encoders.filter_time + late,
+        joint_limits=faults.joint_limits,
+        saturation_time=faults.saturation_time,
     )

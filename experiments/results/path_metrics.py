@@ -214,6 +214,9 @@ def path_following_metrics(
     if "xi_d" in log:
         off = np.linalg.norm(log["xi"].values - log["xi_p"].values, axis=1)
         largest = _max(off[log.time >= converged_after])
+        # what rests because its sensor was never tared does not yield
+        if "tared" in log and not log["tared"].values.any():
+            largest = math.nan
         metrics.add("max_error_from_compliant_reference", largest, "m")
     if "xi_M" in log:
         distance = np.linalg.norm(log["xi_M"].values, axis=1)[log.time >= converged_after]

@@ -26,7 +26,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     """
     drive = station.controller.GetOutputPort(station.controller.drive_port)
     sensor = _sensor(station, root)
-    controller = station.controller.GetMyContextFromRoot(root)
+    controller = station.controller.GetMyMutableContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
     states = np.hstack([log[name].values for name in names])
@@ -39,6 +39,8 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
         root.SetTime(log.time[k])
         station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
         station.place_robot(root, x)
+        # the controller compares what it measures with what it measured before
+        station.controller.set_last_state(controller, states[k - 1])
         sensor()  # what the plant needs to know its forces is not the controller's time
         begin = time.perf_counter()
         drive.Eval(controller)

@@ -143,18 +143,6 @@ class VelocityServoLaw:
             )
         self.limits = limits
 
-    def safe_torque(self, v: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        """Return the drive torque that holds the links and brakes, shape (N,) [Nm].
-
-        ``sat(g - K_p v_M)``: the law for reference zero, without its integral part.
-
-        Args:
-            v: Velocity of the motors [rad/s], shape (N,); what is not finite does not brake.
-            gravity: ``g(q_J)`` [Nm] where the joints were last seen, shape (N,).
-        """
-        braking = self.gains.proportional * np.where(np.isfinite(v), v, 0.0)
-        return np.clip(gravity - braking, -self.limits, self.limits)
-
     def torque(
         self, v: np.ndarray, v_ref: np.ndarray, load: np.ndarray, x: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

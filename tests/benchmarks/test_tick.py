@@ -16,9 +16,10 @@ from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, l
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.following_law import FollowingLaw, SafeState
+from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (

@@ -164,6 +164,11 @@ def test_what_is_known_without_a_run(six_axes):
     wrong = sentence(Fault.INPUT_NOT_FINITE, reference=np.full(18, np.inf))
     assert "reference at eta" in wrong
     assert sentence(Fault.INPUT_NOT_FINITE).startswith(Fault.INPUT_NOT_FINITE.explanation)
+    for fault in (Fault.FORCE_SENSOR_LOST, Fault.COMPLIANCE_INVALID, Fault.BUS_LOST):
+        assert sentence(fault) == f"{fault.explanation} at eta = 0.026 m, t = 0.500 s"
+    turned = sentence(Fault.ORIENTATION_ERROR)
+    assert turned.startswith(f"{Fault.ORIENTATION_ERROR.explanation} at eta = 0.026 m")
+    assert "phi_z = 0.0 deg" in turned or "phi_z = -0.0 deg" in turned
     point = now.signals["manifold_point"].copy()
     point[station.task.place.layout.eta] = np.nan
     lost = sentence(Fault.PROJECTION_FAILED, manifold_point=point)

@@ -22,6 +22,8 @@ from pfsc_drake.yaml.schema_check import REQUIRED
 MASS, DAMPING, STIFFNESS = range(3)
 # what a profile over the size of all transversal coordinates goes over
 _ACROSS = Kind.TRANSVERSAL.value
+# relative; what misses the length of a lap by less is a lap
+_ROUNDING = 1e-6
 
 
 class ImpedanceStatus(enum.IntFlag):
@@ -40,6 +42,9 @@ _OK = ImpedanceStatus.OK
 @dataclass
 class Profile:
     """A parameter: constant, or cubic, C^1, monotone between breakpoints, constant outside.
+
+    Over the arc length of a closed path it is periodic instead: cubic, C^1 and monotone from the
+    last breakpoint to the first of the next lap, too.
 
     Attributes:
         value: The constant, if there are no breakpoints.
@@ -65,17 +70,32 @@ class Profile:
         if not all(math.isfinite(v) and v >= 0.0 for v in self.values):
             raise InputError(f"values: {self.values}; must be finite, none negative")
 
-    def interpolant(self) -> Callable[[float], float]:
-        """Return the parameter as a function of what it goes over."""
+    def interpolant(self, lap: float | None = None) -> Callable[[float], float]:
+        """Return the parameter as a function of what it goes over.
+
+        Args:
+            lap: Period of what it goes over, if it has one.
+
+        Raises:
+            InputError: If the breakpoints do not fit into a period, or the values at its two
+                ends differ.
+        """
         if not self.at:
             constant = self.value
             return lambda _: constant
-        slopes = PchipInterpolator(self.at, self.values).derivative()(self.at)
-        slopes[[0, -1]] = 0.0
-        pieces = CubicHermiteSpline(self.at, self.values, slopes).c.T.tolist()
-        breakpoints, lowest = list(self.at), min(self.values)
+        at, values = np.array(self.at), np.array(self.values)
+        if lap is None:
+            slopes = PchipInterpolator(at, values).derivative()(at)
+            slopes[[0, -1]] = 0.0
+        else:
+            at, values, slopes = self._periodic(at, values, lap)
+        pieces = CubicHermiteSpline(at, values, slopes).c.T.tolist()
+        breakpoints, lowest = at.tolist(), min(self.values)
+        begin = breakpoints[0]
 
         def value(x: float) -> float:
+            if lap is not None:
+                x = begin + (x - begin) % lap
             x = min(max(x, breakpoints[0]), breakpoints[-1])
             i = min(bisect_right(breakpoints, x), len(pieces)) - 1
             a, b, c, d = pieces[i]
@@ -83,6 +103,29 @@ class Profile:
             return max(((a * x + b) * x + c) * x + d, lowest)
 
         return value
+
+    def _periodic(
+        self, at: np.ndarray, values: np.ndarray, lap: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return breakpoints, values and slopes over one period, both its ends included."""
+        span, rounding = float(at[-1] - at[0]), _ROUNDING * lap
+        if span > lap + rounding:
+            raise InputError(f"at: {self.at}; the closed path is {lap:.6g} m long")
+        if span >= lap - rounding:
+            if abs(values[-1] - values[0]) > _ROUNDING * max(values[0], values[-1]):
+                raise InputError(
+                    f"values: {self.values}; the last must be the first one, a lap of "
+                    f"{lap:.6g} m later"
+                )
+            at, values = at[:-1], values[:-1]
+        # the laps around tell the slopes at the seam
+        around = np.concatenate([at - lap, at, at + lap])
+        slopes = PchipInterpolator(around, np.tile(values, 3)).derivative()(at)
+        return (
+            np.append(at, at[0] + lap),
+            np.append(values, values[0]),
+            np.append(slopes, slopes[0]),
+        )
 
 
 @dataclass
@@ -162,6 +205,7 @@ class ImpedanceLaw:
             derivatives jump, by powers of d/m: fed with all of them, a loop of r = 4 with
             poles at -50 1/s errs by 8 times the static deflection of Tab. 3.2, with the
             default, 2, by 14 %.
+        lap: Length of a closed path [m], over which profiles over ``eta`` are periodic.
 
     Raises:
         InputError: If a number is out of range.
@@ -176,6 +220,7 @@ class ImpedanceLaw:
         *,
         desired_order: int | None = None,
         response_order: int = 2,
+        lap: float | None = None,
     ) -> None:
         m, least = len(coordinates), max(relative_degree, 2)
         self.desired_order = least if desired_order is None else desired_order
@@ -197,7 +242,12 @@ class ImpedanceLaw:
             part.__post_init__()
         self._check_profiles(used)
         table = [[kind.mass, kind.damping, kind.stiffness] for kind in used.values()]
-        self._profiles = [[(p.over, p.interpolant()) for p in row] for row in table]
+        round_trip = {
+            c.name: lap for c in coordinates if c.kind is Kind.TANGENTIAL and lap is not None
+        }
+        self._profiles = [
+            [(p.over, p.interpolant(round_trip.get(p.over))) for p in row] for row in table
+        ]
         self._row = [list(used).index(coordinate.kind) for coordinate in coordinates]
         self.is_constant = not any(p.at for row in table for p in row)
         self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], 0.0))

@@ -1,7 +1,6 @@
 """The following law as a function of measurement, manifold point and reference."""
 
 import math
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -10,13 +9,17 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.law.decoupling import DecouplingInverse, DecouplingSolution
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
-from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.robot.robot_model import RobotModel
 
 # attributes of an enumeration are looked up slowly
 _NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(ProjectionStatus.NOT_CONVERGED)
+# rad, of an error angle; from there on (3.38) is not defined
+_LARGEST_ANGLE = math.pi / 2.0
 
 
 class LawLayout:
@@ -46,23 +49,14 @@ class LawLayout:
         self.size: int = ends[-1]
 
 
-@dataclass(frozen=True)
-class SafeState:
-    """What the drives do after a fault: hold the links against gravity and brake.
-
-    ``tau_d = g_L(q) - damping v_M``; for velocity servos the reference is zero.
-
-    Attributes:
-        damping: Braking per drive [Nm s/rad], shape (N,).
-    """
-
-    damping: np.ndarray
-
-
 class FollowingLaw:
     """The law that makes one robot follow a manifold.
 
     For a path it is (3.29), (3.50), (3.58), (3.65) or (3.70), as the drives are.
+
+    Angles go on over full turns: from one tick to the next they are unwrapped, so that a
+    reference that turns on and on is followed. An error angle of 90 deg or more is a fault,
+    because (3.38) is not defined there.
 
     Evaluation writes into buffers that are made once; the object holds no state
     of the controlled system.
@@ -80,6 +74,8 @@ class FollowingLaw:
 
     Attributes:
         layout: Layout of the results.
+        robot: The robot.
+        safe_state: What the drives do after a fault.
 
     Raises:
         InputError: If dimensions do not match, or a limit is not positive.
@@ -113,19 +109,13 @@ class FollowingLaw:
                 f"gains of {coordinates} coordinates; "
                 f"the law has {linearization.num_outputs} outputs"
             )
-        damping = np.asarray(safe_state.damping)
-        if damping.shape != (n,) or not np.all((damping >= 0.0) & np.isfinite(damping)):
-            raise InputError(
-                f"safe state damping: {safe_state.damping}; must be {n} finite numbers, "
-                "none negative"
-            )
+        safe_state.check(n)
+        self.robot, self.safe_state = robot, safe_state
         self.linearization = linearization
         self.stabilization = stabilization
         self.limits = np.asarray(limits, dtype=float)
         self._inverse = inverse
         self._max_alpha = max_alpha
-        self._safe_state = safe_state
-        self._gravity = gravity_function(robot)
         self._tells_velocity = tells_reference_velocity
         self.layout = LawLayout(
             n,
@@ -156,6 +146,7 @@ class FollowingLaw:
         self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
         self._solution, self._rcond = arrays["solution"], arrays["rcond"]
         self._result, self._check = arrays["result"], arrays["check"]
+        self._last_output, self._angle = arrays["last_output"], arrays["angle"]
 
     def evaluate(
         self,
@@ -166,6 +157,7 @@ class FollowingLaw:
         last_held: np.ndarray | None = None,
         tau_ext: np.ndarray | None = None,
         friction: np.ndarray | None = None,
+        last_output: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the drive input of one tick and all that belongs to it.
 
@@ -180,6 +172,8 @@ class FollowingLaw:
             tau_ext: External joint torques and derivatives, shape (N (r - 1),); zero if omitted.
             friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,);
                 zero if omitted.
+            last_output: Virtual output of the last tick, shape (m,), from which angles go on;
+                if omitted they lie within half a turn of zero.
 
         Returns:
             New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
@@ -189,6 +183,7 @@ class FollowingLaw:
         self._reference[:] = reference
         self._integral[:] = integral
         self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
+        self._last_output[:] = 0.0 if last_output is None else last_output
         self._friction[:] = 0.0 if friction is None else friction
         self._linearize()
         solution = self._inverse.solve(self._A, self._rhs)
@@ -221,6 +216,7 @@ class FollowingLaw:
             and alpha < self._max_alpha
             and status != _NOT_CONVERGED
             and math.isfinite(self._check[0])
+            and self._angle[0] < _LARGEST_ANGLE
         ):
             return _NO_FAULT
         inputs = (self._state, self._reference, self._integral, self._tau_ext, self._friction)
@@ -228,6 +224,8 @@ class FollowingLaw:
             return Fault.INPUT_NOT_FINITE
         if status == _NOT_CONVERGED:
             return Fault.PROJECTION_FAILED
+        if self._angle[0] >= _LARGEST_ANGLE:
+            return Fault.ORIENTATION_ERROR
         return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
 
     def error(self, result: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -241,23 +239,6 @@ class FollowingLaw:
         y = result[self.layout.manifold_state][:m]
         # where the point moves with time, the virtual output is the error
         return y if self.linearization.manifold.follows_time else y - reference[:m]
-
-    def safe_drive(self, state: np.ndarray, last_good_state: np.ndarray) -> np.ndarray:
-        """Return the drive input of the safe state, shape (N,).
-
-        Args:
-            state: Measured ``[q_J, v_J, q_M, v_M]``; whatever is not finite is replaced.
-            last_good_state: The state before the fault.
-        """
-        n = self.linearization.num_joints
-        if self.linearization.relative_degree == 1:
-            return np.zeros(n)
-        trusted = state if np.isfinite(state).all() else last_good_state
-        holding = np.array(self._gravity(trusted[:n])).ravel()
-        braking = self._safe_state.damping * np.where(
-            np.isfinite(state[3 * n :]), state[3 * n :], 0.0
-        )
-        return np.clip(holding - braking, -self.limits, self.limits)
 
 
 def _law_function(linearization: Linearization, stabilization: Stabilization) -> ca.Function:
@@ -274,14 +255,24 @@ def _law_function(linearization: Linearization, stabilization: Stabilization) ->
         progress = [ca.vertcat(*[y[0] for y in y_p])]
         y_p = [ca.SX(m, 1)] * (r + 1)
     Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point, *progress)
+    last_output, angle = ca.SX.sym("last_output", m), ca.SX(0.0)
+    turning = indices(linearization.manifold.coordinates, Kind.ROTATIONAL)
+    if turning.stop:
+        Y[turning, 0] += _whole_turns(last_output[turning] - Y[turning, 0])
+        angle = ca.mmax(ca.fabs(Y[turning, 0] - y_p[0][turning]))
     v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
     return ca.Function(
         "following_law",
-        [state, point, reference, integral, tau_ext],
-        [Y, ca.densify(v), A, v - b, gain, drift, offset],
-        ["state", "manifold_point", "reference", "integral", "tau_ext"],
-        ["Y", "v", "A", "rhs", "gain", "drift", "offset"],
+        [state, point, reference, integral, tau_ext, last_output],
+        [Y, ca.densify(v), A, v - b, gain, drift, offset, ca.densify(angle)],
+        ["state", "manifold_point", "reference", "integral", "tau_ext", "last_output"],
+        ["Y", "v", "A", "rhs", "gain", "drift", "offset", "angle"],
     )
+
+
+def _whole_turns(angle: ca.SX) -> ca.SX:
+    """Return the multiple of 2 pi nearest to each angle [rad]."""
+    return 2.0 * math.pi * ca.floor(angle / (2.0 * math.pi) + 0.5)
 
 
 def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:

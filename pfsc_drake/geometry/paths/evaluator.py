@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.point import PathPointLayout
-from pfsc_drake.geometry.paths.projection import Projector
-from pfsc_drake.geometry.paths.table import tabulate
+from pfsc_drake.geometry.paths.projection import Projection, Projector
+from pfsc_drake.geometry.paths.run_out import Continuation, JoinedCurve, continuations
+from pfsc_drake.geometry.paths.table import PathTable, tabulate
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 
 _BEYOND_END = float(ProjectionStatus.BEYOND_END)
@@ -74,6 +75,15 @@ class PathEvaluator:
     ) -> None:
         self.layout = PathPointLayout(order, orientation is not None)
         table = tabulate(position, orientation, arc_length, frame, self.layout)
+        # An open path goes on beyond its ends, before its first piece and after its last.
+        self._project_beyond: Callable[[Sequence[float], float], Projection] | None = None
+        self._first_piece, self._last_piece = 0, len(table.rows) - 1
+        if not position.closed:
+            before, after = continuations(position, orientation, arc_length, frame, order)
+            self._first_piece, table = _extended(before, table, after, self.layout)
+            self._last_piece += self._first_piece
+            whole = JoinedCurve([before.position, position, after.position])
+            self._project_beyond = Projector(whole).project
         self._rows, self._slopes = list(table.rows), list(table.slopes)
         self._starts = table.breakpoints[:-1].tolist()
         self._widths = np.diff(table.breakpoints).tolist()
@@ -123,6 +133,8 @@ class PathEvaluator:
         out[2] = bend / square
         if laps:
             self._add_laps(out, laps)
+        elif not self._first_piece <= piece <= self._last_piece:
+            out[3] = _BEYOND_END
         return out
 
     def evaluate_at(self, theta: float) -> np.ndarray:
@@ -201,6 +213,10 @@ class PathEvaluator:
     def _at_projection(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
         """The same as calling the object, by the projector."""
         theta, alpha, at_end, _, converged = self._project(point, theta_guess)
+        beyond = at_end
+        if at_end and self._project_beyond is not None:
+            theta, alpha, at_end, _, converged = self._project_beyond(point, theta_guess)
+            beyond = not self._domain[0] <= theta <= self._domain[1]
         if alpha != alpha:
             out = np.full(self.layout.size, math.nan)
             out[3] = _NOT_CONVERGED
@@ -208,6 +224,8 @@ class PathEvaluator:
         out = self._at(theta)
         if not at_end:
             out[2] = alpha
+            if beyond:
+                out[3] = _BEYOND_END
             if not converged:
                 out[3] = _NOT_CONVERGED
             return out
@@ -246,3 +264,22 @@ class PathEvaluator:
             out[4] = c * x + s * (ty * z - tz * y)
             out[5] = c * y + s * (tz * x - tx * z)
             out[6] = c * z + s * (tx * y - ty * x)
+
+
+def _extended(
+    before: Continuation, table: PathTable, after: Continuation, layout: PathPointLayout
+) -> tuple[int, PathTable]:
+    """Table of a path with what is beyond its ends, and how many pieces are before its begin."""
+    tables = []
+    for part in (before, after):
+        own = tabulate(part.position, part.orientation, part.arc_length, part.frame, layout)
+        own.rows[:, layout.eta, 0] += part.eta
+        tables.append(own)
+    joined = [tables[0], table, tables[1]]
+    breakpoints = [part.breakpoints[:-1] for part in joined]
+    whole = PathTable(
+        np.concatenate([*breakpoints, tables[1].breakpoints[-1:]]),
+        np.concatenate([part.rows for part in joined]),
+        np.concatenate([part.slopes for part in joined]),
+    )
+    return len(tables[0].rows), whole

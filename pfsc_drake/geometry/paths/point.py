@@ -22,9 +22,10 @@ class PathPointLayout:
     | `quaternion` | 4 (order + 1)   | derivatives 0..order of q; empty if not oriented     |
 
     Derivatives are with respect to theta, the index of the derivative is the slow one.
-    Beyond an end of an open path theta is clamped and the path goes on along its tangent:
-    derivatives of sigma_t from the second and of q from the first, and alpha, are zero,
-    e_perp is kept, and eta = s(theta) + e_par . (y - sigma_t(theta)).
+    Beyond an end of an open path it goes on smoothly to a straight line and a constant
+    orientation, see `paths.run_out`. Beyond that theta is clamped: derivatives of sigma_t from
+    the second and of q from the first, and alpha, are zero, e_perp is kept, and
+    eta = s(theta) + e_par . (y - sigma_t(theta)).
 
     Args:
         order: Relative degree r of the law that reads it, 1..5.

@@ -1,5 +1,8 @@
 """The law that makes a robot follow a manifold, as a Drake system."""
 
+import itertools
+import math
+
 import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
@@ -12,8 +15,14 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
+from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.safe_stop import SafeStop
+from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+
+# attributes of an enumeration are looked up slowly
+_LOST, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
 
 
 class FollowingController(LeafSystem):
@@ -23,8 +32,8 @@ class FollowingController(LeafSystem):
     ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
 
     The integral is held while a drive is at its limit. After a fault (:class:`Fault`)
-    the drives hold the links against gravity and brake; only a new initialization
-    leaves that state.
+    the drives stop the robot and hold it where it has come to rest (:class:`SafeStop`), velocity
+    servos get the reference zero; only a new initialization leaves that state.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -36,41 +45,65 @@ class FollowingController(LeafSystem):
             Only for r > 1.
         friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
             [Nm or N], shape (N,); zero if not connected, and in the safe state. Only for r > 1.
+        alarms (input, optional): What the robot is to stop for, shape (3,): a
+            :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
+            tared, before which its range does not matter, and an
+            :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
             m/s]; the attribute ``drive_port`` holds the name.
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
+        fault (output): A :class:`Fault`, shape (1,).
         reference_velocity (output): Joint velocities that the reference asked for at the last
             tick, shape (N,) [rad/s or m/s], zero before; only of a law that tells them. It
             depends on the state alone: what is told the law may depend on it.
         law (output): All of these, laid out by the law's ``layout``; computed once per
             tick, the others are parts of it.
+        supervision (output): What :meth:`Supervision.evaluate` returns; only with supervision.
 
     State:
         Discrete: integral of the error, shape (m,); latched fault, shape (1,); whether
         the next is known, shape (1,); part of the drive input that is extrapolated over
-        the hold, shape (N,); last ``joint_state`` without fault, shape (4N,); the reference
-        velocity, if the law tells it.
+        the hold, shape (N,); ``joint_state`` of the last tick, shape (4N,); virtual output of
+        the last tick, shape (m,); memory of the safe stop, and of the supervision; for how many
+        ticks each drive has been at its limit, shape (N,); the reference velocity, if the law
+        tells it.
 
     Args:
         law: The law.
         period: Sampling time [s].
+        supervision: What is watched of joints and drives; nothing if omitted.
     """
 
-    def __init__(self, law: FollowingLaw, period: float) -> None:
+    def __init__(
+        self,
+        law: FollowingLaw,
+        period: float,
+        supervision: SupervisionParameters | None = None,
+    ) -> None:
         super().__init__()
         self._law, self.period, self.layout = law, period, law.layout
         linearization = law.linearization
         n, m = linearization.num_joints, linearization.num_outputs
         r = self.relative_degree = linearization.relative_degree
         self._integral, self._fault, self._known = slice(0, m), m, m + 1
-        self._held, self._last_good = slice(m + 2, m + 2 + n), slice(m + 2 + n, m + 2 + 5 * n)
+        start = self.layout.manifold_state.start
+        self._first_output = slice(start, start + m)
+        self._safe_stop = SafeStop(law.robot, law.limits, law.safe_state, period)
+        self._supervision = None
+        if supervision is not None:
+            effort = law.limits if r > 1 else law.robot.gather("effort_limit")
+            self._supervision = Supervision(law.robot, effort, supervision, period)
+        watched = self._supervision.size if self._supervision else 0
         told = self.layout.reference_velocity
-        end = self._last_good.stop + told.stop - told.start
-        self._velocity = slice(self._last_good.stop, end)
-        memory = self.DeclareDiscreteState(end)
+        sizes = [n, 4 * n, m, self._safe_stop.size, watched, n, told.stop - told.start]
+        widths = np.cumsum([m + 2, *sizes]).tolist()
+        parts = [slice(*ends) for ends in itertools.pairwise(widths)]
+        self._held, self._last, self._output_before, self._stop, *parts = parts
+        self._watch, self._saturated, self._velocity = parts
+        memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._manifold_point: InputPort = self.DeclareVectorInputPort(
             "manifold_point", linearization.manifold.layout.size
@@ -84,10 +117,22 @@ class FollowingController(LeafSystem):
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
+        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", 3)
+        sources.add(self._alarms.ticket())
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
             self._friction = self.DeclareVectorInputPort("friction_torque", n)
             sources |= {self._tau_ext.ticket(), self._friction.ticket()}
+        if self._supervision is not None:
+            self._watched: OutputPort = self.DeclareVectorOutputPort(
+                "supervision",
+                1 + 12 * n,
+                self._calc_supervision,
+                prerequisites_of_calc={
+                    self._joint_state.ticket(),
+                    self.discrete_state_ticket(memory),
+                },
+            )
         self._output: OutputPort = self.DeclareVectorOutputPort(
             "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
         )
@@ -95,6 +140,8 @@ class FollowingController(LeafSystem):
         self._declare_part(self.drive_port, self.layout.drive, sources)
         for name in ("manifold_state", "virtual_input", "status"):
             self._declare_part(name, getattr(self.layout, name), sources)
+        status = self.layout.status.start
+        self._declare_part("fault", slice(status, status + 1), sources)
         if told.stop > told.start:
             self.DeclareVectorOutputPort(
                 "reference_velocity",
@@ -120,6 +167,23 @@ class FollowingController(LeafSystem):
         """Return the fault that holds at the present instant."""
         return Fault(int(self._output.Eval(context)[self.layout.status][0]))
 
+    def set_last_state(self, context: Context, joint_state: np.ndarray) -> None:
+        """Let a state be that of the last tick, before which nothing has been compared.
+
+        Args:
+            context: The controller's own.
+            joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        """
+        memory = context.get_discrete_state_vector().value().copy()
+        memory[self._last], memory[self._watch] = joint_state, 0.0
+        context.SetDiscreteState(memory)
+
+    def suspects(self, context: Context) -> np.ndarray:
+        """Return which measured values are not believed, nonzero if so, shape (4N,)."""
+        memory = context.get_discrete_state_vector().value()
+        latched = self._safe_stop.suspects(memory[self._stop])
+        return np.maximum(latched, self._suspects(context))
+
     def _calc_law(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
         state = self._joint_state.Eval(context)
@@ -131,13 +195,63 @@ class FollowingController(LeafSystem):
             memory[self._held] if memory[self._known] else None,
             _value(self._tau_ext, context),
             _value(self._friction, context),
+            memory[self._output_before],
         )
         status = self.layout.status.start
-        fault = memory[self._fault] or result[status]
+        latched = memory[self._fault]
+        fault = latched or self._found_fault(context, memory, result[status])
         if fault:
             result[status] = fault
-            result[self.layout.drive] = self._law.safe_drive(state, memory[self._last_good])
+            stop = memory[self._stop] if latched else self._start_stop(context, memory)
+            result[self.layout.drive] = 0.0
+            if self.relative_degree > 1:
+                result[self.layout.drive] = self._safe_stop.drive(stop, state)
         output.SetFromVector(result)
+
+    def _calc_supervision(self, context: Context, output: BasicVector) -> None:
+        assert self._supervision is not None
+        memory = context.get_discrete_state_vector().value()
+        ignored = self._safe_stop.suspects(memory[self._stop]) if memory[self._fault] else None
+        output.SetFromVector(
+            self._supervision.evaluate(
+                self._joint_state.Eval(context),
+                memory[self._last],
+                memory[self._watch],
+                memory[self._known],
+                ignored,
+            )
+        )
+
+    def _found_fault(self, context: Context, memory: np.ndarray, of_law: float) -> float:
+        """Return a fault of this instant, the root cause first."""
+        if of_law == Fault.INPUT_NOT_FINITE:
+            return of_law
+        if self._supervision is not None:
+            seen = self._watched.Eval(context)[0]
+            if seen:
+                return float(seen)
+            ticks = self._supervision.saturated_ticks
+            if ticks < math.inf and memory[self._saturated].max() >= ticks:
+                return float(Fault.DRIVE_SATURATED)
+        if self._alarms.HasValue(context):
+            sensor, tared, compliance = self._alarms.Eval(context).tolist()
+            if sensor == _LOST:
+                return float(Fault.FORCE_SENSOR_LOST)
+            if sensor == _SATURATED and tared:
+                return float(Fault.FORCE_SENSOR_SATURATED)
+            if compliance:
+                return float(Fault.COMPLIANCE_INVALID)
+        return of_law
+
+    def _suspects(self, context: Context) -> np.ndarray:
+        """Return which measured values are implausible, nonzero if so, shape (4N,)."""
+        if self._supervision is None:
+            return np.zeros(self._last.stop - self._last.start)
+        return self._supervision.suspects(self._watched.Eval(context))
+
+    def _start_stop(self, context: Context, memory: np.ndarray) -> np.ndarray:
+        last, state = memory[self._last], self._joint_state.Eval(context)
+        return self._safe_stop.start(last, state, self._suspects(context))
 
     def _calc_reference_velocity(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value()[self._velocity])
@@ -146,21 +260,30 @@ class FollowingController(LeafSystem):
         memory = state.get_mutable_value()
         memory[:] = 0.0
         joint_state = self._joint_state.Eval(context)
-        memory[self._last_good] = np.where(np.isfinite(joint_state), joint_state, 0.0)
+        memory[self._last] = np.where(np.isfinite(joint_state), joint_state, 0.0)
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        result = self._output.Eval(context)
-        memory = state.get_mutable_value()
+        result, joint_state = self._output.Eval(context), self._joint_state.Eval(context)
+        before, memory = context.get_discrete_state_vector().value(), state.get_mutable_value()
+        if self._supervision is not None:
+            memory[self._watch] = self._supervision.next_memory(self._watched.Eval(context))
         fault = result[self.layout.status.start]
+        memory[self._last] = joint_state
         if fault:
+            stop = before[self._stop] if before[self._fault] else self._start_stop(context, before)
+            suspects = self._suspects(context)
             memory[self._fault] = fault
+            memory[self._stop] = self._safe_stop.advance(stop, joint_state, suspects)
             return
         memory[self._known] = 1.0
         memory[self._held] = result[self.layout.held]
-        memory[self._last_good] = self._joint_state.Eval(context)
+        memory[self._output_before] = result[self._first_output]
         memory[self._velocity] = result[self.layout.reference_velocity]
         saturated = result[self.layout.status.stop - 1]
+        if saturated or before[self._saturated].any():
+            at_limit = np.abs(result[self.layout.drive]) >= self._law.limits
+            memory[self._saturated] = np.where(at_limit, before[self._saturated] + 1.0, 0.0)
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error

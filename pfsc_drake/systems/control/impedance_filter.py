@@ -13,6 +13,7 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.control.compliance.impedance import STIFFNESS, ImpedanceLaw, ImpedanceStatus
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 
 _NOT_STARTED, _RUNNING, _PRESET, _WAITING = 0.0, 1.0, 2.0, 3.0
@@ -95,6 +96,11 @@ class ImpedanceFilter(LeafSystem):
         self.DeclareVectorOutputPort("status", 1, self._calc_status, prerequisites_of_calc={memory})
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(law.period, 0.0, self._update)
+
+    def fault(self, context: Context) -> Fault:
+        """Return the fault that holds since the last update."""
+        status = context.get_discrete_state_vector().value()[self._status]
+        return Fault.COMPLIANCE_INVALID if status != ImpedanceStatus.OK else Fault.NONE
 
     def set_motion(self, context: Context, position: np.ndarray, velocity: np.ndarray) -> None:
         """Choose where y_p starts, before initialization.

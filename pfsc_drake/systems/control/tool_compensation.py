@@ -15,6 +15,7 @@ from pfsc_drake.control.compliance.tool_load import (
     compensation_function,
 )
 from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -133,6 +134,16 @@ class ToolCompensation(LeafSystem):
             width = part.stop - part.start
             self.DeclareVectorOutputPort(name, width, calc, prerequisites_of_calc=sources)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def fault(self, context: Context) -> Fault:
+        """Return the fault that holds at the present instant.
+
+        A sensor at the end of its range is none until it is tared, since nobody uses it.
+        """
+        tared, fault = self._output.Eval(context)[_TARED : _FAULT + 1]
+        if fault == SensorFault.SATURATED:
+            return Fault.FORCE_SENSOR_SATURATED if tared else Fault.NONE
+        return Fault.FORCE_SENSOR_LOST if fault else Fault.NONE
 
     def tare(self, context: Context) -> None:
         """Forget bias and fault and tare anew; the output is zero until that is done."""

@@ -29,36 +29,51 @@ class BusDelay(LeafSystem):
     the same tick. Readers that are themselves unrestricted updates see the tick before, so
     that two delays in a row add one period of their own; use one delay for the sum.
 
+    A frame that is sent while the bus loses its frames does not arrive: what was delivered
+    last is delivered on, and the silence is counted.
+
     Ports:
         sent (input): Any vector, shape (size,).
         delivered (output): The same, later, shape (size,); no direct feedthrough.
+        silence (output): Since when nothing has arrived, beyond the period [s], shape (1,).
 
     State:
-        Discrete: the last k + 1 samples, newest first, shape ((k + 1) size,); whether the
-        first tick is still to come, shape (1,).
+        Discrete: the last k + 1 samples, newest first, shape ((k + 1) size,), where one is lost
+        the one before it again; whether the first tick is still to come, shape (1,); how old
+        in periods each of the samples is beyond its delay, shape (k + 1,).
 
     Args:
         size: Size of the vector.
         delay: Delay [s], a whole number k of periods, 1 to MAX_PERIODS.
         period: Sampling time T of the bus [s].
+        lost: From when to when it loses its frames [s]; none if it ends before it begins.
 
     Raises:
         InputError: If the delay is not a positive multiple of the period.
     """
 
-    def __init__(self, size: int, delay: float, period: float) -> None:
+    def __init__(
+        self, size: int, delay: float, period: float, lost: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         super().__init__()
         self.num_samples = _whole_periods(delay, period)
-        self._size = size
+        self._size, self._period, self._lost = size, period, lost
         samples = self.DeclareDiscreteState(size * (self.num_samples + 1))
         self._starting = self.DeclareDiscreteState(np.ones(1))
         self._samples = samples
+        self._ages = self.DeclareDiscreteState(self.num_samples + 1)
         self._sent = self.DeclareVectorInputPort("sent", size)
         self.DeclareVectorOutputPort(
             "delivered",
             size,
             self._calc_delivered,
             prerequisites_of_calc={self.discrete_state_ticket(samples)},
+        )
+        self.DeclareVectorOutputPort(
+            "silence",
+            1,
+            self._calc_silence,
+            prerequisites_of_calc={self.discrete_state_ticket(self._ages)},
         )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._fill)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._shift)
@@ -78,16 +93,30 @@ class BusDelay(LeafSystem):
             discrete.set_value(self._starting, [0.0])
             return
         samples = context.get_discrete_state(self._samples).value()
-        shifted = np.concatenate([self._sent.Eval(context), samples[: -self._size]])
-        discrete.set_value(self._samples, shifted)
+        ages = context.get_discrete_state(self._ages).value()
+        begin, end = self._lost
+        lost = begin <= context.get_time() < end
+        newest = samples[: self._size] if lost else self._sent.Eval(context)
+        age = ages[0] + 1.0 if lost else 0.0
+        discrete.set_value(self._samples, np.concatenate([newest, samples[: -self._size]]))
+        discrete.set_value(self._ages, np.concatenate([[age], ages[:-1]]))
 
     def _calc_delivered(self, context: Context, output: BasicVector) -> None:
         samples = context.get_discrete_state(self._samples).value()
         output.SetFromVector(samples[-self._size :])
 
+    def _calc_silence(self, context: Context, output: BasicVector) -> None:
+        ages = context.get_discrete_state(self._ages).value()
+        output.SetFromVector([self._period * ages[-1]])
+
 
 def add_bus_delay(
-    builder: DiagramBuilder, port: OutputPort, delay: float, period: float, name: str = "bus_delay"
+    builder: DiagramBuilder,
+    port: OutputPort,
+    delay: float,
+    period: float,
+    name: str = "bus_delay",
+    lost: tuple[float, float] = (0.0, 0.0),
 ) -> BusDelay:
     """Add a bus behind an output port.
 
@@ -97,6 +126,7 @@ def add_bus_delay(
         delay: Delay [s], a positive multiple of the period.
         period: Sampling time of the bus [s].
         name: Name of the system.
+        lost: From when to when it loses its frames [s].
 
     Returns:
         The bus; its output port is ``delivered``.
@@ -104,7 +134,7 @@ def add_bus_delay(
     Raises:
         InputError: If the delay is not a positive multiple of the period.
     """
-    bus = builder.AddNamedSystem(name, BusDelay(port.size(), delay, period))
+    bus = builder.AddNamedSystem(name, BusDelay(port.size(), delay, period, lost))
     builder.Connect(port, bus.GetInputPort("sent"))
     return bus
 

@@ -73,13 +73,8 @@ class JointEncoders(LeafSystem):
             raise InputError(
                 f"encoders: filter_time = {options.filter_time!r} s; must be finite, not negative"
             )
-        per_unit = np.where(robot.gather("is_revolute"), 2.0 * np.pi, 1.0)
         self._resolution = np.zeros(4 * n)
-        for name, start in (("link_increments", 0), ("motor_increments", 2 * n)):
-            increments = _increments(name, getattr(options, name), n)
-            coarse = increments > 0.0
-            part = self._resolution[start : start + n]
-            part[coarse] = per_unit[coarse] / increments[coarse]
+        self._resolution.reshape(4, n)[[0, 2]] = encoder_resolution(robot, options)
         self._quantized = self._resolution > 0.0
         rows = np.arange(4 * n).reshape(4, n)
         self._positions, self._velocities = rows[[0, 2]].ravel(), rows[[1, 3]].ravel()
@@ -122,6 +117,25 @@ class JointEncoders(LeafSystem):
 
     def _remember(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(np.append(self._measured.Eval(context), context.get_time()))
+
+
+def encoder_resolution(robot: RobotModel, options: EncoderOptions) -> np.ndarray:
+    """Return the steps of the measured positions of links and motors, shape (2, N) [rad or m].
+
+    Args:
+        robot: The robot, N joints.
+        options: What the encoders do.
+
+    Raises:
+        InputError: If an option is out of range.
+    """
+    n = robot.dimension
+    per_unit, steps = np.where(robot.gather("is_revolute"), 2.0 * np.pi, 1.0), np.zeros((2, n))
+    for step, name in zip(steps, ("link_increments", "motor_increments"), strict=True):
+        increments = _increments(name, getattr(options, name), n)
+        coarse = increments > 0.0
+        step[coarse] = per_unit[coarse] / increments[coarse]
+    return steps
 
 
 def _increments(name: str, values: list[float], size: int) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Joint velocity control as a Drake system."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,6 +8,8 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
+from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
@@ -24,31 +27,43 @@ class VelocityServo(LeafSystem):
     hold of its own in front of ``velocity_reference``, whose new value the servo takes up
     one servo period after the tick.
 
-    An input that is not finite is a fault (``Fault.INPUT_NOT_FINITE``): from that instant on
-    the servo holds the links against gravity where it saw them last and brakes with what it
-    knows of the velocities (:meth:`VelocityServoLaw.safe_torque`), whatever the reference.
-    Only a new initialization leaves that state.
+    An input that is not finite, a measurement that contradicts itself, if that is supervised, and
+    a bus that is silent for too long are faults: from that instant on the servo stops the
+    joints and holds them where they have come to rest (:class:`SafeStop`), whatever the
+    reference. Only a new initialization leaves that state.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
         velocity_reference (input): ``q'_ref`` [rad/s or m/s], shape (N,).
+        silence (input, optional): For how long no new reference has come [s], shape (1,).
         drive_torque (output): ``tau_d`` within its limits [Nm or N], shape (N,).
         fault (output): a ``Fault``, shape (1,).
 
     State:
         Discrete: integral part [Nm or N], shape (N,), 0 at the start; latched fault, shape
-        (1,); joint coordinates when last seen, shape (N,).
+        (1,); whether the next is known, shape (1,); ``joint_state`` of the last tick, shape
+        (4N,); memory of the safe stop, and of the supervision.
 
     Args:
-        robot: The robot, N joints; its gravity torque and the viscous damping of its drives
-            are fed forward.
+        robot: The robot as it is believed, N joints; its gravity torque and the viscous damping
+            of its drives are fed forward.
         law: The law; its gains' period is the sampling time.
+        safe_state: How to stop and hold; by default without more damping than that needs.
+        supervision: What of the measurement is watched; nothing if omitted.
+        longest_silence: How long a reference may be missing [s]; for ever if infinite.
 
     Raises:
         InputError: If the law is for another number of joints.
     """
 
-    def __init__(self, robot: RobotModel, law: VelocityServoLaw) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        law: VelocityServoLaw,
+        safe_state: SafeState | None = None,
+        supervision: SupervisionParameters | None = None,
+        longest_silence: float = math.inf,
+    ) -> None:
         super().__init__()
         n = robot.dimension
         if law.gains.dimension != n:
@@ -56,24 +71,36 @@ class VelocityServo(LeafSystem):
                 f"servo: gains for {law.gains.dimension} joints; the robot has {n} joints"
             )
         self._law, self._size = law, n
-        memory = self.DeclareDiscreteState(2 * n + 1)
+        period, self._longest_silence = law.gains.period, longest_silence
+        settings = safe_state or SafeState(np.zeros(n))
+        self._safe_stop = SafeStop(robot, law.limits, settings, period)
+        self._supervision = None
+        if supervision is not None:
+            self._supervision = Supervision(robot, law.limits, supervision, period)
+        watched = self._supervision.size if self._supervision else 0
+        widths = np.cumsum([n, 1, 1, 4 * n, self._safe_stop.size, watched]).tolist()
+        parts = [slice(*ends) for ends in itertools.pairwise(widths)]
+        self._fault, self._known, self._last, self._stop, self._watch = parts
+        memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._reference = self.DeclareVectorInputPort("velocity_reference", n)
+        self._silence = self.DeclareVectorInputPort("silence", 1)
         sources = {
             self._joint_state.ticket(),
             self._reference.ticket(),
+            self._silence.ticket(),
             self.discrete_state_ticket(memory),
         }
         # torque and next memory, computed once per tick
         self._step = self.DeclareVectorOutputPort(
-            "step", 3 * n + 1, self._calc_step, prerequisites_of_calc=sources
+            "step", n + widths[-1], self._calc_step, prerequisites_of_calc=sources
         )
         self.DeclareVectorOutputPort(
             "drive_torque", n, self._calc_drive_torque, prerequisites_of_calc=sources
         )
         self.DeclareVectorOutputPort("fault", 1, self._calc_fault, prerequisites_of_calc=sources)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
-        self.DeclarePeriodicDiscreteUpdateEvent(law.gains.period, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
         self._viscous = robot.viscous_damping
         function = BoundFunction(gravity_function(robot))
         self._q, self._gravity = function.arguments["q"], function.results["tau"]
@@ -86,36 +113,72 @@ class VelocityServo(LeafSystem):
 
     def fault(self, context: Context) -> Fault:
         """Return the fault that holds at the present instant."""
-        return Fault(int(self._step.Eval(context)[2 * self._size]))
+        return Fault(int(self._step.Eval(context)[self._size :][self._fault][0]))
+
+    def suspects(self, context: Context) -> np.ndarray:
+        """Return which measured values are not believed, nonzero if so, shape (4N,)."""
+        return self._safe_stop.suspects(self._step.Eval(context)[self._size :][self._stop])
 
     def _calc_step(self, context: Context, output: BasicVector) -> None:
         n = self._size
         state, reference = self._joint_state.Eval(context), self._reference.Eval(context)
-        memory = context.get_discrete_state_vector().value()
-        x, fault, seen = memory[:n], memory[n], memory[n + 1 :]
+        before = context.get_discrete_state_vector().value()
+        after, fault, seen = before.copy(), before[self._fault][0], None
+        if self._supervision is not None:
+            known = before[self._known][0]
+            ignored = self._safe_stop.suspects(before[self._stop])
+            seen = self._supervision.evaluate(
+                state, before[self._last], before[self._watch], known, ignored
+            )
+            after[self._watch] = self._supervision.next_memory(seen)
+        after[self._last], after[self._known] = state, 1.0
+        fault = fault or self._found_fault(context, state, reference, seen)
+        if fault:
+            suspects = np.zeros(4 * n)
+            if self._supervision is not None and seen is not None:
+                suspects = self._supervision.suspects(seen)
+            stop = before[self._stop]
+            if not before[self._fault][0]:
+                stop = self._safe_stop.start(before[self._last], state, suspects)
+            torque = self._safe_stop.drive(stop, state)
+            after[self._stop] = self._safe_stop.advance(stop, state, suspects)
+            after[self._fault] = fault
+        else:
+            self._q[:] = state[:n]
+            self._evaluate()
+            load = self._gravity + self._viscous * reference
+            torque, after[:n] = self._law.torque(state[3 * n :], reference, load, before[:n])
+        output.SetFromVector(np.concatenate([torque, after]))
+
+    def _found_fault(
+        self,
+        context: Context,
+        state: np.ndarray,
+        reference: np.ndarray,
+        seen: np.ndarray | None,
+    ) -> float:
+        """Return a fault of this instant, the root cause first."""
         # a sum is finite only if all its terms are
         if not math.isfinite(state.sum() + reference.sum()):
-            fault = fault or Fault.INPUT_NOT_FINITE
-        q_J, v_M = state[:n], state[3 * n :]
-        self._q[:] = np.where(np.isfinite(q_J), q_J, seen) if fault else q_J
-        self._evaluate()
-        if fault:
-            torque = self._law.safe_torque(v_M, self._gravity)
-        else:
-            load = self._gravity + self._viscous * reference
-            torque, x = self._law.torque(v_M, reference, load, x)
-        output.SetFromVector(np.concatenate([torque, x, [fault], self._q]))
+            return Fault.INPUT_NOT_FINITE
+        if seen is not None and seen[0]:
+            return float(seen[0])
+        if self._silence.HasValue(context):
+            silence = self._silence.Eval(context)[0]
+            return Fault.BUS_LOST if silence > self._longest_silence else Fault.NONE
+        return Fault.NONE
 
     def _calc_drive_torque(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._step.Eval(context)[: self._size])
 
     def _calc_fault(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._step.Eval(context)[2 * self._size : 2 * self._size + 1])
+        output.SetFromVector(self._step.Eval(context)[self._size :][self._fault])
 
     def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
-        q_J = self._joint_state.Eval(context)[: self._size]
-        seen = np.where(np.isfinite(q_J), q_J, 0.0)
-        state.set_value(np.concatenate([np.zeros(self._size + 1), seen]))
+        joint_state = self._joint_state.Eval(context)
+        memory = state.get_mutable_value()
+        memory[:] = 0.0
+        memory[self._last] = np.where(np.isfinite(joint_state), joint_state, 0.0)
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:

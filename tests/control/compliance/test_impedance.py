@@ -286,6 +286,44 @@ def test_profiles():
         ImpedanceLaw(ImpedanceParameters(kinds), POSITION, 2, PERIOD)
 
 
+def test_profiles_go_round_closed_paths():
+    lap = 2.5
+    profile = Profile(over="eta", at=[0.5, 1.0, 2.0], values=[3.0, 9.0, 1.0])
+    value = profile.interpolant(lap)
+    eta = np.linspace(-3.0, 6.0, 2001)
+    around = np.array([value(x) for x in eta])
+    np.testing.assert_allclose([value(x + 2 * lap) for x in eta], around, atol=1e-12)
+    for at, wanted in zip(profile.at, profile.values, strict=True):
+        assert value(at) == pytest.approx(wanted)
+        assert value(at - lap) == pytest.approx(wanted)
+    # from the last breakpoint to the first of the next lap it goes straight up, without a step
+    seam = np.array([value(x) for x in np.linspace(2.0, 3.0, 200)])
+    assert np.all(np.diff(seam) >= 0.0)
+    assert np.abs(np.diff(around)).max() < 0.2
+    slopes = np.gradient(around, eta)
+    assert np.abs(np.diff(slopes)).max() < 1.0
+    # one that names both ends of the lap
+    whole = Profile(over="eta", at=[0.0, 1.0, lap], values=[3.0, 9.0, 3.0]).interpolant(lap)
+    assert whole(lap + 1.0) == pytest.approx(9.0)
+    with pytest.raises(InputError, match=r"2\.5 m long"):
+        Profile(at=[0.0, 2.6], values=[1.0, 1.0]).interpolant(lap)
+    with pytest.raises(InputError, match="the last must be the first"):
+        Profile(at=[0.0, 2.5], values=[1.0, 2.0]).interpolant(lap)
+
+
+def test_an_impedance_goes_round_closed_paths():
+    soft = CoordinateImpedance(
+        Profile(1.0), Profile(1.0), Profile(over="eta", at=[0.2, 1.0], values=[100.0, 900.0])
+    )
+    parameters = ImpedanceParameters(constant(*TANGENTIAL), soft)
+    law = ImpedanceLaw(parameters, POSITION, 2, PERIOD, lap=2.0)
+    straight = ImpedanceLaw(parameters, POSITION, 2, PERIOD)
+    y, later = np.array([0.6, 0.0, 0.0]), np.array([2.6, 0.0, 0.0])
+    np.testing.assert_allclose(law.impedance(y), law.impedance(later), rtol=1e-12)
+    assert straight.impedance(later)[2, 1] == 900.0
+    assert 100.0 < law.impedance(later)[2, 1] < 900.0
+
+
 def over(what):
     soft = CoordinateImpedance(damping=Profile(over=what, at=[0.0, 1.0], values=[1.0, 2.0]))
     return ImpedanceParameters(transversal=soft)

@@ -5,7 +5,7 @@ import pytest
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.following_law import SafeState
+from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import ProjectionStatus
@@ -182,37 +182,6 @@ def test_half_a_tick_is_extrapolated(sampling_time, lead, load_robot, position_p
     assert np.allclose(result[law.layout.held], held, rtol=1e-12)
     assert np.allclose(result[law.layout.drive], drive + lead * change, rtol=0, atol=1e-8)
     assert np.array_equal(tick(), alone)
-
-
-def test_the_safe_state_holds_and_brakes(rigid_3r, tick, q):
-    state = tick.state.copy()
-    _, weight = rigid_3r.link_dynamics(q, np.zeros(3))
-    drive = tick.law.safe_drive(state, np.zeros(12))
-    assert np.allclose(drive, weight - 50.0 * state[9:], rtol=0, atol=1e-9)
-    assert np.abs(weight).max() > 10.0
-
-
-def test_the_safe_state_without_measurement(rigid_3r, tick, q):
-    """The last good position is held; velocities that are known still brake."""
-    state = tick.state.copy()
-    state[[1, 10]] = np.nan
-    last_good = tick.state + 0.01
-    _, weight = rigid_3r.link_dynamics(q + 0.01, np.zeros(3))
-    braking = 50.0 * state[9:] * [1.0, 0.0, 1.0]
-    braking[1] = 0.0
-    drive = tick.law.safe_drive(state, last_good)
-    assert np.allclose(drive, weight - braking, rtol=0, atol=1e-9)
-
-
-def test_the_safe_state_keeps_the_limits(rigid_3r, make_law, tick):
-    law = make_law(rigid_3r.chain, "rigid", False, limits=np.array([0.1, 0.2, 0.3]))
-    drive = law.safe_drive(tick.state, tick.state)
-    assert np.array_equal(np.abs(drive), [0.1, 0.2, 0.3])
-
-
-def test_servos_stop_in_the_safe_state(rigid_3r, make_law, tick):
-    law = make_law(rigid_3r.chain, "velocity_servo", False)
-    assert np.array_equal(law.safe_drive(tick.state, tick.state), np.zeros(3))
 
 
 @pytest.mark.parametrize(

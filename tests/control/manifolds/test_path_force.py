@@ -8,7 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.manifolds.manifold import manifold_force_function
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, ProjectionStatus
+from pfsc_drake.geometry import (
+    FourierCurve,
+    Path,
+    PiecewisePolynomialCurve,
+    ProjectionStatus,
+    quaternion_to_matrix,
+)
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
 
 OFFSET = np.array([0.02, -0.03, 0.025])
@@ -136,15 +142,19 @@ def test_beyond_the_end_of_an_open_path():
     evaluator = path.evaluator(2)
     sigma, slope = arc.derivatives(0.5, 1)
     e_par = slope / np.linalg.norm(slope)
-    y_t = sigma + 0.1 * e_par + 0.05 * np.cross([0.0, 0.0, 1.0], e_par)
+    # where the run-out is over
+    y_t = sigma + 0.3 * e_par + 0.05 * np.cross([0.0, 0.0, 1.0], e_par)
     point, layout = evaluator(y_t.tolist(), 0.5), evaluator.layout
     assert point[layout.status] == [ProjectionStatus.BEYOND_END]
+    slope = point[layout.position][3:6]
+    e_par = slope / np.linalg.norm(slope)
+    assert not point[layout.quaternion][4:].any()
     wrench = np.array([*(7.0 * e_par), 3.0, -2.0, 5.0])
     for with_turning in (False, True):
         tau = manifold_force(wrench, point, layout, np.zeros(3), with_turning=with_turning)
         assert tau[:3] == pytest.approx([7.0, 0.0, 0.0], abs=1e-12)
     # at zero angles the torques are those about z, y, x of the path's orientation
-    R_d = Rotation.from_euler("ZYX", angles[1]).as_matrix()
+    R_d = quaternion_to_matrix(point[layout.quaternion][:4])
     assert tau[3:] == pytest.approx((R_d.T @ wrench[3:])[::-1], abs=1e-12)
 
 

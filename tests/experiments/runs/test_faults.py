@@ -64,14 +64,36 @@ def test_nan_on_the_way(fault, component):
     healthy = log["t"] < 0.0305
     assert set(log["fault"][healthy]) == {"none"}
     assert set(log["fault"][~healthy]) == {"input_not_finite"}
-    measured = np.hstack([log[name] for name in ("q_J", "v_J", "q_M", "v_M")])
+    states = ("q_J", "v_J", "q_M", "v_M")
+    measured = np.hstack([log[f"{name}_measured"] for name in states])
     assert np.isfinite(measured[healthy]).all()
     assert np.isnan(measured[~healthy, component]).all()
+    assert np.isfinite(np.hstack([log[name] for name in states])).all()
     # looked at every 50 ms; until then the drives hold the arm
     assert log["t"][-1] < 0.1
     assert np.isfinite(log["tau_d"]).all()
     assert np.abs(np.delete(measured[-1] - measured[30], component)).max() < 1.0
     assert metrics["saturated_samples"]["value"] == 0.0
+
+
+def test_going_on_after_a_fault(mine, tmp_path, capfd):
+    """The status stays 3; the log tells of both, and the arm stands in the end."""
+    out = tmp_path / "out"
+    failure = ["--set", "simulation.sensor_failure={time: 0.35, component: 10}"]
+    rest = ["--set", "reference.dwell=0.05", "--duration", "0.5", "--after-fault", "0.8"]
+    assert main(["run", mine(), "--out", str(out), *BARE, *failure, *rest]) == 3
+    assert "v_M_2" in capfd.readouterr().err
+    with h5py.File(out / "log.h5") as file:
+        assert float(file.attrs["fault_time"]) == pytest.approx(0.35)
+        assert file["t"][-1] == pytest.approx(1.15, abs=0.06)
+        assert np.abs(file["v_J"][-100:]).max() < 0.05
+        assert np.abs(file["v_J"][340]).max() > 0.3
+
+
+@pytest.mark.parametrize("seconds", ["-1", "nan", "soon", "1e9"])
+def test_a_wrong_time_after_a_fault(mine, capfd, seconds):
+    assert main(["run", mine(), "--after-fault", seconds]) == 2
+    assert f"--after-fault {seconds}: allowed: 0 to 100" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("name", [THREE, SIX])
@@ -91,6 +113,7 @@ def test_singularity_on_the_way(fault, tmp_path):
         "reference={points: [0, 0.4975], velocity: 1, acceleration: 8, dwell: 0}",
         "controller.min_rcond=0.02",
         "start.offset=[0, 0]",
+        "faults.joint_limits=false",
         duration="1.5",
     )
     last_good = np.flatnonzero(log["fault"] == "none")[-1]

@@ -10,6 +10,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.physics.bus_delay import BusDelay, add_bus_delay
 
 T = 1e-3
+PORTS = {BusDelay: "delivered", ZeroOrderHold: "y"}
 
 
 class Clock(LeafSystem):
@@ -54,7 +55,7 @@ def test_delay_for_readers_between_and_at_the_ticks(periods):
         simulator.AdvanceTo(k * T + 0.4 * T)
         # between the ticks, and as sampled by a discrete update at the tick before
         for system in (bus, hold):
-            got = system.get_output_port().Eval(system.GetMyContextFromRoot(root))
+            got = system.GetOutputPort(PORTS[type(system)]).Eval(system.GetMyContextFromRoot(root))
             sent = max(k - periods, 0) * T
             assert np.allclose(got, [7.0 + sent, -sent], rtol=0, atol=1e-12)
 
@@ -63,13 +64,13 @@ def test_delivers_the_present_input_from_the_start():
     simulator, bus, _ = build(2e-3)
     simulator.get_mutable_context().SetTime(3.0)
     simulator.Initialize()
-    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    got = bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(simulator.get_context()))
     assert np.allclose(got, [10.0, -3.0], rtol=0, atol=1e-12)
     # a run may start between two ticks
     simulator.get_mutable_context().SetTime(3.0004)
     simulator.Initialize()
     simulator.AdvanceTo(3.0008)
-    got = bus.get_output_port().Eval(bus.GetMyContextFromRoot(simulator.get_context()))
+    got = bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(simulator.get_context()))
     assert np.allclose(got, [10.0004, -3.0004], rtol=0, atol=1e-12)
 
 
@@ -82,7 +83,7 @@ def test_what_a_sender_had_before_it_was_initialized_is_never_delivered():
     for k in range(6):
         simulator.AdvanceTo((k + 0.4) * T)
         context = bus.GetMyContextFromRoot(simulator.get_context())
-        assert bus.get_output_port().Eval(context)[0] == 5.0
+        assert bus.GetOutputPort("delivered").Eval(context)[0] == 5.0
 
 
 def test_no_direct_feedthrough():
@@ -97,7 +98,7 @@ def test_contexts_do_not_share_samples():
         bus.GetInputPort("sent").FixValue(context, [float(value)])
         simulator.Initialize()
     for value, simulator in enumerate(simulators):
-        assert bus.get_output_port().Eval(simulator.get_context())[0] == value
+        assert bus.GetOutputPort("delivered").Eval(simulator.get_context())[0] == value
 
 
 @pytest.mark.parametrize(
@@ -120,3 +121,20 @@ def test_delay_must_be_whole_periods(delay, period):
 def test_period_must_be_positive():
     with pytest.raises(InputError, match=r"period = 0.0 s; must be positive"):
         BusDelay(1, 2e-3, 0.0)
+
+
+def test_lost_frames():
+    """What was sent from 3 ms to 6 ms never arrives; what arrived last is delivered on."""
+    builder = DiagramBuilder()
+    clock = builder.AddSystem(Clock())
+    bus = add_bus_delay(builder, clock.get_output_port(), 2 * T, T, lost=(2.5 * T, 5.5 * T))
+    simulator = Simulator(builder.Build())
+    simulator.Initialize()
+    delivered, silence = [], []
+    for k in range(12):
+        simulator.AdvanceTo(k * T + 0.4 * T)
+        context = bus.GetMyContextFromRoot(simulator.get_context())
+        delivered.append(-bus.GetOutputPort("delivered").Eval(context)[1] / T)
+        silence.append(bus.GetOutputPort("silence").Eval(context)[0] / T)
+    np.testing.assert_allclose(delivered, [0, 0, 0, 1, 2, 2, 2, 2, 6, 7, 8, 9], atol=1e-9)
+    np.testing.assert_allclose(silence, [0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0], atol=1e-9)

@@ -1,0 +1,220 @@
+"""What contradicts itself in a measurement of joints, and joints at their limits."""
+
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+
+# 1/s, by which differences of what is compared are forgotten
+_FORGETTING = 20.0
+# part of the tolerance that tells a jump within a tick, or a rest for some ticks
+_AT_ONCE = 0.5
+# how far a spring may be bent, over what the drive's limit bends it
+_BENDING = 2.0
+
+
+@dataclass
+class SupervisionParameters:
+    """What of the joints is watched.
+
+    Attributes:
+        tolerance: By how much positions and integrated velocities of a joint may differ
+            [rad or m]; 0 to compare nothing.
+        resolution: Of the measured positions [rad or m], shape (N,) or one for all; widens the
+            tolerance by twice its value.
+        filter_time: By which measured velocities are late [s]; widens it by twice the way that a
+            joint makes in that time at its fastest.
+        joint_limits: Whether a joint at its limit is a fault.
+        saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+    """
+
+    tolerance: float = 2e-3
+    resolution: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    filter_time: float = 0.0
+    joint_limits: bool = True
+    saturation_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        for key in ("tolerance", "filter_time", "saturation_time"):
+            value = getattr(self, key)
+            if not 0.0 <= value < np.inf:
+                raise InputError(f"{key} = {value}; must be zero or a positive number")
+
+
+class Supervision:
+    """Finds measured values of joints that contradict each other, and joints at their limits.
+
+    Of every joint four signals tell the same motion: positions and integrated velocities of
+    link and motor. From tick to tick each adds to a leaky sum (by 20 1/s), so that offsets
+    between them do not count. Position and velocity of one side must agree up to the tolerance;
+    the sides up to what the drive's torque, twice, bends the spring of an elastic joint.
+
+    Of a side that disagrees with itself the position is suspected if it jumped, by half the
+    tolerance within this tick, or if it has rested, to the last bit, while the velocity told of
+    half the tolerance; else the velocity. If the sides disagree, but none with itself, the one
+    that has moved less is taken for frozen. If both disagree with themselves, their velocities
+    are suspected.
+
+    So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
+    as position and integrated velocity part by the tolerance: a jump of a position in the same
+    tick, of a velocity by ``dv`` after ``tolerance / dv``. What cannot be found: a value that
+    is frozen at rest, as long as the joint rests; drifts slower than tolerance times 20 1/s.
+
+    Args:
+        robot: The robot as it is believed, N joints.
+        limits: Of the drives' torques [Nm or N], shape (N,).
+        parameters: What is watched.
+        period: Sampling time [s].
+
+    Attributes:
+        size: Length of the memory, which belongs to the caller; zeros at the start.
+        saturated_ticks: How many ticks in a row a drive may be at its limit, infinite for ever.
+
+    Raises:
+        InputError: If the resolution fits another number of joints.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        limits: np.ndarray,
+        parameters: SupervisionParameters,
+        period: float,
+    ) -> None:
+        n = robot.dimension
+        self.size = 8 * n
+        resolution = np.asarray(parameters.resolution, dtype=float)
+        if resolution.shape not in ((1,), (n,)):
+            raise InputError(
+                f"resolution: {resolution.tolist()}; must be one number or one of each of {n} "
+                "joints"
+            )
+        time = parameters.saturation_time
+        self.saturated_ticks = round(time / period) if time else np.inf
+        self._n = n
+        function = _supervision_function(robot, limits, resolution, parameters, period)
+        bound = BoundFunction(function)
+        self._arguments, self._result = bound.arguments, bound.results["result"]
+        self._evaluate = bound.evaluate
+
+    def evaluate(
+        self,
+        state: np.ndarray,
+        last: np.ndarray,
+        memory: np.ndarray,
+        known: float,
+        ignored: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return ``[fault, suspects, next memory]``, shape (1 + 12N,), an array that is reused.
+
+        The fault is MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT or NONE; suspects, shape (4N,), are 1
+        where a component of the state is not to be believed.
+
+        Args:
+            state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+            last: The same one period before.
+            memory: Of this object, shape (size,).
+            known: Whether ``last`` is known, 1 or 0.
+            ignored: What is not compared any more, nonzero if so, shape (4N,).
+        """
+        arguments = self._arguments
+        arguments["state"][:] = state
+        arguments["last"][:] = last
+        arguments["memory"][:] = memory
+        arguments["known"][0] = known
+        arguments["ignored"][:] = 0.0 if ignored is None else ignored
+        self._evaluate()
+        return self._result
+
+    def suspects(self, result: np.ndarray) -> np.ndarray:
+        """Return the part of a result that tells what is not to be believed, shape (4N,)."""
+        return result[1 : 1 + 4 * self._n]
+
+    def next_memory(self, result: np.ndarray) -> np.ndarray:
+        """Return the part of a result that is the next memory, shape (size,)."""
+        return result[1 + 4 * self._n :]
+
+
+def _supervision_function(
+    robot: RobotModel,
+    limits: np.ndarray,
+    resolution: np.ndarray,
+    parameters: SupervisionParameters,
+    period: float,
+) -> ca.Function:
+    n, k_s = robot.dimension, robot.K_s
+    state, last = ca.SX.sym("state", 4 * n), ca.SX.sym("last", 4 * n)
+    memory, known = ca.SX.sym("memory", 8 * n), ca.SX.sym("known")
+    ignored = ca.SX.sym("ignored", 4 * n)
+    speed = robot.gather("velocity_limit")
+    speed = np.where(np.isfinite(speed), speed, 0.0)
+    tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
+    bending = np.where(np.isfinite(k_s), _BENDING * np.minimum(limits, 1e300) / k_s, 0.0)
+    now, before, sums = (ca.vertsplit(x, n) for x in (state, last, memory[: 4 * n]))
+    unchanged = ca.if_else(state == last, memory[4 * n :] + known, 0.0)
+    rests = ca.vertsplit(unchanged, n)
+    ways, steps = [], []
+    for k, (x, x_0, total) in enumerate(zip(now, before, sums, strict=True)):
+        step = x - x_0 if k % 2 == 0 else period / 2.0 * (x + x_0)
+        steps.append(ca.if_else(known, step, 0.0))
+        moved = total + steps[-1]
+        # what is no number contradicts nothing
+        ways.append(ca.if_else(ca.fabs(moved) < ca.inf, moved, 0.0))
+    used = [
+        ca.logic_and(ca.fabs(x) < ca.inf, skip == 0.0)
+        for x, skip in zip(now, ca.vertsplit(ignored, n), strict=True)
+    ]
+    q_J, v_J, q_M, v_M = _substituted(ways, used)
+    wrong_J, wrong_M = ca.fabs(q_J - v_J) > tolerance, ca.fabs(q_M - v_M) > tolerance
+    link, motor = (q_J + v_J) / 2.0, (q_M + v_M) / 2.0
+    apart = ca.fabs(link - motor) > tolerance + bending
+    neither, both = ca.logic_not(wrong_J + wrong_M), wrong_J * wrong_M
+    link_rests = ca.fabs(link) < ca.fabs(motor)
+    suspects = []
+    for side, wrong in ((0, wrong_J), (2, wrong_M)):
+        slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
+        at_once = _AT_ONCE * tolerance
+        # a velocity that jumped has let them part in the ticks before, too
+        agreed = ca.fabs(sums[side] - sums[side + 1]) < at_once / 2.0
+        sudden = period * ca.fabs(change) < ca.fabs(slip)
+        jumped = (ca.fabs(slip) > at_once) * agreed * sudden
+        rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
+        of_position = (1 - both) * ca.fmax(jumped, rested)
+        suspects += [wrong * of_position, wrong * (1 - of_position)]
+    frozen = [neither * apart * link_rests, neither * apart * (1 - link_rests)]
+    suspect = ca.vertcat(*[s + frozen[k // 2] for k, s in enumerate(suspects)])
+    suspect = suspect if parameters.tolerance else 0.0 * suspect
+    suspect *= ca.vertcat(*used)
+    lower, upper = robot.gather("position_limits").T
+    at_limit = ca.sum1((now[0] <= lower) + (now[0] >= upper)) if parameters.joint_limits else 0
+    fault = ca.if_else(
+        ca.sum1(suspect) > 0,
+        Fault.MEASUREMENT_IMPLAUSIBLE,
+        ca.if_else(at_limit > 0, Fault.JOINT_LIMIT, Fault.NONE),
+    )
+    decay = np.exp(-_FORGETTING * period)
+    result = ca.vertcat(fault, suspect, *[decay * way for way in ways], unchanged)
+    return ca.Function(
+        "supervision",
+        [state, last, memory, known, ignored],
+        ca.cse([ca.densify(result)]),
+        ["state", "last", "memory", "known", "ignored"],
+        ["result"],
+    )
+
+
+def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
+    """Return four signals, each (N,); what is not used agrees with its side, or with the other."""
+    means = []
+    for side in (0, 2):
+        count = used[side] + used[side + 1]
+        total = ways[side] * used[side] + ways[side + 1] * used[side + 1]
+        means.append((count, total / ca.fmax(count, 1.0)))
+    (has_link, link), (has_motor, motor) = means
+    link, motor = ca.if_else(has_link, link, motor), ca.if_else(has_motor, motor, link)
+    return [ca.if_else(used[k], ways[k], link if k < 2 else motor) for k in range(4)]

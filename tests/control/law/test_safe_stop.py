@@ -1,0 +1,174 @@
+"""Stopping and holding, on the equations of motion of a robot integrated here."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+
+PERIOD, N = 1e-3, 3
+POSTURE, SPEED = np.array([0.2, 1.4, -0.4]), np.array([0.8, -0.9, 1.2])
+NOTHING = np.zeros(4 * N)
+
+
+class Robot:
+    """Three axes in Drake's plant; rigid ones, or links and motors with springs between."""
+
+    def __init__(self, name: str) -> None:
+        self.plant = MultibodyPlant(0.0)
+        Parser(self.plant).AddModels(str(resolve_model(name)))
+        self.plant.Finalize()
+        tool = self.plant.GetFrameByName("tool_point")
+        self.chain, self.coordinates = chain_from_plant(self.plant, tool)
+        self.rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
+        self.limits = self.chain.gather("effort_limit")
+        self.context = self.plant.CreateDefaultContext()
+
+    def state(self, q, v):
+        """Return the plant's state with springs that bear the weight."""
+        weight = self.weight(q)
+        x = np.concatenate([q, v, q + weight / self.chain.K_s, v])
+        return self.coordinates.plant_state(x)
+
+    def weight(self, q):
+        from pfsc_drake.robot.robot_model import gravity_function
+
+        return np.array(gravity_function(self.chain)(ca.DM(q))).ravel()
+
+    def rates(self, x, tau):
+        half = len(x) // 2
+        self.plant.SetPositionsAndVelocities(self.context, x)
+        actuation = np.zeros(N)
+        actuation[self.coordinates.actuators] = tau
+        self.plant.get_actuation_input_port().FixValue(self.context, actuation)
+        rates = self.plant.EvalTimeDerivatives(self.context).CopyToVector()
+        assert len(rates) == 2 * half
+        return rates
+
+    def step(self, x, tau):
+        """Integrate over a period by the classical scheme of fourth order."""
+        h = PERIOD
+        k_1 = self.rates(x, tau)
+        k_2 = self.rates(x + h / 2 * k_1, tau)
+        k_3 = self.rates(x + h / 2 * k_2, tau)
+        k_4 = self.rates(x + h * k_3, tau)
+        return x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+
+
+@pytest.fixture(scope="module", params=["comau_racer_1_4_3r", "comau_racer_1_4_elastic_3r"])
+def robot(request):
+    return Robot(request.param)
+
+
+def stop(robot, lost=(), suspect=(), ticks=700, spoil=np.nan, speed=SPEED):
+    """Stop a moving robot of which components are lost, and return states and torques."""
+    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    x, suspects = robot.state(POSTURE, speed), NOTHING.copy()
+    suspects[list(suspect)] = 1.0
+    last = robot.rows @ robot.step(x, robot.weight(POSTURE))
+    memory, states, torques = None, [], []
+    for _ in range(ticks):
+        true = robot.rows @ x
+        measured = true.copy()
+        measured[list(lost)] = spoil
+        memory = safe.start(last, measured, suspects) if memory is None else memory
+        tau = safe.drive(memory, measured)
+        memory = safe.advance(memory, measured, suspects)
+        states.append(true)
+        torques.append(tau)
+        x = robot.step(x, tau)
+    return np.array(states), np.array(torques)
+
+
+def check(states, travel=0.12):
+    """Check that a robot has stopped soon, and stays."""
+    way = np.abs(states[:, :N] - states[0, :N]).max()
+    assert way < travel
+    rest = states[400:]
+    assert np.abs(rest[:, :N] - rest[0, :N]).max() < np.deg2rad(0.5)
+    assert np.abs(states[-50:, N : 2 * N]).max() < 5e-3
+
+
+def test_it_stops_and_holds(robot):
+    states, torques = stop(robot)
+    check(states)
+    assert np.all(np.abs(torques) <= robot.limits)
+    # where it rests there is only the weight left, and no jump on the way there
+    np.testing.assert_allclose(torques[-1], robot.weight(states[-1, :N]), atol=0.5)
+    assert np.abs(np.diff(torques[5:], axis=0)).max() < 0.05 * robot.limits.max()
+
+
+@pytest.mark.parametrize("component", [1, 4, 7, 10])
+def test_each_component_may_be_lost(robot, component):
+    check(stop(robot, lost=[component])[0])
+
+
+@pytest.mark.parametrize("component", [1, 4, 7, 10])
+def test_what_is_implausible_is_not_used(robot, component):
+    """The value is off by far, as the supervision has found."""
+    check(stop(robot, lost=[component], suspect=[component], spoil=5.0)[0])
+
+
+def test_the_link_side_may_be_lost(robot):
+    check(stop(robot, lost=[1, N + 1])[0])
+
+
+def test_of_the_motor_side_nothing_may_be_left(robot):
+    """A soft joint is then held by what its motor is thought to do: it creeps, by less than 5."""
+    states, _ = stop(robot, lost=[2 * N + 1, 3 * N + 1])
+    assert np.abs(states[:, :N] - states[0, :N]).max() < 0.15
+    assert np.abs(states[400:, :N] - states[400, :N]).max() < np.deg2rad(5.0)
+
+
+def test_a_joint_that_is_not_seen_gets_the_planned_torque(robot):
+    """From rest: its weight, whatever the others do."""
+    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    x = robot.rows @ robot.state(POSTURE, np.zeros(N))
+    unseen = x.copy()
+    unseen[1::N] = np.nan
+    memory = safe.start(x, unseen, NOTHING)
+    for _ in range(50):
+        tau = safe.drive(memory, unseen)
+        memory = safe.advance(memory, unseen, NOTHING)
+    assert tau[1] == pytest.approx(robot.weight(POSTURE)[1], abs=1e-9)
+
+
+def test_a_value_that_comes_back_is_used_unless_it_was_implausible(robot):
+    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    x = robot.rows @ robot.state(POSTURE, np.zeros(N))
+    away = x.copy()
+    away[2 * N :] += np.repeat([0.01, 0.0], N)
+    lost = x.copy()
+    lost[2 * N + 1] = np.nan
+    pulls = []
+    for suspects in (NOTHING, np.eye(4 * N)[2 * N + 1]):
+        memory = safe.advance(safe.start(x, lost, suspects), lost, suspects)
+        pulls.append(safe.drive(memory, away)[1] - robot.weight(POSTURE)[1])
+        np.testing.assert_array_equal(safe.suspects(memory), suspects)
+    assert pulls[0] < -10.0
+    assert pulls[0] < 0.1 * pulls[1] if pulls[1] < 0.0 else pulls[1] < 10.0
+
+
+def test_fast_joints_are_given_the_time_that_their_drives_need(robot):
+    """Three times the speed: the limits are kept, and the robot stands within a second."""
+    states, torques = stop(robot, speed=2.5 * SPEED)
+    check(states, travel=1.0)
+    assert np.mean(np.abs(torques) >= robot.limits) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (SafeState(np.zeros(N), bandwidth=0.0), "bandwidth: 0.0"),
+        (SafeState(np.zeros(N), effort_share=1.5), "effort share: 1.5"),
+        (SafeState(np.full(N, np.nan)), "damping.*3 finite"),
+    ],
+)
+def test_wrong_settings_are_refused(robot, settings, message):
+    with pytest.raises(InputError, match=message):
+        SafeStop(robot.chain, robot.limits, settings, PERIOD)

@@ -1,0 +1,126 @@
+"""Which measured value of a joint is wrong: from motions that are known."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+
+PERIOD, N = 1e-3, 3
+TIMES = PERIOD * np.arange(800)
+BEGIN = 400
+NAMES = ("q_J", "v_J", "q_M", "v_M")
+
+
+@pytest.fixture(scope="module", params=["comau_racer_1_4_elastic_3r", "comau_racer_1_4_3r"])
+def chain(request):
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(resolve_model(request.param)))
+    plant.Finalize()
+    return chain_from_plant(plant, plant.GetFrameByName("tool_point"))[0]
+
+
+def motion(chain):
+    """Return states of joints that swing, the springs of elastic ones bent by 500 Nm and back."""
+    rate = np.array([3.0, 4.0, 5.0])
+    angle = rate * TIMES[:, None]
+    q, v = 0.4 * np.sin(angle) + [0.0, 1.0, 0.0], 0.4 * rate * np.cos(angle)
+    bend = np.where(np.isfinite(chain.K_s), 500.0 / chain.K_s, 0.0)
+    swing = 30.0 * TIMES[:, None]
+    q_M, v_M = q + bend * np.sin(swing), v + 30.0 * bend * np.cos(swing)
+    return np.hstack([q, v, q_M, v_M])
+
+
+def watch(chain, states, **options):
+    """Return the first tick with a fault, the fault, and the suspects by name."""
+    limits = chain.gather("effort_limit")
+    supervision = Supervision(chain, limits, SupervisionParameters(**options), PERIOD)
+    memory, last = np.zeros(supervision.size), states[0]
+    for k, state in enumerate(states):
+        result = supervision.evaluate(state, last, memory, float(k > 0))
+        if result[0]:
+            found = np.flatnonzero(supervision.suspects(result))
+            return k, Fault(int(result[0])), [f"{NAMES[i // N]}_{i % N + 1}" for i in found]
+        memory, last = supervision.next_memory(result).copy(), state
+    return None
+
+
+def test_a_true_motion_is_believed(chain):
+    assert watch(chain, motion(chain)) is None
+
+
+@pytest.mark.parametrize("component", range(4 * N))
+@pytest.mark.parametrize("kind", ["jump", "frozen"])
+def test_what_is_wrong_is_found(chain, component, kind):
+    states = motion(chain)
+    if kind == "jump":
+        size = 0.01 if component // N % 2 == 0 else 0.5
+        states[BEGIN:, component] += size
+    else:
+        states[BEGIN:, component] = states[BEGIN, component]
+    k, fault, suspects = watch(chain, states)
+    assert fault is Fault.MEASUREMENT_IMPLAUSIBLE
+    assert suspects == [f"{NAMES[component // N]}_{component % N + 1}"]
+    if kind == "jump":
+        # a position at once, a velocity when 2 mrad are integrated
+        assert k == BEGIN if size == 0.01 else BEGIN + 3 <= k <= BEGIN + 6
+    assert BEGIN <= k < BEGIN + 150
+
+
+def test_what_cannot_be_found(chain):
+    """Frozen at rest; a drift below the tolerance times the rate of forgetting; by intent."""
+    resting = np.tile(motion(chain)[0] * np.repeat([1, 0, 1, 0], N), (800, 1))
+    assert watch(chain, resting) is None
+    drifting = motion(chain)
+    drifting[:, 1] += 0.9 * 2e-3 * 20.0 * TIMES
+    assert watch(chain, drifting) is None
+    drifting[:, 1] += 0.3 * 2e-3 * 20.0 * TIMES
+    assert watch(chain, drifting)[1] is Fault.MEASUREMENT_IMPLAUSIBLE
+    jumped = motion(chain)
+    jumped[BEGIN:, 0] += 1.0
+    assert watch(chain, jumped, tolerance=0.0) is None
+
+
+def test_coarse_and_late_measurements_are_believed(chain):
+    """Steps of 3 mrad, and velocities that a filter of 20 ms delays."""
+    states, step, time = motion(chain), 3e-3, 0.02
+    late = states.copy()
+    for side in (slice(0, N), slice(2 * N, 3 * N)):
+        late[:, side] = step * np.round(states[:, side] / step)
+    weight = 1.0 - np.exp(-PERIOD / time)
+    for k in range(1, len(late)):
+        for side in (slice(N, 2 * N), slice(3 * N, 4 * N)):
+            late[k, side] = late[k - 1, side] + weight * (states[k, side] - late[k - 1, side])
+    assert watch(chain, late) is not None
+    assert watch(chain, late, resolution=np.array([step]), filter_time=time) is None
+
+
+def test_values_that_are_no_numbers_are_for_others_to_find(chain):
+    states = motion(chain)
+    states[BEGIN:, 7] = np.nan
+    assert watch(chain, states) is None
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_joint_limits(chain, side):
+    states = motion(chain)
+    limit = chain.gather("position_limits")[1, side]
+    offset = limit - (states[:, 1].max() if side else states[:, 1].min())
+    for column in (1, 7):
+        states[:, column] += offset
+    k, fault, suspects = watch(chain, states)
+    assert (fault, suspects) == (Fault.JOINT_LIMIT, [])
+    assert states[k, 1] == limit
+    assert watch(chain, states, joint_limits=False) is None
+
+
+def test_wrong_parameters_are_refused(chain):
+    with pytest.raises(InputError, match="tolerance = -1"):
+        SupervisionParameters(tolerance=-1.0)
+    with pytest.raises(InputError, match=r"resolution.*3 joints"):
+        watch(chain, motion(chain), resolution=np.ones(2))

@@ -1,0 +1,191 @@
+"""How runs end after a fault: they are simulated on, and the robot stands."""
+
+import numpy as np
+import pytest
+
+from diagrams.builder import build_station
+from diagrams.scenario import BrakeParameters, ForcePulse, Scenario
+from experiments.catalog.scenario_catalog import find_scenario
+from experiments.simulation import simulate
+from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.robot.robot_model import pose_function
+
+SCENARIOS = find_scenario("pfc_compliant_6r").parent
+AFTER = 1.0
+
+
+@pytest.fixture
+def soft(load_scenario):
+    """Three axes with soft elastic joints on their way at 1.5 m/s."""
+    settings = load_scenario("pfc_elastic_3r")
+    settings.reference.dwell, settings.start.offset = 0.05, [0.0, 0.0]
+    return settings
+
+
+@pytest.fixture
+def six_axes(load_scenario):
+    settings = exact(load_scenario("pfc_compliant_6r"))
+    settings.reference.dwell = 0.1
+    return settings
+
+
+def exact(settings):
+    """Return a scenario without friction, errors of its model, and increments of encoders."""
+    fresh = Scenario()
+    for key in ("friction", "encoders", "model_error"):
+        setattr(settings, key, getattr(fresh, key))
+    return settings
+
+
+def go_on(settings, duration, after=AFTER):
+    """Simulate into a fault and on; return station, result, times, and what was logged."""
+    if settings.simulation.integrator == "auto":
+        settings.simulation.integrator = "runge_kutta3"
+    station = build_station(settings, SCENARIOS)
+    progress = [lambda *_: None]
+    result = simulate(station, settings.simulation, duration, *progress, after_fault=after)
+    times, log = station.log.read(result.root)
+    return station, result, times, log
+
+
+def check_rest(station, result, times, log, *, degrees=5.0):
+    """The joints stand soon after the fault, and stay where they are."""
+    assert result.fault is not None
+    n = station.robot.dimension
+    q, v = log["joint_state"][:, :n], log["joint_state"][:, n : 2 * n]
+    fault = np.searchsorted(times, result.fault_time - 1e-9)
+    stopped = times > result.fault_time + 0.6
+    assert times[-1] > result.fault_time + AFTER - 1e-9
+    assert np.abs(v[stopped]).max() < 0.05
+    assert np.rad2deg(np.abs(q[stopped] - q[stopped][0]).max()) < 1.0
+    assert np.rad2deg(np.abs(q[stopped] - q[fault]).max()) < degrees
+    drive = log.get("drive_torque", log["law"][:, station.law.layout.drive])
+    assert np.isfinite(drive).all()
+
+
+@pytest.mark.parametrize("kind", ["nan", "frozen", "jump"])
+@pytest.mark.parametrize("component", [1, 4, 7, 10])
+def test_a_sensor_of_an_elastic_joint(soft, kind, component):
+    failure = soft.simulation.sensor_failure
+    failure.time, failure.kind, failure.component = 0.35, kind, component
+    failure.size = 0.02 if component in (1, 7) else 1.0
+    station, result, times, log = go_on(soft, 1.0)
+    name = {1: "q_J_2", 4: "v_J_2", 7: "q_M_2", 10: "v_M_2"}[component]
+    assert f": {name} at eta = " in result.fault
+    assert 0.35 <= result.fault_time < 0.45
+    check_rest(station, result, times, log, degrees=6.0)
+
+
+def test_brakes_hold_a_joint_of_which_nothing_is_seen(six_axes):
+    failure = six_axes.simulation.sensor_failure
+    failure.time, failure.component, failure.whole_joint = 0.35, 1, True
+    six_axes.faults.brakes = BrakeParameters(delay=0.1)
+    six_axes.simulation.integrator, six_axes.forces = "runge_kutta3", []
+    check_rest(*go_on(six_axes, 1.0))
+
+
+@pytest.mark.parametrize("kind", ["nan", "jump"])
+def test_a_force_sensor(six_axes, kind):
+    failure = six_axes.simulation.force_sensor_failure
+    six_axes.forces = [ForcePulse(begin=0.2, end=9.0, ramp=0.05, frame="world", force=[0, 20, 0])]
+    failure.time, failure.kind, failure.size = 0.45, kind, 1e4
+    station, result, times, log = go_on(six_axes, 1.0)
+    expected = "is lost" if kind == "nan" else "is at the end of its range"
+    assert result.fault.startswith(f"the force/torque sensor {expected} at eta = ")
+    assert result.fault_time == pytest.approx(0.45)
+    check_rest(station, result, times, log)
+
+
+def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
+    six_axes.sensor.measurement_range = np.full(6, 1.0)
+    station, result, *_ = go_on(six_axes, 0.2)
+    assert result.fault is None
+    sensor = station.diagram.GetSubsystemByName("tool_compensation")
+    assert sensor.fault(sensor.GetMyContextFromRoot(result.root)) is Fault.NONE
+
+
+def test_lost_frames_of_a_bus(six_axes):
+    """Short losses are bridged; the servos stop when nothing has come for 10 ms."""
+    six_axes.controller.law = "velocity_servo"
+    six_axes.compliance = type(six_axes.compliance)()
+    six_axes.sensor = None
+    six_axes.servo.bus_delay = 2e-3
+    six_axes.servo.lost.begin, six_axes.servo.lost.end = 0.4, 0.409
+    assert go_on(six_axes, 0.5)[1].fault is None
+    six_axes.servo.lost.end = np.inf
+    station, result, times, log = go_on(six_axes, 1.0)
+    assert result.fault.startswith(f"velocity_servo: {Fault.BUS_LOST.explanation} at eta")
+    assert 0.41 < result.fault_time < 0.42
+    check_rest(station, result, times, log)
+
+
+def test_a_joint_at_its_limit(six_axes, monkeypatch):
+    """Axis 1 sets off to more than 5 deg beside where it starts."""
+    six_axes.compliance = type(six_axes.compliance)()
+    six_axes.sensor, six_axes.forces = None, []
+    six_axes.reference.velocity = 0.5
+    station = build_station(six_axes, SCENARIOS)
+    kind = type(station.part.belief.robot)
+    limits = kind.gather(station.part.belief.robot, "position_limits").copy()
+    limits[0] = station.start_posture[0] + np.deg2rad([-4.0, 4.0])
+    gather = kind.gather
+
+    def narrow(robot, attribute):
+        return limits if attribute == "position_limits" else gather(robot, attribute)
+
+    monkeypatch.setattr(kind, "gather", narrow)
+    station, result, times, log = go_on(six_axes, 2.0)
+    assert result.fault.startswith("joint 1 'joint_1' is at its limit of ")
+    check_rest(station, result, times, log)
+
+
+def test_a_drive_at_its_limit_for_long(soft):
+    soft.controller.effort_scale, soft.faults.saturation_time = 0.05, 0.02
+    _, result, *_ = go_on(soft, 0.5, after=0.0)
+    assert result.fault.startswith(f"{Fault.DRIVE_SATURATED.explanation}: ")
+
+
+def test_three_free_turns_about_the_tools_axis(six_axes):
+    """The reference turns on and on, and the angles with it."""
+    compliance = six_axes.compliance
+    compliance.transversal = CoordinateImpedance()
+    compliance.rotational = CoordinateImpedance(Profile(0.02), Profile(0.25), Profile(0.0))
+    six_axes.reference.points, six_axes.faults.joint_limits = [0.3, 0.3], False
+    station = build_station(six_axes, SCENARIOS)
+    R_e = np.array(pose_function(station.robot)(station.start_posture)).ravel()[3:].reshape(3, 3)
+    turn = ForcePulse(begin=0.2, end=3.4, ramp=0.1, frame="world", torque=2.0 * R_e[:, 2])
+    six_axes.forces = [turn]
+    station, result, _, log = go_on(six_axes, 2.8)
+    assert result.fault is None
+    m = station.law.linearization.num_outputs
+    phi = log["law"][:, station.law.layout.manifold_state][:, 3:6]
+    assert phi[-1, 0] > 3.0 * 2.0 * np.pi
+    assert np.abs(np.diff(phi, axis=0)).max() < 0.05
+    assert np.abs(phi - log["reference"].reshape(len(phi), -1, m)[:, 0, 3:6]).max() < 0.02
+    drive = log["law"][:, station.law.layout.drive]
+    # the sensor's noise alone takes some 40 Nm a tick of axis 1; the limits are 1800 Nm
+    assert np.abs(np.diff(drive[300:], axis=0)).max() < 100.0
+    assert np.abs(drive[300:]).max() < 600.0
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_over_the_end_of_an_open_path(load_scenario, end):
+    """Pushed over the end at 0.4 m/s; the tool turned on the way to it."""
+    settings, sign = exact(load_scenario("operator_hand_6r")), 2 * end - 1
+    settings.hand = None
+    settings.reference.points = [[0.08, 0.08], [0.94, 0.94]][end]
+    if end:
+        settings.start.posture_deg = [25, 115, -40, -5, 95, -17]
+    settings.forces = [
+        ForcePulse(begin=0.3, end=1.0, ramp=0.05, frame="manifold", force=[sign * 25.0, 0, 0])
+    ]
+    station, result, _, log = go_on(settings, 1.0)
+    assert result.fault is None
+    eta = log["manifold_point"][:, station.task.place.layout.eta]
+    beyond = eta[-1] - station.path.length if end else -eta[-1]
+    assert beyond > 0.07
+    drive = log["law"][:, station.law.layout.drive]
+    # the push itself takes 10 Nm a tick where it sets in
+    assert np.abs(np.diff(drive[350:], axis=0)).max() < 15.0
+    assert np.abs(drive).max() < 400.0
