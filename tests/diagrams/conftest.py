@@ -67,3 +67,18 @@ def load_scenario():
         return load_file(Scenario, find_scenario(name))
 
     return load
+
+
+@pytest.fixture
+def load_exact_scenario(load_scenario):
+    """Return a fresh copy of a shipped scenario whose controller knows and sees the truth."""
+
+    def load(name: str) -> Scenario:
+        settings, plain = load_scenario(name), Scenario()
+        for key in ("friction", "encoders", "model_error"):
+            setattr(settings, key, getattr(plain, key))
+        settings.controller.friction = plain.controller.friction
+        settings.start.transition = 0.0
+        return settings
+
+    return load

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import BrakeParameters, ForcePulse, Scenario
+from diagrams.scenario import BrakeParameters, ForcePulse
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
@@ -24,17 +24,9 @@ def soft(load_scenario):
 
 
 @pytest.fixture
-def six_axes(load_scenario):
-    settings = exact(load_scenario("pfc_compliant_6r"))
+def six_axes(load_exact_scenario):
+    settings = load_exact_scenario("pfc_compliant_6r")
     settings.reference.dwell = 0.1
-    return settings
-
-
-def exact(settings):
-    """Return a scenario without friction, errors of its model, and increments of encoders."""
-    fresh = Scenario()
-    for key in ("friction", "encoders", "model_error"):
-        setattr(settings, key, getattr(fresh, key))
     return settings
 
 
@@ -170,9 +162,9 @@ def test_three_free_turns_about_the_tools_axis(six_axes):
 
 
 @pytest.mark.parametrize("end", [0, 1])
-def test_over_the_end_of_an_open_path(load_scenario, end):
+def test_over_the_end_of_an_open_path(load_exact_scenario, end):
     """Pushed over the end at 0.4 m/s; the tool turned on the way to it."""
-    settings, sign = exact(load_scenario("operator_hand_6r")), 2 * end - 1
+    settings, sign = load_exact_scenario("operator_hand_6r"), 2 * end - 1
     settings.hand = None
     settings.reference.points = [[0.08, 0.08], [0.94, 0.94]][end]
     if end:

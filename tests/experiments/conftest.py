@@ -81,9 +81,10 @@ def three_axes(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def six_axes(tmp_path_factory):
-    """The shipped six-axis scenario with everything that a run can write."""
+    """The shipped six-axis scenario, from beside the path, with everything that a run can write."""
     out = tmp_path_factory.mktemp("six") / "out"
-    return run(out, "pfc_elastic_6r", "--duration", "0.15", complete=True)
+    beside = ("--set", "start.transition=0")
+    return run(out, "pfc_elastic_6r", "--duration", "0.15", *beside, complete=True)
 
 
 @pytest.fixture

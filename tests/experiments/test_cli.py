@@ -26,6 +26,7 @@ class Outcome:
     warnings: list[str] = field(default_factory=list)
     interrupted: bool = False
     problem: str | None = None
+    margins: str | None = None
 
 
 class FakeRun:
@@ -36,7 +37,7 @@ class FakeRun:
         self.raises: BaseException | None = None
         self.calls: list[tuple] = []
 
-    def run_scenario(self, scenario, out, duration, figures, recording, progress):
+    def run_scenario(self, scenario, out, duration, figures, recording, progress, **_):
         self.calls.append((scenario, out, duration, figures, recording))
         progress(0.0, "building")
         progress.expect(1.0)

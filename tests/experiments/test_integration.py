@@ -56,7 +56,7 @@ def motion(station, settings, parameters):
     [
         ("pfc_elastic_6r", RIGID, "runge_kutta2", None),
         ("pfc_elastic_3r", (), "runge_kutta3", "runge_kutta2"),
-        ("pfc_elastic_6r", (), "runge_kutta5", "runge_kutta3"),
+        ("pfc_elastic_6r", ("start.transition=0",), "runge_kutta5", "runge_kutta3"),
     ],
 )
 def test_the_cheapest_that_is_accurate(name, changes, scheme, without):

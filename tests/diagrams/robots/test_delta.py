@@ -19,7 +19,8 @@ PERIOD = 0.04
 
 
 def load(*changes):
-    return load_typed(Scenario, load_scenario_data(FILE, list(changes)), str(FILE))
+    exact = ["encoders={}", "model_error={}", "start.transition=0"]
+    return load_typed(Scenario, load_scenario_data(FILE, [*exact, *changes]), str(FILE))
 
 
 def build(*changes):

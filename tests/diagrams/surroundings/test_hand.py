@@ -31,9 +31,9 @@ def steady_hand(target, **changes):
 
 
 @pytest.fixture
-def settings(load_scenario) -> Scenario:
+def settings(load_scenario, load_exact_scenario) -> Scenario:
     """Three rigid axes that rest on the path."""
-    settings = load_scenario("operator_hand_6r")
+    settings = load_exact_scenario("operator_hand_6r")
     settings.robot.model = "comau_racer_1_4_3r"
     settings.path = load_scenario("pfc_elastic_3r").path
     settings.start.posture_deg = [15, 115, -10]

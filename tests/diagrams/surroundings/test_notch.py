@@ -21,7 +21,8 @@ UP = np.array([0.0, 0.0, -1.0])  # z_0 points down
 
 
 def load(*changes):
-    return load_typed(Scenario, load_scenario_data(FILE, list(changes)), str(FILE))
+    exact = ["encoders={}", "model_error={}", "start.transition=0"]
+    return load_typed(Scenario, load_scenario_data(FILE, [*exact, *changes]), str(FILE))
 
 
 @pytest.fixture(name="settings", scope="module")

@@ -22,9 +22,9 @@ def impedance(mass, damping, stiffness):
 
 
 @pytest.fixture
-def settings(load_scenario) -> Scenario:
+def settings(load_exact_scenario) -> Scenario:
     """Six rigid axes that rest on the path; nothing yields, and the sensor is exact."""
-    settings = load_scenario("pfc_compliant_6r")
+    settings = load_exact_scenario("pfc_compliant_6r")
     settings.compliance.transversal = CoordinateImpedance()
     settings.reference.points = [0.3, 0.3]
     settings.sensor.noise, settings.sensor.bias = np.zeros(6), np.zeros(6)
