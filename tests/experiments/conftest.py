@@ -81,10 +81,14 @@ def three_axes(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def six_axes(tmp_path_factory):
-    """The shipped six-axis scenario, from beside the path, with everything that a run can write."""
+    """The shipped six-axis scenario with everything that a run can write.
+
+    It starts beside the path, without transition, and without integral part.
+    """
     out = tmp_path_factory.mktemp("six") / "out"
-    beside = ("--set", "start.transition=0")
-    return run(out, "pfc_elastic_6r", "--duration", "0.15", *beside, complete=True)
+    gains = [f"controller.gains.elastic.{kind}.integral_pole=0" for kind in ("eta", "xi", "phi")]
+    changes = [x for change in ("start.transition=0", *gains) for x in ("--set", change)]
+    return run(out, "pfc_elastic_6r", "--duration", "0.15", *changes, complete=True)
 
 
 @pytest.fixture
