@@ -10,7 +10,7 @@ import dataclasses
 import json
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,6 +22,7 @@ from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
 from experiments.interruption import INTERRUPTED, raised_interruption
+from experiments.outcomes import fail, judge_run, judge_sweep, print_run, print_sweep, show_page
 from experiments.progress import ProgressDisplay
 from experiments.terminal import one_line, print_error
 from pfsc_drake.errors import InputError, shortened
@@ -29,13 +30,7 @@ from pfsc_drake.yaml.schema_check import is_number
 
 if TYPE_CHECKING:
     from experiments.pages.report import Report
-    from experiments.results.metrics import Metric
-    from experiments.run import RunOutcome
-    from experiments.sweep.sweep import SweepOutcome
 
-WRONG_INPUT = 2
-FAULT = 3
-NOT_WRITTEN = 4
 _LONGEST_AFTER_FAULT = 100.0  # s
 
 app = typer.Typer(
@@ -119,8 +114,8 @@ def run_command(
                 after_fault=further,
                 margins=margins,
             )
-        _print_outcome(console, outcome)
-        raise typer.Exit(_judge(outcome, folder, progress.simulated_time))
+        print_run(console, outcome)
+        raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
 
 
 @app.command("compare")
@@ -133,7 +128,7 @@ def compare_command(
 
     with _interruptible():
         report = write_comparison([expand_home(run) for run in runs], expand_home(out))
-        raise typer.Exit(_show("comparison", report))
+        raise typer.Exit(show_page("comparison", report))
 
 
 @app.command("sweep")
@@ -201,8 +196,8 @@ def sweep_command(
         outcome = run_sweep(
             sweep, folder, console, scheduler=scheduler, workers=workers, metric=metric
         )
-        _print_sweep(console, outcome)
-        raise typer.Exit(_judge_sweep(outcome, folder))
+        print_sweep(console, outcome)
+        raise typer.Exit(judge_sweep(outcome, folder))
 
 
 @app.command("study")
@@ -235,7 +230,7 @@ def study_command(
         report = studies[name](
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
-        raise typer.Exit(_show("study", report))
+        raise typer.Exit(show_page("study", report))
 
 
 @app.command("margins")
@@ -278,7 +273,7 @@ def margins_command(
             console.print(table)
             console.print()
         console.print(summary(outcome.analysis), highlight=False)
-        raise typer.Exit(_show("margins", outcome.report))
+        raise typer.Exit(show_page("margins", outcome.report))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -298,10 +293,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             standalone_mode=False,
         )
     except InputError as error:
-        return _fail(str(error))
+        return fail(str(error))
     except usage_error as error:
         reason = one_line(error.format_message()).rstrip(".")
-        return _fail(f"{reason}; see python -m experiments --help")
+        return fail(f"{reason}; see python -m experiments --help")
     return status if isinstance(status, int) else 0
 
 
@@ -332,100 +327,3 @@ def _read_after_fault(text: str) -> float:
             f"--after-fault {shortened(text)}: allowed: 0 to {_LONGEST_AFTER_FAULT:g} seconds"
         )
     return seconds
-
-
-def _print_outcome(console: Console, outcome: "RunOutcome") -> None:
-    """What came out of a run, as far as it is no reason for concern."""
-    console.print(_metrics_table(outcome.metrics))
-    for warning in outcome.warnings:
-        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
-    if outcome.margins is not None:
-        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
-    _print_page(console, "\nOpen the report", outcome.report)
-
-
-def _judge(outcome: "RunOutcome", out: Path, time: float) -> int:
-    """Says in one line what went wrong in a run, if anything did; returns the exit status."""
-    status, ends = 0, []
-    if outcome.interrupted:
-        status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
-    if outcome.fault is not None:
-        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    elif ends:
-        ends = [f"{ends[0]}, everything logged so far is kept in {out}"]
-    if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
-    return status
-
-
-def _print_sweep(console: Console, outcome: "SweepOutcome") -> None:
-    """What came out of a sweep."""
-    key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
-    console.print(_metrics_table(key_metrics))
-    for warning in outcome.warnings:
-        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
-    for strikes, command in outcome.commands.items():
-        console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
-    _print_page(console, "\nOpen the report", outcome.report)
-
-
-def _judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
-    """Says in one line why a sweep is not whole, if it is not; returns the exit status."""
-    status, ends = 0, []
-    done = f"{len(outcome.rows)} of {outcome.total} runs"
-    if outcome.interrupted:
-        status, ends = INTERRUPTED, [f"interrupted after {done}"]
-    if outcome.stopped is not None:
-        status, ends = FAULT, [f"fault: {outcome.stopped}; stopped after {done}"]
-    if ends:
-        ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
-    elif outcome.refusal is not None:
-        status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
-    if outcome.problem is not None:
-        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
-    if ends:
-        print_error("; ".join(ends), after_echo=outcome.interrupted)
-    return status
-
-
-def _show(what: str, report: "Report") -> int:
-    """Says where a page is, or that it could not be written; returns the exit status."""
-    _print_page(Console(), f"Open the {what}", report.path)
-    if report.problem is None:
-        return 0
-    print_error(f"error: {report.problem}")
-    return NOT_WRITTEN
-
-
-def _print_page(console: Console, invitation: str, page: Path | None) -> None:
-    """Where a page is, if there is one."""
-    if page is not None:
-        # Soft wrap: a path broken into two lines cannot be clicked.
-        console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
-
-
-def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
-    """The metrics with their targets, one line each."""
-    from experiments.results.units import format_quantity
-
-    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    table.add_column("Metric", no_wrap=True)
-    table.add_column("Value", justify="right", no_wrap=True)
-    table.add_column("Target")
-    marks = {True: "[green]met[/]", False: "[red]missed[/]", None: ""}
-    for name, metric in metrics.items():
-        target = escape(metric.target or "")
-        if metric.bound is not None:
-            comparison, number = metric.bound
-            target = f"{comparison} {format_quantity(number, metric.unit)}"
-        value = format_quantity(metric.value, metric.unit)
-        table.add_row(name, value, f"{target} {marks[metric.passed]}".strip())
-    return table
-
-
-def _fail(message: str) -> int:
-    """Reports wrong input."""
-    print_error(f"error: {message}")
-    return WRONG_INPUT

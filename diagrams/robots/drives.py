@@ -9,10 +9,10 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer, ZeroOrderHold
 
 from diagrams.robots.part import Drives, RobotPart
+from diagrams.safety import safe_state, supervision
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
-from diagrams.tasks.law import safe_state, supervision
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains

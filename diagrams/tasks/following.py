@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
+from diagrams.safety import supervision
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.friction import Coefficients, add_friction_compensation
-from diagrams.tasks.law import supervision
 from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw

@@ -4,11 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from diagrams.scenario import (
-    ControllerParameters,
-    FaultParameters,
-    Scenario,
-)
+from diagrams.safety import safe_state
+from diagrams.scenario import ControllerParameters, FaultParameters
 from diagrams.tasks.gains import choose_poles, gains_of
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -18,15 +15,10 @@ from pfsc_drake.control.law.linearization import (
     linearize,
 )
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.safe_stop import SafeState
-from pfsc_drake.control.law.stabilization import (
-    Stabilization,
-)
-from pfsc_drake.control.law.supervision import SupervisionParameters
+from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.physics.joint_encoders import encoder_resolution
 
 
 def make_law(
@@ -78,40 +70,4 @@ def make_law(
         parameters.max_alpha,
         safe_state(parameters, robot, faults or FaultParameters()),
         tells_reference_velocity=parameters.friction.needs_reference_velocity,
-    )
-
-
-def safe_state(
-    parameters: ControllerParameters, robot: RobotModel, faults: FaultParameters
-) -> SafeState:
-    """Return how a robot is stopped and held after a fault.
-
-    Args:
-        parameters: Of the controller.
-        robot: The robot as it is believed.
-        faults: What the scenario says of faults.
-    """
-    effort = robot.gather("effort_limit") * parameters.effort_scale
-    damping = parameters.brake_damping * np.where(np.isfinite(effort), effort, 0.0)
-    return SafeState(damping, faults.hold_bandwidth, faults.effort_share)
-
-
-def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
-    """Return what is watched of a scenario's joints.
-
-    Args:
-        scenario: The scenario.
-        robot: The robot as it is believed.
-
-    Raises:
-        InputError: If the encoders do not suit the robot.
-    """
-    faults, encoders = scenario.faults, scenario.encoders
-    late = scenario.controller.sampling_time if encoders.difference_quotient else 0.0
-    return SupervisionParameters(
-        tolerance=faults.plausibility,
-        resolution=np.maximum(*encoder_resolution(robot, encoders)),
-        filter_time=encoders.filter_time + late,
-        joint_limits=faults.joint_limits,
-        saturation_time=faults.saturation_time,
     )

@@ -1,0 +1,119 @@
+"""What a command says when it has ended, and the exit status that belongs to it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.interruption import INTERRUPTED
+from experiments.terminal import print_error
+
+if TYPE_CHECKING:
+    from experiments.pages.report import Report
+    from experiments.results.metrics import Metric
+    from experiments.run import RunOutcome
+    from experiments.sweep.sweep import SweepOutcome
+
+WRONG_INPUT = 2
+FAULT = 3
+NOT_WRITTEN = 4
+
+
+def print_run(console: Console, outcome: "RunOutcome") -> None:
+    """What came out of a run, as far as it is no reason for concern."""
+    console.print(_metrics_table(outcome.metrics))
+    for warning in outcome.warnings:
+        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    if outcome.margins is not None:
+        console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
+    _print_page(console, "\nOpen the report", outcome.report)
+
+
+def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
+    """Says in one line what went wrong in a run, if anything did; returns the exit status."""
+    status, ends = 0, []
+    if outcome.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
+    if outcome.fault is not None:
+        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+    if outcome.problem is not None:
+        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
+    elif ends:
+        ends = [f"{ends[0]}, everything logged so far is kept in {out}"]
+    if ends:
+        print_error("; ".join(ends), after_echo=outcome.interrupted)
+    return status
+
+
+def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
+    """What came out of a sweep."""
+    key_metrics = {name: outcome.metrics[name] for name in outcome.key_metrics}
+    console.print(_metrics_table(key_metrics))
+    for warning in outcome.warnings:
+        console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
+    for strikes, command in outcome.commands.items():
+        console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
+    _print_page(console, "\nOpen the report", outcome.report)
+
+
+def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
+    """Says in one line why a sweep is not whole, if it is not; returns the exit status."""
+    status, ends = 0, []
+    done = f"{len(outcome.rows)} of {outcome.total} runs"
+    if outcome.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted after {done}"]
+    if outcome.stopped is not None:
+        status, ends = FAULT, [f"fault: {outcome.stopped}; stopped after {done}"]
+    if ends:
+        ends = [f"{ends[0]}, which are kept in {out}; the same command goes on"]
+    elif outcome.refusal is not None:
+        status, ends = WRONG_INPUT, [f"error: no run could start: {outcome.refusal}"]
+    if outcome.problem is not None:
+        status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
+    if ends:
+        print_error("; ".join(ends), after_echo=outcome.interrupted)
+    return status
+
+
+def show_page(what: str, report: "Report") -> int:
+    """Says where a page is, or that it could not be written; returns the exit status."""
+    _print_page(Console(), f"Open the {what}", report.path)
+    if report.problem is None:
+        return 0
+    print_error(f"error: {report.problem}")
+    return NOT_WRITTEN
+
+
+def _print_page(console: Console, invitation: str, page: Path | None) -> None:
+    """Where a page is, if there is one."""
+    if page is not None:
+        # Soft wrap: a path broken into two lines cannot be clicked.
+        console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
+
+
+def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
+    """The metrics with their targets, one line each."""
+    from experiments.results.units import format_quantity
+
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    table.add_column("Metric", no_wrap=True)
+    table.add_column("Value", justify="right", no_wrap=True)
+    table.add_column("Target")
+    marks = {True: "[green]met[/]", False: "[red]missed[/]", None: ""}
+    for name, metric in metrics.items():
+        target = escape(metric.target or "")
+        if metric.bound is not None:
+            comparison, number = metric.bound
+            target = f"{comparison} {format_quantity(number, metric.unit)}"
+        value = format_quantity(metric.value, metric.unit)
+        table.add_row(name, value, f"{target} {marks[metric.passed]}".strip())
+    return table
+
+
+def fail(message: str) -> int:
+    """Reports wrong input."""
+    print_error(f"error: {message}")
+    return WRONG_INPUT
