@@ -5,7 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, Multiplexer, ZeroOrderHold
+from pydrake.systems.primitives import (
+    Adder,
+    ConstantVectorSource,
+    Demultiplexer,
+    MatrixGain,
+    Multiplexer,
+    ZeroOrderHold,
+)
 
 from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions
@@ -14,7 +21,7 @@ from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
-WIRES = (Adder, Demultiplexer, MatrixGain, Multiplexer, ZeroOrderHold)
+WIRES = (Adder, ConstantVectorSource, Demultiplexer, MatrixGain, Multiplexer, ZeroOrderHold)
 # what a real machine gives: positions and velocities of the joints, and a sensor's reading
 MEASUREMENTS = {"joint_encoders", "encoder_increments", "sensor_failure", "force_torque_sensor"}
 SCENARIOS = (
@@ -22,6 +29,7 @@ SCENARIOS = (
     "ttc_comau_6r",
     "pfc_comau_6r_elastic",
     "operator_hand_6r",
+    "friction_observer_in_loop",
     "pfc_delta_notch",
 )
 
