@@ -166,7 +166,10 @@ class OnePeriodMap:
     ) -> np.ndarray:
         shifted = x.copy()
         shifted[variable] += difference
-        return self.advance(section, shifted)
+        try:
+            return self.advance(section, shifted)
+        except RuntimeError:  # a flag that was shifted leads where no plant goes
+            return np.full(self.size, np.nan)
 
     def _set_part(self, context: Context, part: slice, values: np.ndarray) -> None:
         which = self._parts.index(part)

@@ -46,9 +46,9 @@ def run(settings: Scenario, duration: float, folder=SCENARIO_DIRECTORY):
 
 
 @pytest.fixture
-def delta(load_scenario):
+def delta(load_exact_scenario):
     """The DELTA robot without friction, resting on its path."""
-    settings = load_scenario("pfc_delta")
+    settings = load_exact_scenario("pfc_delta")
     settings.drive_friction = False
     settings.start.offset = [0.0, 0.0]
     settings.reference.dwell = 3.0
@@ -120,17 +120,17 @@ def test_friction_of_a_delta_robot_may_be_given(delta):
     assert np.all(np.abs(log["friction_torque"]).max(axis=0) <= [1.0, 2.0, 3.0])
 
 
-def test_an_arm_has_no_friction_of_its_own(load_scenario):
-    settings = load_scenario("pfc_compliant_6r")
+def test_an_arm_has_no_friction_of_its_own(load_exact_scenario):
+    settings = load_exact_scenario("pfc_compliant_6r")
     settings.drive_friction = True
     with pytest.raises(InputError, match=r"drive_friction = True; allowed: null; .*'friction'"):
         build_station(settings, SCENARIO_DIRECTORY)
 
 
 @pytest.fixture
-def arm_in_a_notch(load_scenario):
+def arm_in_a_notch(load_exact_scenario):
     """A six-axis arm with a ball at its tool point, on a level line."""
-    settings = load_scenario("pfc_compliant_6r")
+    settings = load_exact_scenario("pfc_compliant_6r")
     settings.path.shape = Line([0.8, -0.15, 0.9], [0.8, 0.15, 0.9])
     settings.path.orientation.convention = "zyz"
     settings.path.orientation.keyframes = [Keyframe(0.0, [0.0, 150.0, 180.0])]

@@ -116,6 +116,7 @@ def test_motion_at_the_frames(settings, run):
 def test_motion_ends_where_the_state_is_unknown(settings, run, time, frames):
     settings.controller.law = "rigid"
     settings.simulation.sensor_failure.time = time
+    settings.simulation.sensor_failure.component = 6  # a motor, on which this law acts
     station, result, _, _ = run(0.1)
     motion = collect_motion(station, result.root, 0.032)
     assert motion.times.shape == (frames,)

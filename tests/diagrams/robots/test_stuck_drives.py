@@ -41,9 +41,9 @@ def arm_in_a_notch(settings):
         ("pfc_compliant_6r", arm_in_a_notch),
     ],
 )
-def test_stuck_drives_bend_as_their_inertia_and_the_step_say(load_scenario, scenario, change):
+def test_stuck_drives_bend_as_their_inertia_and_the_step_say(load_exact_scenario, scenario, change):
     """``force / bend = J (omega h)^2 / h^2``, from what a small push changes."""
-    settings = load_scenario(scenario)
+    settings = load_exact_scenario(scenario)
     step, frequency = change(settings)
     settings.reference.dwell = 2.0
     # until then the reference rests where the tool is, in the middle of the notch

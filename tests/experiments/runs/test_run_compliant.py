@@ -40,4 +40,5 @@ def test_nothing_moves_while_taring(log):
     first = log["t"] < 0.05
     # no more than the encoders' increments let it
     assert np.abs(log["y_t"][first] - log["y_t"][0]).max() < 5e-6
-    assert np.abs(log["xi_p"][first]).max() < 1e-12  # where the tool is, but for rounding
+    # where the encoders see the tool
+    assert np.abs(log["xi_p"][first]).max() < 1e-6

@@ -17,7 +17,7 @@ END = 0.9  # s, 0.4 s of which it moves
 def run(tmp_path, scenario, duration=END, *changes):
     out = tmp_path / "out"
     arguments = ["run", scenario, "--out", str(out), "--duration", str(duration), *BARE]
-    for change in changes:
+    for change in ("encoders={}", "model_error={}", *changes):
         arguments += ["--set", change]
     assert main(arguments) == 0
     with h5py.File(out / "log.h5") as file:
