@@ -102,7 +102,9 @@ class Chain:
         measured = builder.AddSystem(MatrixGain(rows))
         kinematics = builder.AddSystem(ToolKinematics(self.robot))
         projector = builder.AddSystem(PathProjector(self.path, r, PERIOD))
-        controller = builder.AddSystem(FollowingController(self.law, PERIOD, SupervisionParameters()))
+        controller = builder.AddSystem(
+            FollowingController(self.law, PERIOD, SupervisionParameters())
+        )
         motion = rest_to_rest([0.0, 5.0], velocity=1.5, acceleration=5.0)
         reference = builder.AddSystem(ReferenceGenerator(motion, r, m))
         builder.ExportInput(measured.get_input_port(), "plant_state")
@@ -198,7 +200,6 @@ def test_whole_tick(chain, benchmark):
 
 def test_updates(chain, benchmark):
     """What comes on top of a tick, once the drives have their torques."""
-
 
     def next_tick():
         chain.remember()
