@@ -170,6 +170,7 @@ def _add_smooth_start(
             reference_order(following.scenario, linearization),
             linearization.num_outputs,
             controller.GetOutputPort("manifold_state").size(),
+            controller.period,
         ),
     )
     builder.Connect(desired, start.GetInputPort("desired_reference"))

@@ -1,4 +1,6 @@
-"""Time of one controller tick, from the plant's state to the drive torques.
+"""Time of one controller tick as runs have it, from the plant's state to the drive torques.
+
+The joints are supervised, and between two ticks everything is remembered that a run remembers.
 
 Run with ``pytest tests/benchmarks --benchmark-enable``; otherwise every benchmark runs once.
 """
@@ -21,6 +23,7 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptio
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (
     FourierCurve,
@@ -35,6 +38,7 @@ from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
+from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
@@ -43,7 +47,7 @@ COUNT = 64
 NAMES = ["eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3"]
 CASES = {
     "6R elastic oriented": ("comau_racer_1_4_elastic", "elastic", True, False),
-    "6R elastic oriented observed": ("comau_racer_1_4_elastic", "elastic", True, True),
+    "6R elastic oriented with all": ("comau_racer_1_4_elastic", "elastic", True, True),
     "3R elastic": ("comau_racer_1_4_elastic_3r", "elastic", False, False),
     "6R rigid oriented": ("comau_racer_1_4", "rigid", True, False),
 }
@@ -52,10 +56,10 @@ CASES = {
 class Chain:
     """The controller's chain of systems, and the plant's states of successive ticks.
 
-    ``observed``: with observers of friction and of external torques.
+    ``with_all``: with observers of friction and of external torques, and a smooth start.
     """
 
-    def __init__(self, model, law, oriented, observed):
+    def __init__(self, model, law, oriented, with_all):
         plant = MultibodyPlant(0.0)
         Parser(plant).AddModels(str(resolve_model(model)))
         plant.Finalize()
@@ -64,7 +68,7 @@ class Chain:
         self.path = make_path(oriented)
         self.law = make_law(self.robot, law, oriented)
         self.states = self._states(plant, tool)
-        self._build(observed)
+        self._build(with_all)
 
     def _states(self, plant, tool):
         """States along the path at 1.5 m/s, each a tick after the one before."""
@@ -84,21 +88,23 @@ class Chain:
 
         q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])[:n]
         speed = np.linalg.norm(self.path.position.derivatives(THETA, 1)[1])
-        motion, self.thetas = [], THETA + 1.5 * PERIOD / speed * np.arange(COUNT)
-        for theta in self.thetas:
+        motion = []
+        for theta in THETA + 1.5 * PERIOD / speed * np.arange(COUNT):
             q = least_squares(error, q, args=(theta,)).x
             motion.append(q)
         velocities = np.gradient(motion, PERIOD, axis=0)
         return [plant_state(q, v) for q, v in zip(motion, velocities, strict=True)]
 
-    def _build(self, observed):
+    def _build(self, with_all):
         r, m = self.law.linearization.relative_degree, self.law.linearization.num_outputs
         builder = DiagramBuilder()
         rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         measured = builder.AddSystem(MatrixGain(rows))
         kinematics = builder.AddSystem(ToolKinematics(self.robot))
         projector = builder.AddSystem(PathProjector(self.path, r, PERIOD))
-        controller = builder.AddSystem(FollowingController(self.law, PERIOD))
+        controller = builder.AddSystem(
+            FollowingController(self.law, PERIOD, SupervisionParameters())
+        )
         motion = rest_to_rest([0.0, 5.0], velocity=1.5, acceleration=5.0)
         reference = builder.AddSystem(ReferenceGenerator(motion, r, m))
         builder.ExportInput(measured.get_input_port(), "plant_state")
@@ -106,10 +112,16 @@ class Chain:
         builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))
         builder.Connect(kinematics.get_output_port(), projector.GetInputPort("tool_pose"))
         builder.Connect(projector.get_output_port(), controller.GetInputPort("manifold_point"))
-        builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))
+        wanted = reference.get_output_port()
+        if with_all:
+            start = builder.AddSystem(SmoothStart(0.03, r, m, r * m, PERIOD))
+            actual = controller.GetOutputPort("manifold_state")
+            builder.Connect(wanted, start.GetInputPort("desired_reference"))
+            builder.Connect(actual, start.GetInputPort("manifold_state"))
+            wanted = start.GetOutputPort("reference")
+        builder.Connect(wanted, controller.GetInputPort("reference"))
         builder.ExportOutput(controller.GetOutputPort("drive_torque"), "drive")
-        self.observers = []
-        if observed:
+        if with_all:
             friction = MomentumObserver(drive_momentum(self.robot), 300.0, PERIOD)
             forces = MomentumObserver(link_momentum(self.robot), 100.0, PERIOD, r - 2)
             for observer, port in ((friction, "friction_torque"), (forces, "tau_ext")):
@@ -120,39 +132,27 @@ class Chain:
                 ):
                     builder.Connect(source, system.GetInputPort(name))
                 builder.Connect(system.get_output_port(), controller.GetInputPort(port))
-                self.observers.append((system, observer))
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
-        self.controller, self.projector = controller, projector
+        self.controller = controller
         self._value = self.diagram.get_input_port().FixValue(self.context, self.states[0])
         self._drive = self.diagram.get_output_port()
-        self._tick = 0
+        inner = projector.GetMyMutableContextFromRoot(self.context)
+        projector.set_parameter(inner, THETA)
+        self.diagram.ExecuteInitializationEvents(self.context)
+        self._start, self._tick = self.context.Clone(), 0
 
     def remember(self):
-        """Do what the discrete updates of the last tick did: remember where the tool was."""
-        inner = self.projector.GetMyMutableContextFromRoot(self.context)
-        self.projector.set_parameter(inner, self.thetas[self._tick])
-        self.remember_torques()
+        """Remember the last tick, as a run does; after the last of all begin again."""
         self._tick = (self._tick + 1) % COUNT
+        if self._tick:
+            self.context.get_mutable_discrete_state().SetFrom(self.updated_memory())
+        else:
+            self.context.SetTimeStateAndParametersFrom(self._start)
 
-    def remember_torques(self):
-        """Do what the observers' discrete updates of the last tick did."""
-        for memory, inner in self.updated_memories():
-            inner.SetDiscreteState(0, memory)
-
-    def updated_memories(self):
-        """Return what the observers remember of this tick, with their contexts."""
-        updated = []
-        for system, observer in self.observers:
-            inner = system.GetMyMutableContextFromRoot(self.context)
-            memory = inner.get_discrete_state_vector().CopyToVector()
-            observer.remember(
-                memory,
-                system.GetInputPort("joint_state").Eval(inner),
-                system.GetInputPort("drive_torque").Eval(inner),
-            )
-            updated.append((memory, inner))
-        return updated
+    def updated_memory(self):
+        """Return what all systems remember of this tick."""
+        return self.diagram.EvalUniquePeriodicDiscreteUpdate(self.context)
 
     def tick(self):
         """Take a measurement and return the drive torques."""
@@ -198,10 +198,15 @@ def test_whole_tick(chain, benchmark):
     assert not np.array_equal(drive, before)
 
 
-def test_updates_of_the_observers(chain, benchmark):
+def test_updates(chain, benchmark):
     """What comes on top of a tick, once the drives have their torques."""
+
+    def next_tick():
+        chain.remember()
+        chain.tick()
+
     chain.tick()
-    benchmark(chain.updated_memories)
+    benchmark.pedantic(chain.updated_memory, setup=next_tick, rounds=1000, warmup_rounds=50)
     inner = chain.controller.GetMyContextFromRoot(chain.context)
     assert chain.controller.fault(inner) == Fault.NONE
 

@@ -182,9 +182,9 @@ class FollowingLaw:
         self._point[:] = point
         self._reference[:] = reference
         self._integral[:] = integral
-        self._tau_ext[:] = 0.0 if tau_ext is None else tau_ext
-        self._last_output[:] = 0.0 if last_output is None else last_output
-        self._friction[:] = 0.0 if friction is None else friction
+        _assign(self._tau_ext, tau_ext)
+        _assign(self._last_output, last_output)
+        _assign(self._friction, friction)
         self._linearize()
         solution = self._inverse.solve(self._A, self._rhs)
         self._solution[:] = solution.x
@@ -239,6 +239,14 @@ class FollowingLaw:
         y = result[self.layout.manifold_state][:m]
         # where the point moves with time, the virtual output is the error
         return y if self.linearization.manifold.follows_time else y - reference[:m]
+
+
+def _assign(argument: np.ndarray, values: np.ndarray | None) -> None:
+    """Overwrite an argument, by zeros if there are no values."""
+    if values is None:
+        argument.fill(0.0)
+    else:
+        argument[:] = values
 
 
 def _law_function(linearization: Linearization, stabilization: Stabilization) -> ca.Function:

@@ -101,6 +101,8 @@ class Supervision:
         bound = BoundFunction(function)
         self._arguments, self._result = bound.arguments, bound.results["result"]
         self._evaluate = bound.evaluate
+        # whether the argument is other than zero
+        self._ignores = False
 
     def evaluate(
         self,
@@ -127,7 +129,11 @@ class Supervision:
         arguments["last"][:] = last
         arguments["memory"][:] = memory
         arguments["known"][0] = known
-        arguments["ignored"][:] = 0.0 if ignored is None else ignored
+        if ignored is not None:
+            arguments["ignored"][:] = ignored
+        elif self._ignores:
+            arguments["ignored"].fill(0.0)
+        self._ignores = ignored is not None
         self._evaluate()
         return self._result
 

@@ -20,6 +20,10 @@ class Transition:
         duration: How long it takes [s].
         order: Highest derivative that is needed, at most 4.
 
+    Attributes:
+        duration: How long it takes [s].
+        order: Highest derivative.
+
     Raises:
         InputError: If the duration is not positive or the order too high.
     """
@@ -29,7 +33,7 @@ class Transition:
             raise InputError(f"transition: {duration} s; must be a positive number")
         if not 0 <= order <= _HIGHEST_ORDER:
             raise InputError(f"transition: order {order}; must be 0 to {_HIGHEST_ORDER}")
-        self.duration = duration
+        self.duration, self.order = duration, order
         rest = 1.0 - _STEP
         derivatives = [rest.deriv(k).coef if k else rest.coef for k in range(order + 1)]
         # column k holds the k-th derivative's coefficients, in real time

@@ -21,8 +21,9 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 
-# attributes of an enumeration are looked up slowly
+# attributes of an enumeration are looked up slowly, and numpy's numbers compared slowly with them
 _LOST, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
+_NOT_FINITE = float(Fault.INPUT_NOT_FINITE)
 
 
 class FollowingController(LeafSystem):
@@ -59,9 +60,9 @@ class FollowingController(LeafSystem):
         reference_velocity (output): Joint velocities that the reference asked for at the last
             tick, shape (N,) [rad/s or m/s], zero before; only of a law that tells them. It
             depends on the state alone: what is told the law may depend on it.
-        law (output): All of these, laid out by the law's ``layout``; computed once per
-            tick, the others are parts of it.
-        supervision (output): What :meth:`Supervision.evaluate` returns; only with supervision.
+        law (output): All of these, laid out by the law's ``layout``.
+        evaluation (output): The same, and with supervision what :meth:`Supervision.evaluate`
+            returns; computed once per tick, all others are parts of it.
 
     State:
         Discrete: integral of the error, shape (m,); latched fault, shape (1,); whether
@@ -123,25 +124,21 @@ class FollowingController(LeafSystem):
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
             self._friction = self.DeclareVectorInputPort("friction_torque", n)
             sources |= {self._tau_ext.ticket(), self._friction.ticket()}
-        if self._supervision is not None:
-            self._watched: OutputPort = self.DeclareVectorOutputPort(
-                "supervision",
-                1 + 12 * n,
-                self._calc_supervision,
-                prerequisites_of_calc={
-                    self._joint_state.ticket(),
-                    self.discrete_state_ticket(memory),
-                },
-            )
+        size = self.layout.size
+        self._seen = slice(size, size + 1 + 12 * n if self._supervision else size)
+        # written at every evaluation
+        self._values = np.zeros(self._seen.stop)
+        self._of_law, self._of_supervision = self._values[:size], self._values[self._seen]
         self._output: OutputPort = self.DeclareVectorOutputPort(
-            "law", self.layout.size, self._calc_law, prerequisites_of_calc=sources
+            "evaluation", self._seen.stop, self._calc_evaluation, prerequisites_of_calc=sources
         )
+        self._declare_part("law", slice(0, size), sources)
         self.drive_port = "drive_torque" if r > 1 else "velocity_reference"
         self._declare_part(self.drive_port, self.layout.drive, sources)
         for name in ("manifold_state", "virtual_input", "status"):
             self._declare_part(name, getattr(self.layout, name), sources)
-        status = self.layout.status.start
-        self._declare_part("fault", slice(status, status + 1), sources)
+        self._status = self.layout.status.start
+        self._declare_part("fault", slice(self._status, self._status + 1), sources)
         if told.stop > told.start:
             self.DeclareVectorOutputPort(
                 "reference_velocity",
@@ -182,54 +179,50 @@ class FollowingController(LeafSystem):
         """Return which measured values are not believed, nonzero if so, shape (4N,)."""
         memory = context.get_discrete_state_vector().value()
         latched = self._safe_stop.suspects(memory[self._stop])
-        return np.maximum(latched, self._suspects(context))
+        return np.maximum(latched, self._suspects(self._output.Eval(context)))
 
-    def _calc_law(self, context: Context, output: BasicVector) -> None:
+    def _calc_evaluation(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()
-        state = self._joint_state.Eval(context)
-        result = self._law.evaluate(
+        state, result = self._joint_state.Eval(context), self._of_law
+        latched, known = memory.item(self._fault), memory.item(self._known)
+        result[:] = self._law.evaluate(
             state,
             self._manifold_point.Eval(context),
             self._reference.Eval(context),
             memory[self._integral],
-            memory[self._held] if memory[self._known] else None,
+            memory[self._held] if known else None,
             _value(self._tau_ext, context),
             _value(self._friction, context),
             memory[self._output_before],
         )
-        status = self.layout.status.start
-        latched = memory[self._fault]
-        fault = latched or self._found_fault(context, memory, result[status])
+        if self._supervision is not None:
+            self._of_supervision[:] = self._supervision.evaluate(
+                state,
+                memory[self._last],
+                memory[self._watch],
+                known,
+                self._safe_stop.suspects(memory[self._stop]) if latched else None,
+            )
+        status = self._status
+        fault = latched or self._found_fault(context, memory, result.item(status))
         if fault:
             result[status] = fault
-            stop = memory[self._stop] if latched else self._start_stop(context, memory)
+            stop = memory[self._stop]
+            if not latched:
+                stop = self._start_stop(memory, state, self._suspects(self._values))
             result[self.layout.drive] = 0.0
             if self.relative_degree > 1:
                 result[self.layout.drive] = self._safe_stop.drive(stop, state)
-        output.SetFromVector(result)
-
-    def _calc_supervision(self, context: Context, output: BasicVector) -> None:
-        assert self._supervision is not None
-        memory = context.get_discrete_state_vector().value()
-        ignored = self._safe_stop.suspects(memory[self._stop]) if memory[self._fault] else None
-        output.SetFromVector(
-            self._supervision.evaluate(
-                self._joint_state.Eval(context),
-                memory[self._last],
-                memory[self._watch],
-                memory[self._known],
-                ignored,
-            )
-        )
+        output.SetFromVector(self._values)
 
     def _found_fault(self, context: Context, memory: np.ndarray, of_law: float) -> float:
         """Return a fault of this instant, the root cause first."""
-        if of_law == Fault.INPUT_NOT_FINITE:
+        if of_law == _NOT_FINITE:
             return of_law
         if self._supervision is not None:
-            seen = self._watched.Eval(context)[0]
+            seen = self._of_supervision.item(0)
             if seen:
-                return float(seen)
+                return seen
             ticks = self._supervision.saturated_ticks
             if ticks < math.inf and memory[self._saturated].max() >= ticks:
                 return float(Fault.DRIVE_SATURATED)
@@ -243,15 +236,16 @@ class FollowingController(LeafSystem):
                 return float(Fault.COMPLIANCE_INVALID)
         return of_law
 
-    def _suspects(self, context: Context) -> np.ndarray:
+    def _suspects(self, evaluation: np.ndarray) -> np.ndarray:
         """Return which measured values are implausible, nonzero if so, shape (4N,)."""
         if self._supervision is None:
             return np.zeros(self._last.stop - self._last.start)
-        return self._supervision.suspects(self._watched.Eval(context))
+        return self._supervision.suspects(evaluation[self._seen])
 
-    def _start_stop(self, context: Context, memory: np.ndarray) -> np.ndarray:
-        last, state = memory[self._last], self._joint_state.Eval(context)
-        return self._safe_stop.start(last, state, self._suspects(context))
+    def _start_stop(
+        self, memory: np.ndarray, state: np.ndarray, suspects: np.ndarray
+    ) -> np.ndarray:
+        return self._safe_stop.start(memory[self._last], state, suspects)
 
     def _calc_reference_velocity(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value()[self._velocity])
@@ -267,12 +261,13 @@ class FollowingController(LeafSystem):
         result, joint_state = self._output.Eval(context), self._joint_state.Eval(context)
         before, memory = context.get_discrete_state_vector().value(), state.get_mutable_value()
         if self._supervision is not None:
-            memory[self._watch] = self._supervision.next_memory(self._watched.Eval(context))
-        fault = result[self.layout.status.start]
+            memory[self._watch] = self._supervision.next_memory(result[self._seen])
+        fault = result.item(self._status)
         memory[self._last] = joint_state
         if fault:
-            stop = before[self._stop] if before[self._fault] else self._start_stop(context, before)
-            suspects = self._suspects(context)
+            suspects, stop = self._suspects(result), before[self._stop]
+            if not before[self._fault]:
+                stop = self._start_stop(before, joint_state, suspects)
             memory[self._fault] = fault
             memory[self._stop] = self._safe_stop.advance(stop, joint_state, suspects)
             return

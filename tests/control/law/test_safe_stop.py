@@ -9,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 PERIOD, N = 1e-3, 3
@@ -28,6 +29,11 @@ class Robot:
         self.rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         self.limits = self.chain.gather("effort_limit")
         self.context = self.plant.CreateDefaultContext()
+        port = self.plant.get_actuation_input_port()
+        self.actuation = port.FixValue(self.context, np.zeros(N)).GetMutableData
+        # what is remembered of a stop belongs to the caller
+        self.safe = SafeStop(self.chain, self.limits, SafeState(np.zeros(N)), PERIOD)
+        self.gravity = gravity_function(self.chain)
 
     def state(self, q, v):
         """Return the plant's state with springs that bear the weight."""
@@ -36,27 +42,21 @@ class Robot:
         return self.coordinates.plant_state(x)
 
     def weight(self, q):
-        from pfsc_drake.robot.robot_model import gravity_function
+        return np.array(self.gravity(ca.DM(q))).ravel()
 
-        return np.array(gravity_function(self.chain)(ca.DM(q))).ravel()
-
-    def rates(self, x, tau):
-        half = len(x) // 2
+    def rates(self, x):
         self.plant.SetPositionsAndVelocities(self.context, x)
-        actuation = np.zeros(N)
-        actuation[self.coordinates.actuators] = tau
-        self.plant.get_actuation_input_port().FixValue(self.context, actuation)
-        rates = self.plant.EvalTimeDerivatives(self.context).CopyToVector()
-        assert len(rates) == 2 * half
-        return rates
+        return self.plant.EvalTimeDerivatives(self.context).CopyToVector()
 
     def step(self, x, tau):
         """Integrate over a period by the classical scheme of fourth order."""
-        h = PERIOD
-        k_1 = self.rates(x, tau)
-        k_2 = self.rates(x + h / 2 * k_1, tau)
-        k_3 = self.rates(x + h / 2 * k_2, tau)
-        k_4 = self.rates(x + h * k_3, tau)
+        h, actuation = PERIOD, np.zeros(N)
+        actuation[self.coordinates.actuators] = tau
+        self.actuation().get_mutable_value().SetFromVector(actuation)
+        k_1 = self.rates(x)
+        k_2 = self.rates(x + h / 2 * k_1)
+        k_3 = self.rates(x + h / 2 * k_2)
+        k_4 = self.rates(x + h * k_3)
         return x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
 
 
@@ -67,7 +67,7 @@ def robot(request):
 
 def stop(robot, lost=(), suspect=(), ticks=700, spoil=np.nan, speed=SPEED):
     """Stop a moving robot of which components are lost, and return states and torques."""
-    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    safe = robot.safe
     x, suspects = robot.state(POSTURE, speed), NOTHING.copy()
     suspects[list(suspect)] = 1.0
     last = robot.rows @ robot.step(x, robot.weight(POSTURE))
@@ -127,7 +127,7 @@ def test_of_the_motor_side_nothing_may_be_left(robot):
 
 def test_a_joint_that_is_not_seen_gets_the_planned_torque(robot):
     """From rest: its weight, whatever the others do."""
-    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    safe = robot.safe
     x = robot.rows @ robot.state(POSTURE, np.zeros(N))
     unseen = x.copy()
     unseen[1::N] = np.nan
@@ -139,7 +139,7 @@ def test_a_joint_that_is_not_seen_gets_the_planned_torque(robot):
 
 
 def test_a_value_that_comes_back_is_used_unless_it_was_implausible(robot):
-    safe = SafeStop(robot.chain, robot.limits, SafeState(np.zeros(N)), PERIOD)
+    safe = robot.safe
     x = robot.rows @ robot.state(POSTURE, np.zeros(N))
     away = x.copy()
     away[2 * N :] += np.repeat([0.01, 0.0], N)
