@@ -57,8 +57,8 @@ class Supervision:
     Of a side that disagrees with itself the position is suspected if it jumped, by half the
     tolerance within this tick, or if it has rested, to the last bit, while the velocity told of
     half the tolerance; else the velocity. If the sides disagree, but none with itself, the one
-    that has moved less is taken for frozen. If both disagree with themselves, their velocities
-    are suspected.
+    that has moved less is taken for frozen, if it rests to the last bit. If both disagree with
+    themselves, their velocities are suspected.
 
     So a position that jumps or freezes, and a velocity that jumps or freezes, are found as soon
     as position and integrated velocity part by the tolerance: a jump of a position in the same
@@ -180,7 +180,8 @@ def _supervision_function(
     link, motor = (q_J + v_J) / 2.0, (q_M + v_M) / 2.0
     apart = ca.fabs(link - motor) > tolerance + bending
     neither, both = ca.logic_not(wrong_J + wrong_M), wrong_J * wrong_M
-    link_rests = ca.fabs(link) < ca.fabs(motor)
+    link_moved_less = ca.fabs(link) < ca.fabs(motor)
+    less = (link_moved_less, 1 - link_moved_less)
     suspects = []
     for side, wrong in ((0, wrong_J), (2, wrong_M)):
         slip, change = steps[side] - steps[side + 1], now[side + 1] - before[side + 1]
@@ -192,7 +193,11 @@ def _supervision_function(
         rested = period * rests[side] * ca.fabs(now[side + 1]) > at_once
         of_position = (1 - both) * ca.fmax(jumped, rested)
         suspects += [wrong * of_position, wrong * (1 - of_position)]
-    frozen = [neither * apart * link_rests, neither * apart * (1 - link_rests)]
+    # joints that bend by more than they should move on both sides
+    still = [(rests[side] > 0) * (rests[side + 1] > 0) for side in (0, 2)]
+    frozen = [
+        neither * apart * moved_less * rest for moved_less, rest in zip(less, still, strict=True)
+    ]
     suspect = ca.vertcat(*[s + frozen[k // 2] for k, s in enumerate(suspects)])
     suspect = suspect if parameters.tolerance else 0.0 * suspect
     suspect *= ca.vertcat(*used)
