@@ -194,3 +194,22 @@ def test_saturation_of_servos(run_scenario, tmp_path, limited):
     assert margin["target"] == "> 0"
     share = np.abs(result["v_J"]) / result.marks["v_J"]["limits"]
     assert result.metrics["joint_velocity_share"]["value"] == share.max()
+
+
+def test_a_tool_that_is_turned_away(fault):
+    """A torque beyond the drives turns the tool about x, until its angles say little."""
+    log, _ = fault(
+        "turned away from its reference by 90 deg or more",
+        "targets={}",
+        "compliance={}",
+        "encoders={}",
+        "friction={}",
+        "controller.friction={}",
+        "faults.joint_limits=false",
+        "forces=[{begin: 0.1, end: 3.0, ramp: 0.05, torque: [400, 0, 0]}]",
+        name="pfc_compliant_6r",
+    )
+    last_good = np.flatnonzero(log["fault"] == "none")[-1]
+    assert set(log["fault"][last_good + 1 :]) == {"orientation_error"}
+    angles = np.degrees(np.abs(log["phi"][: last_good + 1]))
+    assert 75.0 < angles.max() < 90.0
