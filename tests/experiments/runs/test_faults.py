@@ -7,10 +7,12 @@ import h5py
 import numpy as np
 import pytest
 
+from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 BARE = ("--no-figures", "--no-recording")
+TAUGHT = find_scenario("pfc_compliant_6r").parent / "paths" / "comau_teach_in.csv"
 
 
 SERVOS = (
@@ -200,6 +202,7 @@ def test_a_tool_that_is_turned_away(fault):
     """A torque beyond the drives turns the tool about x, until its angles say little."""
     log, _ = fault(
         "turned away from its reference by 90 deg or more",
+        f"path.shape.file={TAUGHT}",
         "targets={}",
         "compliance={}",
         "encoders={}",
