@@ -1,15 +1,14 @@
 """Coefficients of friction from how the joints move: the Kalman filter of App. A."""
 
-import math
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.control.estimation.friction_model import friction_torque, require_smoothing
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
+from pfsc_drake.control.estimation.sampled_estimator import SampledEstimator
 from pfsc_drake.errors import InputError
 
 INTERVALS = ("mean", "begin")
@@ -47,7 +46,7 @@ class FrictionNoise:
             raise InputError(f"noise: initial = {self.initial}; must be zero or positive, finite")
 
 
-class FrictionKalmanFilter:
+class FrictionKalmanFilter(SampledEstimator):
     """Linear time-varying Kalman filter of ``x_i = [p_i, f_c,i, f_v,i]`` for each axis (A.5).
 
     Between two samples at times ``t_{k-1}`` and ``t_k = t_{k-1} + T`` the model is::
@@ -66,8 +65,6 @@ class FrictionKalmanFilter:
     and positions are those that friction acts on, of the motors. Where velocities are measured
     with a delay, all is taken that much earlier.
 
-    Memory is one array, which :meth:`estimate` reads and :meth:`remember` writes.
-
     Args:
         model: Momenta and forces, of :func:`drive_momentum`; their delay is at most T.
         start: First estimates of f_c and f_v, shape (2, N).
@@ -76,10 +73,6 @@ class FrictionKalmanFilter:
         intervals: ``mean`` or ``begin``.
         resting_velocity: Below which an axis is at rest [rad/s or m/s], for ``mean``.
         smoothing: See :func:`friction_torque`.
-
-    Attributes:
-        num_joints: N.
-        initial_memory: Memory at the start.
 
     Raises:
         InputError: If a number is out of range.
@@ -96,7 +89,7 @@ class FrictionKalmanFilter:
         resting_velocity: float = 0.0,
         smoothing: float = 0.02,
     ) -> None:
-        n = self.num_joints = model.dimension
+        n = model.dimension
         first = np.asarray(start, dtype=float)
         if first.shape != (2, n) or not np.isfinite(first).all():
             raise InputError(f"first estimates of friction: {start}; must be 2 times {n} numbers")
@@ -108,16 +101,10 @@ class FrictionKalmanFilter:
             raise InputError(f"resting_velocity = {resting_velocity}: must be zero or positive")
         require_smoothing(smoothing)
         resting = resting_velocity if intervals == "mean" else -1.0
-        function = BoundFunction(
-            _filter_function(model, noise, period, intervals == "mean", resting, smoothing)
+        super().__init__(
+            _filter_function(model, noise, period, intervals == "mean", resting, smoothing), n
         )
-        arguments, results = function.arguments, function.results
-        self._memory, self._state = arguments["memory"], arguments["state"]
-        self._velocity, self._evaluate = arguments["velocity"], function.evaluate
-        self._drive, self._known = arguments["drive_torque"], arguments["known_torque"]
-        self._estimate, self._next = results["estimate"], results["next"]
-        self._check = results["check"]
-        self.initial_memory = np.zeros(len(self._memory))
+        self._velocity = self.arguments["velocity"]
         self.initial_memory[n : 3 * n] = first.ravel()
         # variances of f_c and f_v
         for block in (6, 8):
@@ -136,38 +123,8 @@ class FrictionKalmanFilter:
         Returns:
             A view that the next evaluation overwrites.
         """
-        self._memory[:] = memory
-        self._state[:] = state
         self._velocity[:] = state[3 * self.num_joints :] if velocity is None else velocity
-        self._evaluate()
-        return self._estimate
-
-    def remember(
-        self,
-        memory: np.ndarray,
-        state: np.ndarray,
-        drive_torque: np.ndarray,
-        known_torque: np.ndarray | None = None,
-    ) -> None:
-        """Overwrite the memory by that of this sample.
-
-        After a sample that is not finite the coefficients stand still, and the next sample
-        starts a new interval.
-
-        Args:
-            memory: From the last sample.
-            state: ``[q_J, v_J, q_M, v_M]`` at this sample, shape (4N,).
-            drive_torque: What the drives do until the next sample, shape (N,).
-            known_torque: What else is known to act, see :class:`MomentumModel`, shape (N,);
-                zero if omitted.
-        """
-        self._drive[:] = drive_torque
-        self._known[:] = 0.0 if known_torque is None else known_torque
-        self.estimate(memory, state)
-        if math.isfinite(self._check[0]):
-            memory[:] = self._next
-        else:
-            memory[-1] = 0.0
+        return super().estimate(memory, state)
 
 
 def _filter_function(
