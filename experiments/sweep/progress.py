@@ -78,7 +78,8 @@ class SweepProgress:
         if not number and self._processes != number and self._bar is None:
             self._console.print(f"{self._title}: no worker is left; waiting for one")
         if not self._processes:
-            self._begin = time.monotonic()  # starting them is no part of a run's time
+            # starting them is no part of a run's time, nor are runs from before
+            self._begin, self._before = time.monotonic(), self._done
         self._processes = number
         self._show()
 
