@@ -33,6 +33,19 @@ if TYPE_CHECKING:
 
 _LONGEST_AFTER_FAULT = 100.0  # s
 
+# what several commands take
+ScenarioName = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+]
+Duration = Annotated[
+    str | None,
+    typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
+]
+
 app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -60,9 +73,7 @@ def list_command(
 
 @app.command("run")
 def run_command(
-    scenario: Annotated[
-        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
-    ],
+    scenario: ScenarioName,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -70,14 +81,8 @@ def run_command(
             "replaced; a user's own files never are. Default: out/SCENARIO"
         ),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
-    ] = None,
-    duration: Annotated[
-        str | None,
-        typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
-    ] = None,
+    overrides: Overrides = None,
+    duration: Duration = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Record the motion.")
@@ -133,9 +138,7 @@ def compare_command(
 
 @app.command("sweep")
 def sweep_command(
-    scenario: Annotated[
-        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
-    ],
+    scenario: ScenarioName,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -165,14 +168,8 @@ def sweep_command(
             "Default: out/SCENARIO_sweep"
         ),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
-    ] = None,
-    duration: Annotated[
-        str | None,
-        typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
-    ] = None,
+    overrides: Overrides = None,
+    duration: Duration = None,
     metric: Annotated[
         str | None, typer.Option(help="What to draw. Default: max_path_deviation")
     ] = None,
@@ -235,13 +232,8 @@ def study_command(
 
 @app.command("margins")
 def margins_command(
-    scenario: Annotated[
-        str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
-    ],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
-    ] = None,
+    scenario: ScenarioName,
+    overrides: Overrides = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the page. Default: out/SCENARIO_margins")
     ] = None,

@@ -26,6 +26,7 @@ class Subject:
         before: What it was before the cures, as overrides.
         after: The cures beyond those that the scenario has.
         elastic: Whether its joints have a stiffness.
+        friction: Overrides without friction, and the one that gives it.
         metric: What is to stay small.
     """
 
@@ -34,6 +35,7 @@ class Subject:
     after: tuple[str, ...] = ()
     elastic: bool = True
     metric: str = "max_path_deviation"
+    friction: tuple[str, str] = ("friction={}", "friction.file=comau_racer_1_4")
 
 
 def _equal_poles(law: str, **poles: float) -> str:
@@ -44,7 +46,7 @@ def _equal_poles(law: str, **poles: float) -> str:
 
 
 # nothing but the law between the plant and its model
-_BARE = ("model_error={}", "friction={}", "encoders={}")
+_BARE = ("model_error={}", "encoders={}")
 _OBSERVED = ("controller.friction.source=observer",)
 # what links and tool do that the model does not tell, of robots that nothing pushes
 _TORQUE_OBSERVED = "controller.external_torque={source: observed, bandwidth: 60}"
@@ -61,10 +63,11 @@ SUBJECTS = (
     Subject("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
     Subject("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
     Subject("pfc_comau_6r"),
-    Subject("pfc_delta", elastic=False),
+    # a DELTA robot brings its own friction
+    Subject("pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")),
     Subject("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
 )
-_FRICTION = "friction.file=comau_racer_1_4"
+_FRICTION = "friction"  # as each subject says it
 _ENCODERS = (
     "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
 )
@@ -155,20 +158,11 @@ def _scenarios(
                 BEFORE: (*_UNOBSERVED, *subject.before),
                 AFTER: (*_OBSERVED, *subject.after),
             }.items():
-                overrides = [*_bare(subject), *own, *_suited(subject, changes), "targets={}"]
+                without, with_friction = subject.friction
+                suited = [with_friction if x == _FRICTION else x for x in changes]
+                overrides = [*_BARE, without, *own, *suited, "targets={}"]
                 scenarios[subject.scenario, name, when] = read_scenario(subject.scenario, overrides)
     return scenarios
-
-
-def _bare(subject: Subject) -> tuple[str, ...]:
-    return (*_BARE, "drive_friction=false") if subject.scenario == "pfc_delta" else _BARE
-
-
-def _suited(subject: Subject, changes: tuple[str, ...]) -> tuple[str, ...]:
-    """Return changes as they are said of a robot; a DELTA robot brings its own friction."""
-    if subject.scenario != "pfc_delta":
-        return changes
-    return tuple("drive_friction=true" if x == _FRICTION else x for x in changes)
 
 
 def _said(row: RunRow, metric: str) -> str:
@@ -179,8 +173,11 @@ def _said(row: RunRow, metric: str) -> str:
 
 def _listing(subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]) -> list[str]:
     lines = [f"{name}: {' '.join(changes) or '-'}" for name, changes in disturbances.items()]
-    lines += [f"{s.scenario}, before: {' '.join((*_UNOBSERVED, *s.before))}" for s in subjects]
-    return [*lines, f"after: {' '.join(_OBSERVED)}"]
+    for s in subjects:
+        lines.append(f"{s.scenario}, friction: {s.friction[1]}")
+        lines.append(f"{s.scenario}, before: {' '.join((*_UNOBSERVED, *s.before))}")
+        lines.append(f"{s.scenario}, after: {' '.join((*_OBSERVED, *s.after))}")
+    return lines
 
 
 def _picture(rows: Mapping[Case, RunRow], metric: Mapping[str, str]) -> Figure:
