@@ -41,3 +41,21 @@ def test_a_bar_on_a_terminal():
 )
 def test_times(seconds, spoken):
     assert spoken_time(seconds) == spoken
+
+
+def test_the_time_left_counts_runs_since_processes_started(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("experiments.sweep.progress.time.monotonic", lambda: clock[0])
+    text = io.StringIO()
+    with SweepProgress(Console(file=text, width=100), "arm", 20, 0) as progress:
+        progress.processes(1)
+        for _ in range(10):
+            clock[0] += 10.0
+            progress.advance("completed")
+        progress.processes(0)
+        clock[0] += 500.0
+        progress.processes(1)
+        for _ in range(2):
+            clock[0] += 10.0
+            progress.advance("completed")
+    assert text.getvalue().splitlines()[-1] == "arm: 12 of 20 runs, 1 min 20 s left"
