@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -26,6 +27,8 @@ from pfsc_drake.geometry import (
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
+# of joints beyond the number of outputs [1/s]
+POSTURE_POLES = (-14.0, -17.0, -19.0, -23.0)
 NAMES = ("eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3")
 
 
@@ -155,6 +158,7 @@ def make_law():
         sampling_time = changes.pop("sampling_time", 0.0)
         damping = changes.pop("boundary_layer_damping", None)
         integral = changes.pop("integral", 0.0)
+        weight, coordinate = changes.pop("weight", None), changes.pop("coordinate", None)
         options = ActuationOptions(sampling_time, damping)
         linearization = linearize(
             chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), options
@@ -162,6 +166,10 @@ def make_law():
         r, m, n = RELATIVE_DEGREE[law], linearization.num_outputs, chain.dimension
         poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
         gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]
+        posture = None
+        if n > m:
+            own = Stabilization([gains_from_poles(POSTURE_POLES[:r])] * n, r, ["posture"] * n)
+            posture = Posture(own, weight, coordinate)
         arguments = {
             "robot": chain,
             "linearization": linearization,
@@ -170,6 +178,7 @@ def make_law():
             "limits": np.full(n, 1e9),
             "max_alpha": 0.9,
             "safe_state": SafeState(np.full(n, 50.0)),
+            "posture": posture,
         }
         return FollowingLaw(**(arguments | changes))
 
