@@ -16,7 +16,7 @@ from pfsc_drake.control.law.law_functions import completion_function, law_functi
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
-from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
@@ -170,8 +170,14 @@ class FollowingLaw:
         self._last_output, self._angle = arrays["last_output"], arrays["angle"]
         self._posture = arrays.get("posture", np.zeros(0))
         self._wish, self._slope = arrays.get("wish"), arrays.get("slope")
-        self._weight, self._rate = arrays.get("weight"), arrays.get("rate")
+        self._weight, self._rate = arrays.get("weight"), arrays.get("rate", np.zeros(1))
         self._scale = None if self.posture is None else self.posture.scale
+
+    @property
+    def gains(self) -> LoopGains:
+        """All gains."""
+        posture = None if self.posture is None else self.posture.stabilization
+        return LoopGains(self.stabilization, posture)
 
     def evaluate(
         self,
