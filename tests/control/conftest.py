@@ -29,6 +29,9 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 # of joints beyond the number of outputs [1/s]
 POSTURE_POLES = (-14.0, -17.0, -19.0, -23.0)
+# bent arms of six axes and of seven [rad]
+BENT = (0.2, 1.6, -0.5, 0.1, 1.2, 0.1)
+BENT_7 = (0.1, -0.7, 0.2, -2.3, 0.1, 1.6, 0.7)
 NAMES = ("eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3")
 
 
@@ -94,8 +97,10 @@ class Robot:
             self.context, JacobianWrtVariable.kV, self.tool, [0, 0, 0], world, world
         )
 
-    def reach(self, y_t, R_e=None, guess=(0.2, 1.6, -0.5, 0.1, 1.2, 0.1)):
+    def reach(self, y_t, R_e=None, guess=None):
         """Return joint coordinates that bring the tool to a pose."""
+        if guess is None:
+            guess = BENT_7 if self.n == 7 else BENT
 
         def error(q):
             y, R = self.tool_pose(np.concatenate([q, 0 * q, q, 0 * q]))
@@ -125,6 +130,19 @@ def oriented_path():
         zyx_to_quaternion(angles), theta, smoothness=5, closed=True
     )
     return Path(FourierCurve.bent_lemniscate(), orientation)
+
+
+@pytest.fixture(scope="session")
+def small_path():
+    """Tilted circle within reach of a small arm, with an orientation that nods and sways."""
+    theta = np.linspace(0.0, 2.0 * np.pi, 13)
+    swing = [0.3 * np.sin(theta), 0.25 * np.cos(theta), 0.2 * np.sin(2 * theta)]
+    angles = np.stack(swing, axis=1) + np.array([0.0, 0.1, np.pi])
+    orientation = interpolate_orientation(
+        zyx_to_quaternion(angles), theta, smoothness=5, closed=True
+    )
+    circle = FourierCurve.circle([0.45, 0.05, 0.4], 0.12, [1.0, 0.0, 0.2], [0.0, 1.0, 0.1])
+    return Path(circle, orientation)
 
 
 @pytest.fixture(scope="session")

@@ -53,7 +53,7 @@ class ClosedLoop:
         if self.law.posture is None:
             return None
         omega, orders = 5.0, np.arange(self.r + 1)[:, None]
-        swing = np.linspace(0.1, 0.2, self.n) * omega**orders
+        swing = np.linspace(0.04, 0.08, self.n) * omega**orders
         swing = swing * np.sin(omega * t + np.arange(self.n) + orders * np.pi / 2)
         swing[0] += self.middle
         return swing
@@ -88,7 +88,9 @@ def start(robot, path, rigid, theta, size, seed=1):
     R_e = None
     if path.orientation is not None:
         R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])
-        R_e = R_d @ Rotation.from_euler("ZYX", [0.05, -0.04, 0.06]).as_matrix()
+        # the wrist of the small arm is weak
+        angles = (0.4 if n == 7 else 1.0) * np.array([0.05, -0.04, 0.06])
+        R_e = R_d @ Rotation.from_euler("ZYX", angles).as_matrix()
     q = robot.reach(sigma + np.array([0.006, -0.005, 0.008]), R_e)
     v, a, jerk = (scale * rng.uniform(-1.0, 1.0, n) for scale in (0.05, 1.0, 20.0))
     if size <= 2 * n:
