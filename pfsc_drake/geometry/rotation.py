@@ -175,6 +175,7 @@ def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
     middle = np.array([1.0 + a[0] if a[0] >= 0.0 else across / (1.0 - a[0]), a[1], a[2]])
     if not np.any(middle):
         middle[1] = 1.0
+    middle = middle / np.abs(middle).max()
     half_turn = 2.0 * np.outer(middle, middle) / (middle @ middle) - np.eye(3)
     return half_turn * [1.0, -1.0, -1.0]
 
