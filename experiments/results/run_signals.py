@@ -11,7 +11,12 @@ from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.manifolds.manifold import Kind, indices
-from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
+from pfsc_drake.geometry import (
+    PathPointLayout,
+    angle_between,
+    matrix_to_zyx,
+    quaternion_to_matrix,
+)
 from pfsc_drake.robot.robot_model import pose_function
 
 
@@ -229,6 +234,7 @@ def _add_orientation(
     """Add the ZYX angles of the tool and of the reference that the law compares it with.
 
     And how far that reference is away from the orientation that belongs to the tool's place.
+    Where only an axis of the tool matters, its directions take the place of the angles.
     """
     linearization = station.law.linearization
     if not station.task.place.layout.oriented:
@@ -237,12 +243,19 @@ def _add_orientation(
     R_e, R_d = _rotations(station.task.place.layout, pose, point)
     _, R_place = _rotations(station.task.place.layout, pose, place)
     unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
-    for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
-        angles = np.unwrap(matrix_to_zyx(R), axis=0)
-        angles[unknown] = np.nan
-        log.add(name, angles, "rad", ["z", "y", "x"])
+    axis = station.task.place.tool_axis
+    for name, R in {"e": R_e, "d": R_d}.items():
+        if axis is None:
+            angles = np.unwrap(matrix_to_zyx(R), axis=0)
+            angles[unknown] = np.nan
+            log.add(f"angles_{name}", angles, "rad", ["z", "y", "x"])
+        else:
+            directions = np.where(unknown[:, None], np.nan, R @ axis)
+            log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])
     lead = np.full(len(place), np.nan)
-    if not unknown.all():
+    if axis is not None:
+        lead[~unknown] = angle_between(R_place @ axis, R_d @ axis)[~unknown]
+    elif not unknown.all():
         between = np.swapaxes(R_place, 1, 2) @ R_d
         lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
     log.add("orientation_lead", lead, "rad")

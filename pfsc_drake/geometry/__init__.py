@@ -20,6 +20,7 @@ from pfsc_drake.geometry.paths.waypoint_file import WaypointTable, read_waypoint
 from pfsc_drake.geometry.paths.waypoints import Tolerance, path_from_waypoints
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
+    angle_between,
     check_rotation_matrix,
     matrix_to_quaternion,
     matrix_to_zyx,
@@ -51,6 +52,7 @@ __all__ = [
     "ShapeReport",
     "Tolerance",
     "WaypointTable",
+    "angle_between",
     "check_rotation_matrix",
     "interpolate",
     "interpolate_orientation",

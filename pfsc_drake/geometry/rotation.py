@@ -150,6 +150,20 @@ def quaternion_to_zyz(quaternion: ArrayLike) -> np.ndarray:
     return matrix_to_zyz(quaternion_to_matrix(quaternion))
 
 
+def angle_between(a: ArrayLike, b: ArrayLike) -> np.ndarray:
+    """Angles between directions, accurate for small ones too.
+
+    Args:
+        a: Vectors of any length but zero, [..., 3].
+        b: The same.
+
+    Returns:
+        [...] rad, 0 to pi.
+    """
+    dot = np.einsum("...i,...i->...", a, b)
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), dot)
+
+
 def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
     """Rotation of least angle that turns the x-axis to a direction.
 
