@@ -101,9 +101,7 @@ def build_station(
         start.theta,
         on_motors,
         task.warnings
-        + part.start_warnings(
-            scenario.start, link_state[: part.robot.dimension], start.target
-        )
+        + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),
         workpiece,

@@ -100,13 +100,11 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
             ways.append("for a position only write path.orientation.task: none")
         raise InputError("; ".join([said, *ways]))
     if num_joints > 3 and path.orientation is None and task != "none":
-        hold = "" if num_joints == 6 else (
-            f", or hold {num_joints - 3} joints: robot.fixed_joints: {{NAME: VALUE}}"
-        )
-        raise InputError(
-            f"{said}; {_GIVE_ORIENTATION}; if none is meant, write path.orientation.task: none"
-            f"{hold}"
-        )
+        ways = [_GIVE_ORIENTATION, "if none is meant, write path.orientation.task: none"]
+        if num_joints != 6:
+            hold = f"hold {num_joints - 3} of them: robot.fixed_joints: {{NAME: VALUE}}"
+            ways[-1] += f", or {hold}"
+        raise InputError("; ".join([said, *ways]))
 
 
 def _through_waypoints(

@@ -150,7 +150,7 @@ def quaternion_to_zyz(quaternion: ArrayLike) -> np.ndarray:
     return matrix_to_zyz(quaternion_to_matrix(quaternion))
 
 
-def angle_between(a: ArrayLike, b: ArrayLike) -> np.ndarray:
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angles between directions, accurate for small ones too.
 
     Args:

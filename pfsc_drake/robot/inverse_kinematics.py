@@ -51,9 +51,7 @@ class ToolTarget:
         return np.block([[np.eye(3, 12)], [np.zeros((3, 3)), direction]])
 
 
-def solve_pose(
-    robot: RobotModel, target: ToolTarget, guess: np.ndarray, name: str
-) -> np.ndarray:
+def solve_pose(robot: RobotModel, target: ToolTarget, guess: np.ndarray, name: str) -> np.ndarray:
     """Return joint coordinates within their limits that put the tool where it is to be.
 
     The search starts at the guess, so that the guess chooses the branch; other

@@ -137,9 +137,7 @@ class PathManifold:
     name = "path"
     follows_time = False
 
-    def __init__(
-        self, order: int, *, oriented: bool, tool_axis: np.ndarray | None = None
-    ) -> None:
+    def __init__(self, order: int, *, oriented: bool, tool_axis: np.ndarray | None = None) -> None:
         if tool_axis is not None and not oriented:
             raise InputError(f"tool axis {list(tool_axis)}: the path has no orientation to follow")
         self.layout = PathPointLayout(order, oriented)

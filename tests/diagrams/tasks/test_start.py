@@ -263,8 +263,9 @@ def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
     _, _, arm, x = start(on_rails)
     q = (arm.coordinates.link_rows @ x)[:3]
     np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
-    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, ToolTarget(arm.tool_pose()[0])) == []
-    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, ToolTarget(arm.tool_pose()[0]))
+    there = ToolTarget(arm.tool_pose()[0])
+    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, there) == []
+    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, there)
     assert "lift_joint most" in warning and f"q_1 = {0.8 * side:g} m" in warning
 
 
