@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context
 from diagrams.drawing.replay import RecordedMotion
 from diagrams.station import Station
 from experiments.results.orientation_signals import add_orientation
+from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -56,6 +57,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     log.add("alpha", points[:, station.task.place.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
     add_orientation(log, station, raw["manifold_point"], points, pose)
+    add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -81,6 +83,7 @@ def optional_signals(station: Station) -> set[str]:
             names |= {"f_c", "f_v"}
     if station.on_motors:
         names.add("xi_M")
+    names |= posture_signals(station)
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
     return names
 

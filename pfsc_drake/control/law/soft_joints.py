@@ -61,7 +61,12 @@ def bending(joints: SoftJoints) -> float:
     return float(np.linalg.norm(compliance[:3, :3], 2))
 
 
-def composite_law_error(joints: SoftJoints, damping: np.ndarray, proportional: np.ndarray) -> float:
+def composite_law_error(
+    joints: SoftJoints,
+    damping: np.ndarray,
+    proportional: np.ndarray,
+    posture: np.ndarray | None = None,
+) -> float:
     """Return the largest error that slow (3.70) plus fast law (3.71) leave [s^2].
 
     Under ``tau_d = (D_E + D_M) J^-1 v - epsilon D_b tau_J'`` with
@@ -71,12 +76,14 @@ def composite_law_error(joints: SoftJoints, damping: np.ndarray, proportional: n
 
     so that ``y'' = W(s) v``, and the error ``e = y - y_p`` answers to the wanted acceleration by
     ``(s^2 + W (a_2 s + a_1))^-1 (W - 1)``; stiff joints give ``W = 1``. What joints do beside the
-    tool's motion is held with the gains of the last coordinate.
+    tool's motion is held with gains of its own.
 
     Args:
         joints: The joints.
         damping: Diagonal of ``epsilon D_b`` [s], shape (N,).
         proportional: ``a_1`` [1/s^2] and ``a_2`` [1/s] of the coordinates, shape (2, m).
+        posture: The same of the joints beside the tool's motion, shape (2, N), where there are
+            more than the tool needs.
 
     Returns:
         Largest deviation of the tool point [m] per harmonic acceleration [m/s^2], over all
@@ -84,10 +91,12 @@ def composite_law_error(joints: SoftJoints, damping: np.ndarray, proportional: n
     """
     m, n = joints.J.shape
     J_inverse = np.linalg.pinv(joints.J)
-    beside = np.eye(n) - J_inverse @ joints.J if m < n else np.zeros((n, n))
     M = joints.D_E + np.diag(joints.D_M)
     third, fourth = damping[:, None] * joints.D_E, (joints.D_M / joints.K_s)[:, None] * joints.D_E
-    a_1, a_2 = (J_inverse @ (a[:, None] * joints.J) + a[-1] * beside for a in proportional)
+    a_1, a_2 = (J_inverse @ (a[:, None] * joints.J) for a in proportional)
+    if posture is not None:
+        beside = np.eye(n) - J_inverse @ joints.J
+        a_1, a_2 = a_1 + beside * posture[0], a_2 + beside * posture[1]
     loop = np.eye(4 * n, k=n)
     loop[3 * n :] = -np.linalg.solve(fourth, np.hstack([M @ a_1, M @ a_2, M, third]))
     poles = np.linalg.eigvals(loop)

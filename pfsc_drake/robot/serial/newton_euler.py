@@ -128,16 +128,55 @@ def tool_pose(chain: Linkage, motions: Sequence[LinkMotion]) -> tuple[Jet, Jet]:
     Returns:
         ``y_t`` [m], vector jet of order r, and ``R_e``, matrix jet of order r, see (2.5).
     """
-    R_WL, p_WL = ca.SX.eye(3), ca.SX(3, 1)
-    for motion in motions:
-        p_WL = p_WL + R_WL @ motion.p_PL.coefficients[0]
-        R_WL = R_WL @ motion.R_PL.coefficients[0]
+    R_WL, p_WL = _link_poses(motions)[-1]
     R_LT, p_LT = _symbolic(chain.R_LT), _symbolic(chain.p_LT)
     last = motions[-1]
     w_T = R_LT.T @ last.w
     v_T = R_LT.T @ (last.v + jets.cross(last.w, p_LT))
     R_e = _integrate_rotation(R_WL @ R_LT, w_T)
     return (R_e @ v_T).integrate(p_WL + R_WL @ p_LT), R_e
+
+
+def points_on_links(
+    chain: Linkage,
+    q: Sequence[Jet],
+    points: Sequence[tuple[int, np.ndarray]],
+    motions: Sequence[LinkMotion] | None = None,
+) -> list[Jet]:
+    """Return where points fixed to links are in the world.
+
+    Args:
+        chain: The robot, N joints.
+        q: Joint coordinates, N scalar jets of order r >= 1.
+        points: Of each the index of its link, 0 for the first that moves, to N - 1, and where it
+            is in that link's frame [m], shape (3,).
+        motions: Motions for these very coordinates, if known already.
+
+    Returns:
+        Positions in world axes [m], vector jets of order r, in the order of ``points``.
+    """
+    motions = link_motions(chain, q) if motions is None else motions
+    poses, places = _link_poses(motions), []
+    turns: dict[int, Jet] = {}
+    for k, point in points:
+        motion, (R_WL, p_WL) = motions[k], poses[k]
+        p_LQ = _symbolic(point)
+        if k not in turns:
+            turns[k] = _integrate_rotation(R_WL, motion.w)
+        velocity = turns[k] @ (motion.v + jets.cross(motion.w, p_LQ))
+        places.append(velocity.integrate(p_WL + R_WL @ p_LQ))
+    return places
+
+
+def _link_poses(motions: Sequence[LinkMotion]) -> list[tuple[ca.SX, ca.SX]]:
+    """Return orientations and origins of all link frames in the world, of order 0."""
+    R_WL, p_WL = ca.SX.eye(3), ca.SX(3, 1)
+    poses = []
+    for motion in motions:
+        p_WL = p_WL + R_WL @ motion.p_PL.coefficients[0]
+        R_WL = R_WL @ motion.R_PL.coefficients[0]
+        poses.append((R_WL, p_WL))
+    return poses
 
 
 def _integrate_rotation(R: ca.SX, w: Jet) -> Jet:

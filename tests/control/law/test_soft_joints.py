@@ -108,7 +108,7 @@ def test_bending_under_the_worst_acceleration(n):
 
 @pytest.mark.parametrize("stiffness", [1e4, 1e5])
 def test_a_joint_that_the_tool_does_not_need(stiffness):
-    """It has no part in the error, and is held like the last coordinate."""
+    """It has no part in the error, and is held by gains of its own."""
     needed, one = arm(3, stiffness), np.ones(1)
     more = SoftJoints(
         np.block([[needed.D_E, np.zeros((3, 1))], [np.zeros((1, 3)), 2.0]]),
@@ -118,7 +118,9 @@ def test_a_joint_that_the_tool_does_not_need(stiffness):
     )
     damping = 300.0 * needed.D_M / needed.K_s
     expected = composite_law_error(needed, damping, gains(3))
-    found = composite_law_error(more, np.append(damping, 300.0 / stiffness), gains(3))
+    damping = np.append(damping, 300.0 / stiffness)
+    assert composite_law_error(more, damping, gains(3)) == np.inf
+    found = composite_law_error(more, damping, gains(3), gains(4))
     assert 0.0 < expected < np.inf
     assert found == pytest.approx(expected, rel=1e-3)
     assert bending(more) == pytest.approx(bending(needed), rel=1e-12)

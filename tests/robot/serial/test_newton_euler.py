@@ -23,6 +23,7 @@ from pfsc_drake.robot.serial.newton_euler import (
     inverse_dynamics,
     link_motions,
     mass_matrix,
+    points_on_links,
     tool_pose,
 )
 
@@ -133,6 +134,48 @@ def test_tool_pose_and_twist_match_drake(robot):
         assert np.allclose(y1, V_WT.translational(), atol=1e-11)
         assert np.allclose(R1 @ R0.T, ca.skew(ca.DM(V_WT.rotational())).full(), atol=1e-11)
         assert np.allclose(y2, (J @ values[2])[3:] + bias.translational(), atol=1e-10)
+
+
+def test_points_on_links_match_drake(robot):
+    plant, _, chain, _ = robot
+    n = chain.dimension
+    rng = np.random.default_rng(8)
+    points = [(k, rng.uniform(-0.5, 0.5, size=3)) for k in [*range(n), 0]]
+    symbols, q = symbolic_coordinates(n, 2)
+    places = points_on_links(chain, q, points)
+    jacobian = ca.vertcat(*[ca.jacobian(place.coefficients[0], symbols[0]) for place in places])
+    columns = [ca.vertcat(*[place.derivative(k) for place in places]) for k in range(3)]
+    f = ca.Function("f", symbols, [*columns, jacobian])
+    values = rng.uniform(-1.5, 1.5, size=(3, n))
+    position, velocity, acceleration, J = (np.array(v).squeeze() for v in f(*values))
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, values[0])
+    plant.SetVelocities(context, values[1])
+    world = plant.world_frame()
+    for i, (k, point) in enumerate(points):
+        rows = slice(3 * i, 3 * i + 3)
+        frame = plant.GetJointByName(f"joint_{k}").frame_on_child()
+        at = (JacobianWrtVariable.kV, frame, point, world, world)
+        expected = plant.CalcJacobianTranslationalVelocity(
+            context, JacobianWrtVariable.kV, frame, point, world, world
+        )
+        bias = plant.CalcBiasTranslationalAcceleration(context, *at).ravel()
+        assert np.allclose(position[rows], frame.CalcPoseInWorld(context) @ point, atol=1e-12)
+        assert np.allclose(J.reshape(-1, n)[rows], expected, atol=1e-12)
+        assert np.allclose(velocity[rows], expected @ values[1], atol=1e-11)
+        assert np.allclose(acceleration[rows], expected @ values[2] + bias, atol=1e-10)
+
+
+def test_point_at_the_tool_is_the_tool_point_to_any_order(robot):
+    _, _, chain, _ = robot
+    coefficients = np.random.default_rng(9).uniform(-1.0, 1.0, size=(chain.dimension, 5))
+    q = [Jet([ca.SX(c) for c in row]) for row in coefficients]
+    motions = link_motions(chain, q)
+    y, _ = tool_pose(chain, motions)
+    (place,) = points_on_links(chain, q, [(chain.dimension - 1, chain.p_LT)], motions)
+    for k in range(5):
+        expected, found = (np.array(ca.DM(jet.derivative(k))) for jet in (y, place))
+        assert np.allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(expected).max())
 
 
 def test_dynamics_match_drake(robot):
