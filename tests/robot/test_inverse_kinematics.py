@@ -105,6 +105,6 @@ def test_the_tool_may_turn_about_its_axis_at_the_start(make_chain):
     """The guess's own turn about the last joint is kept, whatever the path's orientation has."""
     robot = make_chain([*JOINTS[:5], (X, [0, 0, 0])], [0.2, 0.0, 0.0])
     pose, q_0 = pose_function(robot), POSTURE[:6]
-    there = np.array(pose(q_0 + [0, 0, 0, 0, 0, 2.0])).ravel()
+    there = np.array(pose(q_0 + 2.0 * np.eye(6)[5])).ravel()
     target = ToolTarget(there[:3], there[3:].reshape(3, 3), X)
     np.testing.assert_allclose(solve_pose(robot, target, q_0, "start"), q_0, rtol=0, atol=1e-8)
