@@ -191,12 +191,15 @@ def test_a_robot_without_names(load_scenario):
     assert "q_1 = 0.1781 m" in sentence or "q_2 = 0.186 m" in sentence or "q_3" in sentence
 
 
-def test_a_wrist_of_five_axes_that_aims_its_tool(through_the_wrist):
-    """Beside its own axis the fourth joint turns nothing when the tool is in line with it."""
-    through_the_wrist.robot.fixed_joints = {"joint_6": 0.0}
+@pytest.mark.parametrize(("num_joints", "name"), [(5, "robot"), (6, "wrist")])
+def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
+    """The fourth joint turns nothing but the tool about its axis where both are in line."""
+    if num_joints == 5:
+        through_the_wrist.robot.fixed_joints = {"joint_6": 0.0}
     through_the_wrist.path.orientation.task = "tool_axis"
-    through_the_wrist.start = StartParameters(posture_deg=[0, 105, -25, 0, 25])
+    posture = [0, 105, -25, 0, 25, 0][:num_joints]
+    through_the_wrist.start = StartParameters(posture_deg=posture)
     station, root = run(through_the_wrist, 1.0)
     sentence = station.fault(root)
-    assert sentence.startswith("robot singular at eta = 0.")
+    assert sentence.startswith(f"{name} singular at eta = 0.")
     assert "q_5 = " in sentence and "(q_4 can move without the tool)" in sentence

@@ -60,3 +60,18 @@ def test_a_point_that_moves_with_time(five_axes):
     late = run.after(CONVERGED)
     assert np.linalg.norm(run["tracking_error"], axis=1)[late].max() < 5e-6
     assert angle_between(run["axis_e"], run["axis_d"])[late].max() < 5e-6
+
+
+def test_six_axes_turn_the_tool_about_its_axis_meanwhile(five_axes):
+    """Where it turns to is the posture's; the axis does not notice."""
+    run = five_axes(
+        "pfc_comau_6r",
+        "robot.fixed_joints={}",
+        "start={posture_deg: [-25, 115, -40, -5, 95, -170]}",
+        "controller.posture={reference_deg: [-25, 115, -40, -5, 95, 170], stiffness: 64, "
+        "damping: 16, inertia: 1}",
+    )
+    turned = np.rad2deg(run["q_J"][-1, 5] - run["q_J"][0, 5])
+    assert turned > 300.0
+    assert angle_between(run["axis_e"], run["axis_d"]).max() < 2e-6
+    assert np.linalg.norm(run["xi"], axis=1).max() < 2e-6
