@@ -57,7 +57,7 @@ def build_station(
     builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
-    require_orientation(task.path, part.robot.dimension)
+    require_orientation(task.path, scenario.path.orientation.task, part.robot.dimension)
     believed = part.belief.robot
     begin = cache(lambda: _start(scenario, task, part, workpiece))
     rest = cache(lambda: _rest(task, part, *begin()))
@@ -101,9 +101,7 @@ def build_station(
         start.theta,
         on_motors,
         task.warnings
-        + part.start_warnings(
-            scenario.start, link_state[: part.robot.dimension], start.R_e is not None
-        )
+        + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),
         workpiece,
@@ -141,7 +139,7 @@ def _start(
     if workpiece is not None:
         shift = workpiece.start_shift(upwards(part.gravity, "notch"))
     start = task.start(shift)
-    q_J = part.posture(start.y_t, start.R_e, scenario.start)
+    q_J = part.posture(start.target, scenario.start)
     for position, where in task.way():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)
