@@ -10,7 +10,7 @@ from scipy.linalg import lapack
 from pfsc_drake.errors import InputError
 
 # of a posture's coordinate, by which part of itself it must move with the outputs at rest
-_LEAST_SHARE = 0.02
+_LEAST_SHARE = 0.1
 
 
 class Spare(NamedTuple):
