@@ -75,3 +75,12 @@ def test_six_axes_turn_the_tool_about_its_axis_meanwhile(five_axes):
     assert turned > 300.0
     assert angle_between(run["axis_e"], run["axis_d"]).max() < 2e-6
     assert np.linalg.norm(run["xi"], axis=1).max() < 2e-6
+
+
+def test_a_target_of_the_orientation_where_it_is_no_task(tmp_path, run_scenario):
+    changes = ("--set", "path.orientation.task=none", "--duration", "0.02")
+    run = run_scenario(tmp_path / "out", "pfc_elastic_6r", *changes)
+    assert run.status == 0
+    assert "phi" not in run.log and "axis_e" not in run.log
+    assert run["q_J"].shape[1] == 6
+    assert "max_orientation_error" not in run.metrics
