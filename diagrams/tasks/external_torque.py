@@ -1,4 +1,4 @@
-"""What the law is told about forces on the tool."""
+"""What the law is told about forces on the robot."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -22,17 +22,20 @@ def add_external_torque(
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Tell the law the external torques in the joints, as far as they come from a wrench.
+    """Tell the law the external torques in the joints, as far as they come from known forces.
+
+    A sensor in the flange does not see what acts on links in front of it.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
         scenario: The scenario.
         controller: The controller.
-        ports: ``joint_state``, and of ``wrench_ext`` and ``wrench_measured`` what there is.
+        ports: ``joint_state``, and of ``wrench_ext``, ``wrench_measured`` and ``push_torque``
+            what there is.
 
     Returns:
-        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the tool.
+        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the robot.
 
     Raises:
         InputError: If the law knows no external torques.
@@ -40,20 +43,25 @@ def add_external_torque(
     parameters = scenario.controller.external_torque
     if parameters.source in ("none", "observed"):
         return {}
-    wrench = ports.get({"known": "wrench_ext", "measured": "wrench_measured"}[parameters.source])
+    seen = {
+        "known": {"wrench_ext": "wrench", "push_torque": "link_torque"},
+        "measured": {"wrench_measured": "wrench"},
+    }[parameters.source]
     degree = controller.relative_degree
     if degree == 1:
         raise InputError(
             f"controller.external_torque.source = {parameters.source} with the law "
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
-    if wrench is None:  # nothing acts on the tool
+    acting = {name: ports[name] for name in seen if name in ports}
+    if not acting:  # nothing acts on the robot
         return {}
     torque = builder.AddNamedSystem(
         "external_torque",
         ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
     )
-    builder.Connect(wrench, torque.GetInputPort("wrench"))
+    for name, port in acting.items():
+        builder.Connect(port, torque.GetInputPort(seen[name]))
     builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
     builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))
     return {"tau_ext": torque.GetOutputPort("tau_ext")}

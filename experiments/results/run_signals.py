@@ -264,7 +264,9 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     for name, (unit, labels) in known.items():
         if name in raw:
             log.add(name, raw[name], unit, labels)
-    if "wrench_ext" in raw:
+    if "push_wrench" in raw:
+        _add_pushes(log, station, raw)
+    if "wrench_ext" in raw or "push_torque" in raw:
         labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
     if "tau_ext_observed" in raw:
@@ -278,11 +280,22 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
-    """Return what the wrench on the tool means in the joints, shape (samples, N)."""
-    q_J, wrench = raw["joint_state"][:, : station.robot.dimension], raw["wrench_ext"]
-    if len(q_J) == 0:
-        return np.zeros_like(q_J)
-    return np.array(joint_torque_function(station.robot).map(len(q_J))(q_J.T, wrench.T)).T
+    """Return what acts on tool and links means in the joints, shape (samples, N)."""
+    q_J = raw["joint_state"][:, : station.robot.dimension]
+    pushes = raw.get("push_torque", np.zeros_like(q_J))
+    if len(q_J) == 0 or "wrench_ext" not in raw:
+        return pushes
+    function = joint_torque_function(station.robot).map(len(q_J))
+    return np.array(function(q_J.T, raw["wrench_ext"].T)).T + pushes
+
+
+def _add_pushes(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add forces on links, and where they act, three columns for each point."""
+    places = station.diagram.GetSubsystemByName("link_pushes").places
+    labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
+    force = raw["push_wrench"].reshape(len(log.time), -1, 2, 3)[:, :, 0]
+    log.add("push_force", force.reshape(len(log.time), -1), "N", labels)
+    log.add("push_point", raw["push_point"], "m", labels)
 
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:

@@ -46,9 +46,10 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     if result.hand is not None and result.hand.tremor > 0.0:
         result.hand.tremor = 0.0
         removed.append("tremor of the hand")
-    if settings.forces or settings.hold_back.force != 0.0:
-        result.forces, result.hold_back = [], HoldBackParameters()
-        removed.append("forces on the tool")
+    on_links = bool(settings.pushes) or any(pulse.link for pulse in settings.forces)
+    on_tool = any(not pulse.link for pulse in settings.forces) or settings.hold_back.force != 0.0
+    result.forces, result.pushes, result.hold_back = [], [], HoldBackParameters()
+    removed += ["forces on the tool"] * on_tool + ["forces on links"] * on_links
     if any(settings.start.offset) or any(settings.start.rotation_deg):
         result.start.offset, result.start.rotation_deg = [0.0, 0.0], [0.0, 0.0, 0.0]
         removed.append("start beside the path")
