@@ -92,9 +92,7 @@ def connect_push(
     builder.Connect(ports[0], plant.get_applied_spatial_force_input_port())
 
 
-def connect_torques(
-    builder: DiagramBuilder, port: InputPort, pushes: Sequence[LeafSystem]
-) -> None:
+def connect_torques(builder: DiagramBuilder, port: InputPort, pushes: Sequence[LeafSystem]) -> None:
     """Let wrenches act as what they mean in the joints.
 
     Args:

@@ -73,9 +73,7 @@ class ForcePulse:
         for key in ("force", "torque", "point"):
             setattr(self, key, require_vector(key, getattr(self, key)))
         if not self.link and self.point.any():
-            raise InputError(
-                f"point = {self.point.tolist()}: must be [0, 0, 0] without a link, at the tool point"
-            )
+            raise InputError(f"point = {self.point.tolist()}: must be [0, 0, 0] without a link")
         if not (np.isfinite(self.begin) and self.begin < self.end < np.inf):
             raise InputError(f"begin, end = {self.begin}, {self.end}: must be finite and ascending")
         longest = (self.end - self.begin) / 2.0

@@ -10,7 +10,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 
 class ExternalTorque(LeafSystem):
-    """``tau_ext = J_g(q_J)^T wrench + link_torque`` (2.11), with the derivatives that a law asks for.
+    """``tau_ext = J_g(q_J)^T wrench + link_torque`` (2.11), with derivatives as a law asks for.
 
     A law of relative degree r counts on ``tau_ext`` up to the derivative r - 2. A sensor
     gives none; they are estimated from the samples (:class:`SignalDerivatives`). Without an
