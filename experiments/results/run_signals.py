@@ -4,8 +4,14 @@ import numpy as np
 from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
-from diagrams.drawing.replay import RecordedMotion
+from diagrams.drawing.replay import RecordedMotion, RecordedPushes
 from diagrams.station import Station
+from experiments.results.link_signals import (
+    add_link_signals,
+    elbow_motion,
+    has_elbow,
+    push_forces,
+)
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -58,6 +64,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     _add_manifold(log, station, raw, Y)
     _add_orientation(log, station, raw["manifold_point"], points, pose)
     _add_forces(log, station, raw)
+    add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
         log.add(name, length.values, "m", length.labels, length.limit)
@@ -80,6 +87,8 @@ def optional_signals(station: Station) -> set[str]:
         names |= {"f_c_estimate", "f_v_estimate"}
         if "tau_f" in names:
             names |= {"f_c", "f_v"}
+    if "push_wrench" in names:
+        names.add("push_force")
     if station.on_motors:
         names.add("xi_M")
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
@@ -120,8 +129,16 @@ def collect_motion(station: Station, root: Context, period: float) -> RecordedMo
     states = [station.part.coordinates.plant_state(x) for x in state]
     half = station.part.coordinates.num_states // 2
     positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
+    pushes = None
+    if "push_wrench" in raw:
+        pushes = RecordedPushes(raw["push_point"][frames], push_forces(raw)[frames])
     return RecordedMotion(
-        times[frames], positions, _tool_poses(station, state), raw["manifold_point"][frames]
+        times[frames],
+        positions,
+        _tool_poses(station, state),
+        raw["manifold_point"][frames],
+        elbow_motion(station, state) if has_elbow(station) else None,
+        pushes,
     )
 
 
@@ -264,8 +281,6 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     for name, (unit, labels) in known.items():
         if name in raw:
             log.add(name, raw[name], unit, labels)
-    if "push_wrench" in raw:
-        _add_pushes(log, station, raw)
     if "wrench_ext" in raw or "push_torque" in raw:
         labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
@@ -287,15 +302,6 @@ def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
         return pushes
     function = joint_torque_function(station.robot).map(len(q_J))
     return np.array(function(q_J.T, raw["wrench_ext"].T)).T + pushes
-
-
-def _add_pushes(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
-    """Add forces on links, and where they act, three columns for each point."""
-    places = station.diagram.GetSubsystemByName("link_pushes").places
-    labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
-    force = raw["push_wrench"].reshape(len(log.time), -1, 2, 3)[:, :, 0]
-    log.add("push_force", force.reshape(len(log.time), -1), "N", labels)
-    log.add("push_point", raw["push_point"], "m", labels)
 
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
