@@ -107,7 +107,9 @@ def _pushes(part: RobotPart, scenario: Scenario) -> list[_Push]:
 
 def _place(part: RobotPart, where: str, link: str, point: np.ndarray) -> LinkPlace:
     if not isinstance(part, Arm):
-        raise InputError(f"{where}.link = {link}; allowed: none, this robot is pushed at its tool")
+        raise InputError(
+            f"{where}.link = '{link}'; allowed: none, this robot is pushed at its tool"
+        )
     try:
         return place_on_link(part.model, part.coordinates, link, point)
     except InputError as error:

@@ -1,6 +1,7 @@
 """Signals of what happens to the links of a run's arm: pushes, and where its elbow goes."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagrams.robots.arm import Arm
 from diagrams.station import Station
@@ -92,13 +93,13 @@ def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) 
     undisturbed = None
     if _PUSHES in raw and station.path.closed:
         force, eta = log["push_force"].values, log["eta"].values[:, 0]
-        undisturbed = lap_before(eta, elbow, force.any(axis=1), station.path.length)
+        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.path.length)
     if undisturbed is not None:
         log.add("elbow_undisturbed", undisturbed, "m", ["x", "y", "z"])
 
 
 def lap_before(
-    eta: FloatArray, values: FloatArray, disturbed: FloatArray, lap: float
+    eta: FloatArray, values: FloatArray, disturbed: NDArray[np.bool_], lap: float
 ) -> FloatArray | None:
     """Return what was at the same place of a closed path in the lap before a disturbance.
 

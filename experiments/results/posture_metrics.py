@@ -18,6 +18,16 @@ AT_REST = 1e-3  # m/s, below which the tool rests
 PUSHED = 0.05  # share of a run's largest push, from which on a link counts as pushed
 
 
+def has_spare_joints(log: RunLog) -> bool:
+    """Whether a run's robot has more joints than the coordinates that it follows.
+
+    Args:
+        log: With ``q_J``.
+    """
+    outputs = sum(log[name].dim for name in ("eta", "xi", "phi") if name in log)
+    return 0 < outputs < log["q_J"].dim
+
+
 def max_posture_error(log: RunLog) -> float:
     """Largest magnitude of a joint's distance from the reference posture.
 
@@ -116,12 +126,11 @@ def posture_return(log: RunLog, lap: float) -> float:
     return _largest(q[later] - np.stack(expected, axis=1))
 
 
-def posture_metrics(log: RunLog, redundant: bool, lap: float | None) -> Metrics:
+def posture_metrics(log: RunLog, lap: float | None) -> Metrics:
     """All metrics of this module that a run has.
 
     Args:
         log: Of a path following run.
-        redundant: Whether its robot has more joints than the task needs.
         lap: Length of its path [m] if that is closed.
     """
     angle, speed = log["q_J"].unit, log["v_J"].unit
@@ -133,7 +142,7 @@ def posture_metrics(log: RunLog, redundant: bool, lap: float | None) -> Metrics:
         "elbow_travel": (lambda: elbow_travel(log), "m"),
     }
     metrics = Metrics()
-    for name in posture_metric_names(log.signals, redundant, lap is not None):
+    for name in posture_metric_names(log.signals, has_spare_joints(log), lap is not None):
         calculate, unit = calculations[name]
         metrics.add(name, calculate(), unit)
     return metrics

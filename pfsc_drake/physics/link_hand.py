@@ -43,8 +43,6 @@ class LinkHandParameters:
     grip_ramp: float = 0.2
 
     def __post_init__(self) -> None:
-        if not self.link:
-            raise InputError("link = '': must be a link or frame of the robot's model")
         self.point = require_vector("point", self.point)
         self.way = require_vector("way", self.way)
         for key, at_least in (("begin", "zero"), ("hold", "zero"), ("duration", None)):

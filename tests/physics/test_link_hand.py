@@ -49,7 +49,6 @@ def test_it_comes_back_before_it_lets_go():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"link": ""}, "link = ''"),
         ({"way": [0.0, 1.0]}, r"way = \[0.0, 1.0\]: must be 3"),
         ({"point": [0.0, np.nan, 0.0]}, "point = "),
         ({"begin": -1.0}, "begin = -1.0: must be finite, zero or positive"),

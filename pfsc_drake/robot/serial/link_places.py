@@ -76,7 +76,7 @@ def place_on_link(
         problem = "does not move with a link" if frame is not None else "is not in the model"
         bodies = [body.name() for body in bodies_of(plant) if body.index() in carriers]
         raise InputError(
-            f"{name}: {problem}; allowed: {', '.join(bodies)}, and the frames that are on these"
+            f"'{name}' {problem}; allowed: {', '.join(bodies)}, and the frames that are on these"
         )
     k = carriers[frame.body().index()]
     X_LF = plant.CalcRelativeTransform(plant.CreateDefaultContext(), links[k], frame)

@@ -133,14 +133,16 @@ def test_forces_on_links_are_in_manifold_axes_if_wanted(three_axes):
 
 def test_what_cannot_be_pushed_is_refused(three_axes, load_scenario):
     three_axes.forces = [ForcePulse(link="link_2"), ForcePulse(link="elbow")]
-    with pytest.raises(InputError, match=r"forces\[1\]\.link = elbow: .*allowed: link_1, link_2"):
+    with pytest.raises(
+        InputError, match=r"forces\[1\]\.link = 'elbow' is not .*allowed: link_1, link_2"
+    ):
         build_station(three_axes, SCENARIOS)
     three_axes.forces, three_axes.pushes = [], [LinkHandParameters("base")]
-    with pytest.raises(InputError, match=r"pushes\[0\]\.link = base: does not move .*link_1"):
+    with pytest.raises(InputError, match=r"pushes\[0\]\.link = 'base' does not move .*link_1"):
         build_station(three_axes, SCENARIOS)
     delta = load_scenario("pfc_delta")
     delta.forces = [ForcePulse(link="link_2")]
-    with pytest.raises(InputError, match=r"forces\[0\]\.link = link_2; allowed: none"):
+    with pytest.raises(InputError, match=r"forces\[0\]\.link = 'link_2'; allowed: none"):
         build_station(delta, SCENARIOS)
 
 

@@ -129,9 +129,9 @@ def test_link_frames_are_those_of_the_links_not_of_the_motors(station):
     assert names == [f"link_{i + 1}" for i in range(6)]
 
 
-@pytest.mark.parametrize("name", ["elbow", "base", "rotor_3"])
+@pytest.mark.parametrize("name", ["elbow", "base", "rotor_3", ""])
 def test_what_does_not_move_with_a_link_is_refused(name):
     with pytest.raises(InputError) as caught:
         Station("comau_racer_1_4_elastic").place(name, np.zeros(3))
-    assert str(caught.value).startswith(f"{name}: ")
+    assert str(caught.value).startswith(f"'{name}' ")
     assert "allowed: link_1, link_2, link_3, link_4, link_5, link_6, tool" in str(caught.value)
