@@ -54,7 +54,7 @@ def draw_conditioning(log: RunLog) -> Drawing:
         panel.set(xlabel=label, ylabel="1 / condition", title=f"Conditioning {title}")
     place_legend(panels[0])
     caption = "Reciprocal condition number of the decoupling matrix; 0 at a singular posture"
-    caption += ", dashed: below it the law stops" if signal.limits is not None else ""
+    caption += ", dashed: the least that the law accepts" if signal.limits is not None else ""
     return Drawing("conditioning", "Conditioning along the path", f"{caption}.", canvas)
 
 
@@ -108,13 +108,13 @@ def draw_pushes(log: RunLog) -> Drawing:
     draw_components(panels[-1], log.time, shift, ["$x$", "$y$", "$z$"])
     distance = np.linalg.norm(shift, axis=1)
     panels[-1].plot(log.time, distance, "--", color=INK, linewidth=1.1, label="distance")
-    compared = "elbow_undisturbed" in log
+    compared, name = "elbow_undisturbed" in log, log["elbow"].labels[0].rsplit(" ", 1)[0]
     since = "the lap before" if compared else "the first push"
-    panels[-1].set(ylabel="way in mm", title=f"Way of the pushed point since {since}")
+    panels[-1].set(ylabel="way in mm", title=f"Way of {name} since {since}")
     for panel in panels:
         place_legend(panel)
     what = "its motion in the lap before" if compared else "where it was when the push began"
-    caption = f"Forces on links, and how far the pushed point is from {what}."
+    caption = f"Forces on links, and how far {name} is from {what}, at the point that is pushed."
     return Drawing("pushes", "Forces on links", caption, canvas)
 
 

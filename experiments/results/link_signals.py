@@ -81,6 +81,7 @@ def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) 
         station: The station that was simulated.
         raw: Its logged signals.
     """
+    labels = [f"{station.robot.names[station.robot.dimension // 2]} {axis}" for axis in "xyz"]
     if _PUSHES in raw:
         places = station.diagram.GetSubsystemByName("link_pushes").places
         labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
@@ -89,13 +90,13 @@ def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) 
     if not has_elbow(station):
         return
     elbow = elbow_motion(station, raw["joint_state"])
-    log.add("elbow", elbow, "m", ["x", "y", "z"])
+    log.add("elbow", elbow, "m", labels[:3])
     undisturbed = None
     if _PUSHES in raw and station.path.closed:
         force, eta = log["push_force"].values, log["eta"].values[:, 0]
         undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.path.length)
     if undisturbed is not None:
-        log.add("elbow_undisturbed", undisturbed, "m", ["x", "y", "z"])
+        log.add("elbow_undisturbed", undisturbed, "m", labels[:3])
 
 
 def lap_before(
