@@ -16,6 +16,7 @@ from diagrams.scenario.path import (
     PathParameters,
     Waypoints,
 )
+from diagrams.scenario.posture import PostureParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
@@ -45,6 +46,7 @@ __all__ = [
     "ModelErrorParameters",
     "OrientationParameters",
     "PathParameters",
+    "PostureParameters",
     "RandomModelError",
     "ReferenceParameters",
     "RobotParameters",

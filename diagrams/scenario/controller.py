@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 from diagrams.scenario.friction_compensation import FrictionCompensationParameters
+from diagrams.scenario.posture import PostureParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
@@ -57,6 +58,11 @@ class GainParameters:
         )
 
     @property
+    def is_given(self) -> bool:
+        """Whether there are any."""
+        return bool(self.poles or self.coefficients or self.bandwidth)
+
+    @property
     def is_automatic(self) -> bool:
         """Whether poles are to be chosen."""
         return self.bandwidth > 0.0 and not self.poles
@@ -70,11 +76,18 @@ class LawGains:
         eta: Tangential.
         xi: Both transversal.
         phi: Rotational; unused by arms that only position.
+        posture: Of the joints next to the posture reference, where there are more joints than
+            outputs; by default those of ``xi`` without their integral part.
     """
 
     eta: GainParameters = dc.field(default_factory=GainParameters)
     xi: GainParameters = dc.field(default_factory=GainParameters)
     phi: GainParameters = dc.field(default_factory=GainParameters)
+    posture: GainParameters = dc.field(default_factory=GainParameters)
+
+    def __post_init__(self) -> None:
+        integral = self.posture.integral or self.posture.integral_pole
+        require(integral == 0.0, "posture", integral, "gains without an integral part")
 
 
 @dc.dataclass
@@ -111,6 +124,9 @@ class ControllerParameters:
         sampling_time: Sampling time ``T_s`` [s].
         boundary_layer_damping: Diagonal of ``epsilon D_b`` [s], for ``singular_perturbation``.
         min_rcond: Smallest reciprocal condition number of the decoupling matrix.
+        damped_below: Reciprocal condition number below which the joints' motion is damped, so
+            that a robot goes through singular postures off its path rather than stops; 0 for
+            never, else above ``min_rcond``.
         max_alpha: End of the feasible neighbourhood for the controller, below 1.
         brake_damping: Damping of the safe state on every drive, as a fraction of its
             effort limit per rad/s.
@@ -121,6 +137,7 @@ class ControllerParameters:
         model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
             robot parameters; empty for the plant's own. ``model_error`` comes on top.
         friction: What it does about friction.
+        posture: What joints do that the task leaves free.
     """
 
     law: str = "elastic"
@@ -128,6 +145,7 @@ class ControllerParameters:
     sampling_time: float = 1e-3
     boundary_layer_damping: list[float] = dc.field(default_factory=list)
     min_rcond: float = 1e-3
+    damped_below: float = 0.0
     max_alpha: float = 0.95
     brake_damping: float = 0.1
     effort_scale: float = 1.0
@@ -137,6 +155,7 @@ class ControllerParameters:
     friction: FrictionCompensationParameters = dc.field(
         default_factory=FrictionCompensationParameters
     )
+    posture: PostureParameters = dc.field(default_factory=PostureParameters)
 
     def __post_init__(self) -> None:
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
@@ -147,5 +166,8 @@ class ControllerParameters:
         require(
             in_range, "sampling_time", self.sampling_time, "a positive number from 1e-5 to 0.1 s"
         )
+        good = self.damped_below == 0.0 or self.min_rcond < self.damped_below < 1.0
+        allowed = f"0, or above min_rcond = {self.min_rcond:g} and below 1"
+        require(good, "damped_below", self.damped_below, allowed)
         require_positive("effort_scale", self.effort_scale)
         require_not_negative("brake_damping", self.brake_damping)

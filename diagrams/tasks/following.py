@@ -12,6 +12,7 @@ from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.friction import Coefficients, add_friction_compensation
 from diagrams.tasks.observed_forces import add_observed_forces
+from diagrams.tasks.posture import add_posture_reference
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
@@ -136,6 +137,7 @@ def add_law(
         signals["friction"] = friction
     signals |= add_observed_forces(builder, following.robot, scenario, controller, signals)
     made |= {name: signals[name] for name in _OBSERVED if name in signals}
+    made |= add_posture_reference(builder, following.robot, scenario, law, controller, signals)
     if scenario.compliance.is_given:
         inputs = signals | {
             "desired_reference": desired,

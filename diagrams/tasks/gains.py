@@ -1,13 +1,17 @@
 """Gains of a scenario: those given, and poles that are chosen for what they have to bear."""
 
+import dataclasses as dc
 from collections.abc import Callable
 
-from diagrams.scenario import ControllerParameters, GainParameters
+from diagrams.scenario import ControllerParameters, GainParameters, LawGains
+from diagrams.tasks.posture import make_posture
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
+from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.robust_gains import SampledRobot, choose_fast_pole, rule_of_poles
 from pfsc_drake.control.law.stabilization import (
     CoordinateGains,
+    LoopGains,
     Stabilization,
     check_gains,
     gains_from_poles,
@@ -46,11 +50,49 @@ def gains_of(
     return gains
 
 
+def loop_gains(by_kind: LawGains, law: str, linearization: Linearization) -> LoopGains:
+    """Return all gains of a law; coordinates of a kind share theirs.
+
+    Args:
+        by_kind: What the scenario says.
+        law: Name of the law.
+        linearization: The law.
+
+    Raises:
+        InputError: See :func:`gains_of`.
+    """
+    r = linearization.relative_degree
+    names = [coordinate.kind.value for coordinate in linearization.manifold.coordinates]
+    outputs = Stabilization([gains_of(getattr(by_kind, k), r, law, k) for k in names], r, names)
+    if not linearization.is_redundant:
+        return LoopGains(outputs)
+    joint = _joint_gains(by_kind, r, law)
+    return LoopGains(
+        outputs,
+        Stabilization(
+            [joint] * linearization.num_joints, r, ["posture"] * linearization.num_joints
+        ),
+    )
+
+
+def _joint_gains(by_kind: LawGains, relative_degree: int, law: str) -> CoordinateGains:
+    """Return the gains of joints next to a posture, by default those of ``xi``."""
+    if by_kind.posture.is_given:
+        return gains_of(by_kind.posture, relative_degree, law, "posture")
+    # an integral part would fight what the outputs keep the joints from
+    if by_kind.xi.poles:
+        return gains_from_poles(by_kind.xi.poles)
+    gains = CoordinateGains(tuple(by_kind.xi.coefficients))
+    check_gains(gains, relative_degree, f"controller.gains.{law}.posture, by default xi's")
+    return gains
+
+
 def sampled_robot(
     parameters: ControllerParameters,
     robot: RobotModel,
     linearization: Linearization,
     rest: RestPosture,
+    posture: Posture | None = None,
 ) -> SampledRobot:
     """Return a law on its robot at rest.
 
@@ -59,9 +101,10 @@ def sampled_robot(
         robot: The robot.
         linearization: The law, which commands torques.
         rest: Where the robot rests.
+        posture: What joints beyond the number of outputs do, if there are any.
     """
     period = parameters.sampling_time
-    loop = LoopAtRest(robot, linearization, rest, period)
+    loop = LoopAtRest(robot, linearization, rest, period, posture)
     return SampledRobot(loop, period, not robot.is_rigid)
 
 
@@ -83,9 +126,12 @@ def choose_poles(
         InputError: If other gains of the law are missing or wrong.
     """
     law, r = parameters.law, linearization.relative_degree
-    kinds = [c.kind.value for c in linearization.manifold.coordinates]
-    by_kind = {kind: getattr(parameters.gains[law], kind) for kind in dict.fromkeys(kinds)}
-    automatic = {kind: gains for kind, gains in by_kind.items() if gains.is_automatic}
+    by_kind = parameters.gains[law]
+    kinds = dict.fromkeys(c.kind.value for c in linearization.manifold.coordinates)
+    if linearization.is_redundant:
+        kinds["posture"] = None
+    given = {kind: getattr(by_kind, kind) for kind in kinds}
+    automatic = {kind: gains for kind, gains in given.items() if gains.is_automatic}
     if not automatic:
         return
     fast = 0.0
@@ -93,21 +139,20 @@ def choose_poles(
         if rest is None:
             raise InputError(f"controller.gains.{law}: poles: auto needs a start of the robot")
 
-        def gains(fast: float) -> Stabilization:
-            poles = {
-                kind: gains_from_poles(rule_of_poles(given.bandwidth, fast, r), given.integral_pole)
-                if kind in automatic
-                else gains_of(given, r, law, kind)
-                for kind, given in by_kind.items()
+        def tried(fast: float) -> LoopGains:
+            chosen = {
+                kind: dc.replace(gains, poles=rule_of_poles(gains.bandwidth, fast, r))
+                for kind, gains in automatic.items()
             }
-            return Stabilization([poles[kind] for kind in kinds], r, kinds)
+            return loop_gains(dc.replace(by_kind, **chosen), law, linearization)
 
+        posture = make_posture(parameters.posture, robot, tried(1.0).posture, rest)
         fast = choose_fast_pole(
-            sampled_robot(parameters, robot, linearization, rest()),
-            gains,
-            [given.bandwidth for given in automatic.values()],
-            max(given.bears for given in automatic.values()),
+            sampled_robot(parameters, robot, linearization, rest(), posture),
+            tried,
+            [gains.bandwidth for gains in automatic.values()],
+            max(gains.bears for gains in automatic.values()),
         )
-    for given in automatic.values():
-        poles = rule_of_poles(given.bandwidth, fast, r)
-        given.poles = [float(f"{pole:.{_DIGITS}g}") for pole in poles]
+    for gains in automatic.values():
+        poles = rule_of_poles(gains.bandwidth, fast, r)
+        gains.poles = [float(f"{pole:.{_DIGITS}g}") for pole in poles]

@@ -6,7 +6,8 @@ import numpy as np
 
 from diagrams.safety import safe_state
 from diagrams.scenario import ControllerParameters, FaultParameters
-from diagrams.tasks.gains import choose_poles, gains_of
+from diagrams.tasks.gains import choose_poles, loop_gains
+from diagrams.tasks.posture import make_posture
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (
@@ -15,7 +16,6 @@ from pfsc_drake.control.law.linearization import (
     linearize,
 )
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -55,19 +55,18 @@ def make_law(
         )
     by_kind = parameters.gains[law]
     choose_poles(parameters, robot, linearization, rest)
-    # coordinates of a kind share their gains
-    names = [coordinate.kind.value for coordinate in manifold.coordinates]
+    gains = loop_gains(by_kind, law, linearization)
     relative_degree = linearization.relative_degree
-    gains = [gains_of(getattr(by_kind, name), relative_degree, law, name) for name in names]
     effort = robot.gather("effort_limit") * parameters.effort_scale
     limits = robot.gather("velocity_limit") if relative_degree == 1 else effort
     return FollowingLaw(
         robot,
         linearization,
-        Stabilization(gains, relative_degree, names),
-        DecouplingInverse(parameters.min_rcond),
+        gains.outputs,
+        DecouplingInverse(parameters.min_rcond, parameters.damped_below),
         limits,
         parameters.max_alpha,
         safe_state(parameters, robot, faults or FaultParameters()),
         tells_reference_velocity=parameters.friction.needs_reference_velocity,
+        posture=make_posture(parameters.posture, robot, gains.posture, rest),
     )

@@ -4,6 +4,7 @@ import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.gains import sampled_robot
+from diagrams.tasks.posture import warn_unused
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError
@@ -53,6 +54,7 @@ def law_warnings(
         *_fast_servo(scenario, robot, link_state),
         *_unknown_forces(scenario, robot),
         *_friction_behind_servos(parameters),
+        *warn_unused(parameters, law),
     ]
 
 
@@ -79,8 +81,8 @@ def _fragile_gains(
     """Warn of gains that do not bear a small error of the model, on the loop at rest."""
     if law.linearization.relative_degree == 1:
         return []
-    sampled = sampled_robot(parameters, robot, law.linearization, rest)
-    gains = law.stabilization
+    sampled = sampled_robot(parameters, robot, law.linearization, rest, law.posture)
+    gains = law.gains
     advice = "poles: auto with a bandwidth chooses some that do; 'margins' tells more"
     if sampled.rate(gains, RobotError()) > 0.0:
         return [

@@ -12,6 +12,7 @@ from experiments.results.link_signals import (
     has_elbow,
     push_forces,
 )
+from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -63,6 +64,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     log.add("alpha", points[:, station.task.place.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
     _add_orientation(log, station, raw["manifold_point"], points, pose)
+    add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
@@ -91,6 +93,7 @@ def optional_signals(station: Station) -> set[str]:
         names.add("push_force")
     if station.on_motors:
         names.add("xi_M")
+    names |= posture_signals(station)
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
     return names
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import CoordinateGains, Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -26,6 +27,11 @@ from pfsc_drake.geometry import (
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
+# of joints beyond the number of outputs [1/s]
+POSTURE_POLES = (-14.0, -17.0, -19.0, -23.0)
+# bent arms of six axes and of seven [rad]
+BENT = (0.2, 1.6, -0.5, 0.1, 1.2, 0.1)
+BENT_7 = (0.1, -0.7, 0.2, -2.3, 0.1, 1.6, 0.7)
 NAMES = ("eta", "xi_1", "xi_2", "phi_1", "phi_2", "phi_3")
 
 
@@ -91,8 +97,10 @@ class Robot:
             self.context, JacobianWrtVariable.kV, self.tool, [0, 0, 0], world, world
         )
 
-    def reach(self, y_t, R_e=None, guess=(0.2, 1.6, -0.5, 0.1, 1.2, 0.1)):
+    def reach(self, y_t, R_e=None, guess=None):
         """Return joint coordinates that bring the tool to a pose."""
+        if guess is None:
+            guess = BENT_7 if self.n == 7 else BENT
 
         def error(q):
             y, R = self.tool_pose(np.concatenate([q, 0 * q, q, 0 * q]))
@@ -122,6 +130,19 @@ def oriented_path():
         zyx_to_quaternion(angles), theta, smoothness=5, closed=True
     )
     return Path(FourierCurve.bent_lemniscate(), orientation)
+
+
+@pytest.fixture(scope="session")
+def small_path():
+    """Tilted circle within reach of a small arm, with an orientation that nods and sways."""
+    theta = np.linspace(0.0, 2.0 * np.pi, 13)
+    swing = [0.3 * np.sin(theta), 0.25 * np.cos(theta), 0.2 * np.sin(2 * theta)]
+    angles = np.stack(swing, axis=1) + np.array([0.0, 0.1, np.pi])
+    orientation = interpolate_orientation(
+        zyx_to_quaternion(angles), theta, smoothness=5, closed=True
+    )
+    circle = FourierCurve.circle([0.45, 0.05, 0.4], 0.12, [1.0, 0.0, 0.2], [0.0, 1.0, 0.1])
+    return Path(circle, orientation)
 
 
 @pytest.fixture(scope="session")
@@ -155,6 +176,7 @@ def make_law():
         sampling_time = changes.pop("sampling_time", 0.0)
         damping = changes.pop("boundary_layer_damping", None)
         integral = changes.pop("integral", 0.0)
+        weight, coordinate = changes.pop("weight", None), changes.pop("coordinate", None)
         options = ActuationOptions(sampling_time, damping)
         linearization = linearize(
             chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), options
@@ -162,6 +184,10 @@ def make_law():
         r, m, n = RELATIVE_DEGREE[law], linearization.num_outputs, chain.dimension
         poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
         gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]
+        posture = None
+        if n > m:
+            own = Stabilization([gains_from_poles(POSTURE_POLES[:r])] * n, r, ["posture"] * n)
+            posture = Posture(own, weight, coordinate)
         arguments = {
             "robot": chain,
             "linearization": linearization,
@@ -170,6 +196,7 @@ def make_law():
             "limits": np.full(n, 1e9),
             "max_alpha": 0.9,
             "safe_state": SafeState(np.full(n, 50.0)),
+            "posture": posture,
         }
         return FollowingLaw(**(arguments | changes))
 

@@ -1,5 +1,6 @@
 """The one place that inverts a decoupling matrix."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,48 +9,192 @@ from scipy.linalg import lapack
 
 from pfsc_drake.errors import InputError
 
+# of a posture's coordinate, by which part of itself it must move with the outputs at rest
+_LEAST_SHARE = 0.02
+
+
+class Spare(NamedTuple):
+    """What joints beyond the number of outputs are to do.
+
+    Attributes:
+        wish: Highest joint derivative that is wanted, shape (N,).
+        scale: ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which deviations
+            from the wish are judged; None for the identity.
+        slope: Of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
+            none.
+        rate: ``h q^(r)`` that this coordinate is to have.
+    """
+
+    wish: np.ndarray
+    scale: np.ndarray | None = None
+    slope: np.ndarray | None = None
+    rate: float = 0.0
+
 
 class DecouplingSolution(NamedTuple):
     """Solution of ``A x = rhs`` and how far A is from singular.
 
     Attributes:
         x: Highest joint derivative, shape (N,); NaN where A is singular.
-        rcond: Estimated reciprocal condition number of A (1-norm) in [0, 1].
+        rcond: Estimated reciprocal condition number of A (1-norm) in [0, 1]; where A has more
+            columns than rows that of its triangular factor.
+        residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves; None where
+            nothing is damped.
     """
 
     x: np.ndarray
     rcond: float
+    residual: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class DecouplingInverse:
-    """Solves ``A q^(r) = v - b`` and judges the conditioning of A.
+    """Solves ``A q^(r) = v - b`` and judges the conditioning of A, shape (m, N) with N >= m.
+
+    With as many joints as outputs that is one linear system. With more, it is the solution
+    that deviates least from a wish w, weighted by W::
+
+        x = w + W^-1 A' (A W^-1 A')^-1 (rhs - A w)
+
+    and then, within what leaves the outputs alone, the one that gives one more coordinate of the
+    joints the rate that is wanted of it. It fades out where it hardly moves without the outputs.
+
+    Damping: where the reciprocal condition number c is below ``damped_below = c_0``, the system
+    is solved with ``A W^-1 A' + lambda^2 I``, ``lambda^2 = (c_0^2 - c^2) |A S|^2`` (Frobenius),
+    which keeps x bounded through a singular posture; what the outputs miss is told.
 
     Attributes:
         min_rcond: Smallest reciprocal condition number (1-norm, rows in m and
-            rad) at which the solution may be used.
+            rad) at which the solution may be used, unless it is damped.
+        damped_below: Reciprocal condition number below which the solution is damped; 0 for never.
     """
 
     min_rcond: float = 1e-3
+    damped_below: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_rcond < 1.0:
             raise InputError(f"min_rcond: {self.min_rcond}; must lie between 0 and 1")
+        if self.damped_below != 0.0 and not self.min_rcond < self.damped_below < 1.0:
+            raise InputError(
+                f"damped_below: {self.damped_below}; must be 0, or lie between min_rcond = "
+                f"{self.min_rcond:g} and 1"
+            )
 
-    def solve(self, A: np.ndarray, rhs: np.ndarray) -> DecouplingSolution:
-        """Solve the linear system by LU factorization.
+    def solve(
+        self, A: np.ndarray, rhs: np.ndarray, spare: Spare | None = None
+    ) -> DecouplingSolution:
+        """Solve the linear system.
 
         Args:
-            A: Decoupling matrix, shape (N, N).
-            rhs: Right-hand side, shape (N,).
+            A: Decoupling matrix, shape (m, N).
+            rhs: Right-hand side, shape (m,).
+            spare: What joints beyond the number of outputs are to do; needed if N > m.
         """
+        if spare is not None:
+            return self._solve_next_to(A, rhs, spare)
         lu, _, x, info = lapack.dgesv(A, rhs)
-        if info != 0:
+        if info == 0:
+            rcond = float(lapack.dgecon(lu, lapack.dlange("1", A))[0])
+            if rcond >= self.damped_below:
+                return DecouplingSolution(x, rcond)
+        elif not self.damped_below:
             return DecouplingSolution(np.full(len(rhs), np.nan), 0.0)
-        rcond, _ = lapack.dgecon(lu, lapack.dlange("1", A))
-        return DecouplingSolution(x, float(rcond))
+        else:
+            rcond = 0.0
+        return self._damped(A, rhs, rcond, Spare(np.zeros(len(rhs))))
 
     def accepts(self, solution: DecouplingSolution) -> bool:
         """Return whether the solution may be used."""
         # written so that NaN is refused
-        return solution.rcond >= self.min_rcond
+        return solution.rcond >= self.min_rcond or solution.residual is not None
+
+    def _solve_next_to(self, A: np.ndarray, rhs: np.ndarray, spare: Spare) -> DecouplingSolution:
+        """Solve a system of fewer rows than columns."""
+        wish, scale = spare.wish, spare.scale
+        Q, R = _factors(A if scale is None else A @ scale)
+        # conditioning is that of the outputs, whatever the weight
+        rcond = _rcond(R if scale is None else _factors(A)[1])
+        if rcond < self.damped_below:
+            return self._damped(A, rhs, rcond, spare)
+        z, info = lapack.dtrtrs(R, rhs - A @ wish, trans=1)
+        if info != 0:
+            return DecouplingSolution(np.full(len(wish), np.nan), 0.0)
+        return DecouplingSolution(_next_to(Q, Q @ z, spare), rcond)
+
+    def _damped(
+        self, A: np.ndarray, rhs: np.ndarray, rcond: float, spare: Spare
+    ) -> DecouplingSolution:
+        """Solve with damping; of a matrix that is not finite nothing is known."""
+        B = A if spare.scale is None else A @ spare.scale
+        norm = float(np.linalg.norm(B))
+        if not math.isfinite(norm + float(rhs.sum())):
+            return DecouplingSolution(np.full(A.shape[1], np.nan), math.nan)
+        square = (self.damped_below**2 - rcond**2) * norm**2
+        gram = B @ B.T
+        gram[np.diag_indices(len(rhs))] += square
+        z = lapack.dposv(gram, rhs - A @ spare.wish)[1]
+        x = _next_to(_factors(B)[0], B.T @ z, spare)
+        return DecouplingSolution(x, rcond, square * z)
+
+
+def scale_of(weight: np.ndarray) -> np.ndarray:
+    """Return ``S`` with ``S S' = W^-1`` of a symmetric positive definite W, shape (N, N).
+
+    Args:
+        weight: ``W``, shape (N, N); if it is not positive definite, S is of NaN.
+    """
+    upper, info = lapack.dpotrf(weight)
+    return lapack.dtrtri(upper)[0] if info == 0 else np.full_like(weight, np.nan)
+
+
+def free_torque(A: np.ndarray, torque: np.ndarray, scale: np.ndarray | None = None) -> np.ndarray:
+    """Return the part of joint torques that does no work on the outputs, shape (N,).
+
+    That is ``N' tau`` with ``N = I - W^-1 A' (A W^-1 A')^-1 A``.
+
+    Args:
+        A: Decoupling matrix, shape (m, N) with N > m.
+        torque: ``tau``, shape (N,).
+        scale: ``S`` with ``S S' = W^-1``, shape (N, N); None for the identity.
+    """
+    if scale is None:
+        Q = _factors(A)[0]
+        return torque - Q @ (Q.T @ torque)
+    Q, scaled = _factors(A @ scale)[0], scale.T @ torque
+    return np.linalg.solve(scale.T, scaled - Q @ (Q.T @ scaled))
+
+
+def _factors(B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``Q, R`` of ``B' = Q R``; Q has orthonormal columns, shapes (N, m) and (m, m)."""
+    qr, tau, _, _ = lapack.dgeqrf(B.T)
+    Q, _, _ = lapack.dorgqr(qr, tau)
+    return Q, qr[: len(B)]
+
+
+def _rcond(R: np.ndarray) -> float:
+    """Return the reciprocal condition number of an upper triangular matrix; NaN if not finite."""
+    return float(lapack.dtrcon(R)[0]) if math.isfinite(R.sum()) else math.nan
+
+
+def _next_to(Q: np.ndarray, y: np.ndarray, spare: Spare) -> np.ndarray:
+    """Return ``wish + S y``, with the rate of the spare coordinate where it can move alone.
+
+    Args:
+        Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
+        y: What the outputs ask for beyond the wish, shape (N,).
+        spare: The wish.
+    """
+    scale = spare.scale
+    x = spare.wish + (y if scale is None else scale @ y)
+    if spare.slope is None:
+        return x
+    whole = spare.slope if scale is None else scale.T @ spare.slope
+    alone = whole - Q @ (Q.T @ whole)
+    square = float(alone @ alone)
+    # continuous: a coordinate that can hardly move alone is given up
+    divisor = max(square, _LEAST_SHARE**2 * float(whole @ whole))
+    if divisor == 0.0:
+        return x
+    step = alone * ((spare.rate - float(spare.slope @ x)) / divisor)
+    return x + (step if scale is None else scale @ step)

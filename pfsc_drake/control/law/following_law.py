@@ -2,16 +2,21 @@
 
 import math
 
-import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.law.decoupling import DecouplingInverse, DecouplingSolution
+from pfsc_drake.control.law.decoupling import (
+    DecouplingInverse,
+    DecouplingSolution,
+    Spare,
+    scale_of,
+)
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.law_functions import completion_function, law_function
 from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
-from pfsc_drake.control.law.stabilization import Stabilization
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
@@ -34,18 +39,25 @@ class LawLayout:
         held: The part of the drive input that is extrapolated over the hold, shape (N,).
         reference_velocity: Joint velocities that the reference asks for [rad/s or m/s], shape
             (N,), or (0,) of a law that does not tell them.
+        residual: What damping lets the virtual output's r-th derivatives miss, shape (m,), or
+            (0,) of a law that does not damp.
         size: Length of the whole array.
     """
 
     def __init__(
-        self, num_joints: int, num_outputs: int, relative_degree: int, num_velocities: int = 0
+        self,
+        num_joints: int,
+        num_outputs: int,
+        relative_degree: int,
+        num_velocities: int = 0,
+        num_residuals: int = 0,
     ) -> None:
         sizes = [num_joints, relative_degree * num_outputs, num_outputs, 3, num_joints]
-        sizes.append(num_velocities)
+        sizes += [num_velocities, num_residuals]
         ends = np.cumsum(sizes).tolist()
         fields = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
         self.drive, self.manifold_state, self.virtual_input, self.status, self.held = fields[:5]
-        self.reference_velocity = fields[5]
+        self.reference_velocity, self.residual = fields[5:]
         self.size: int = ends[-1]
 
 
@@ -70,7 +82,9 @@ class FollowingLaw:
         max_alpha: Where the feasible neighbourhood (3.9) ends for the controller, below 1.
         safe_state: What the drives do after a fault.
         tells_reference_velocity: Whether the results tell the joint velocities that the
-            reference asks for, ``q' - A^-1 (yhat' - yhat_p')``; for r > 1.
+            reference asks for, ``q' - A^-1 (yhat' - yhat_p')``; for r > 1. With more joints than
+            outputs it is the one next to the posture reference's.
+        posture: What joints beyond the number of outputs do; for a robot that has some.
 
     Attributes:
         layout: Layout of the results.
@@ -92,6 +106,7 @@ class FollowingLaw:
         safe_state: SafeState,
         *,
         tells_reference_velocity: bool = False,
+        posture: Posture | None = None,
     ) -> None:
         n = linearization.num_joints
         if np.shape(limits) != (n,) or not np.all(np.asarray(limits) > 0.0):
@@ -109,12 +124,17 @@ class FollowingLaw:
                 f"gains of {coordinates} coordinates; "
                 f"the law has {linearization.num_outputs} outputs"
             )
+        if linearization.is_redundant != (posture is not None):
+            raise InputError(
+                f"posture: {'none' if posture is None else 'given'} for {n} joints and "
+                f"{coordinates} outputs; one is needed where there are more joints than outputs"
+            )
         safe_state.check(n)
         self.robot, self.safe_state = robot, safe_state
         self.linearization = linearization
         self.stabilization = stabilization
         self.limits = np.asarray(limits, dtype=float)
-        self._inverse = inverse
+        self.posture, self._inverse = posture, inverse
         self._max_alpha = max_alpha
         self._tells_velocity = tells_reference_velocity
         self.layout = LawLayout(
@@ -122,9 +142,10 @@ class FollowingLaw:
             linearization.num_outputs,
             linearization.relative_degree,
             n if tells_reference_velocity else 0,
+            linearization.num_outputs if inverse.damped_below else 0,
         )
-        self.function = _law_function(linearization, stabilization)
-        self._completion = _completion_function(linearization, self.limits)
+        self.function = law_function(robot, linearization, stabilization, posture)
+        self._completion = completion_function(linearization, self.limits)
         self._fault_index = self.layout.status.start
         self._alpha_index = linearization.manifold.layout.alpha.start
         self._status_index = linearization.manifold.layout.status.start
@@ -147,6 +168,16 @@ class FollowingLaw:
         self._solution, self._rcond = arrays["solution"], arrays["rcond"]
         self._result, self._check = arrays["result"], arrays["check"]
         self._last_output, self._angle = arrays["last_output"], arrays["angle"]
+        self._posture = arrays.get("posture", np.zeros(0))
+        self._wish, self._slope = arrays.get("wish"), arrays.get("slope")
+        self._weight, self._rate = arrays.get("weight"), arrays.get("rate", np.zeros(1))
+        self._scale = None if self.posture is None else self.posture.scale
+
+    @property
+    def gains(self) -> LoopGains:
+        """All gains."""
+        posture = None if self.posture is None else self.posture.stabilization
+        return LoopGains(self.stabilization, posture)
 
     def evaluate(
         self,
@@ -158,6 +189,7 @@ class FollowingLaw:
         tau_ext: np.ndarray | None = None,
         friction: np.ndarray | None = None,
         last_output: np.ndarray | None = None,
+        posture: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the drive input of one tick and all that belongs to it.
 
@@ -174,6 +206,8 @@ class FollowingLaw:
                 zero if omitted.
             last_output: Virtual output of the last tick, shape (m,), from which angles go on;
                 if omitted they lie within half a turn of zero.
+            posture: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,); only
+                for a law with a posture, and zero if omitted.
 
         Returns:
             New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
@@ -185,8 +219,9 @@ class FollowingLaw:
         _assign(self._tau_ext, tau_ext)
         _assign(self._last_output, last_output)
         _assign(self._friction, friction)
+        _assign(self._posture, posture)
         self._linearize()
-        solution = self._inverse.solve(self._A, self._rhs)
+        solution = self._inverse.solve(self._A, self._rhs, self._spare())
         self._solution[:] = solution.x
         self._rcond[0] = solution.rcond
         if last_held is None:
@@ -197,7 +232,22 @@ class FollowingLaw:
         self._complete()
         result = self._result.copy()
         result[self._fault_index] = self._judge(solution)
-        return np.append(result, self._reference_velocity()) if self._tells_velocity else result
+        if self._tells_velocity:
+            result = np.append(result, self._reference_velocity())
+        if self._inverse.damped_below:
+            missed = solution.residual
+            result = np.append(result, np.zeros(len(self._rhs)) if missed is None else missed)
+        return result
+
+    def _spare(self) -> Spare | None:
+        """Return what joints beyond the number of outputs are to do."""
+        if self._wish is None:
+            return None
+        if self._weight is not None:
+            self._scale = scale_of(self._weight.reshape((len(self._wish), -1)))
+        if self._slope is None:
+            return Spare(self._wish, self._scale)
+        return Spare(self._wish, self._scale, self._slope, self._rate.item())
 
     def _reference_velocity(self) -> np.ndarray:
         """Return the joint velocities that the reference asks for, shape (N,)."""
@@ -205,7 +255,12 @@ class FollowingLaw:
         error = self._result[self.layout.manifold_state][m : 2 * m]
         if not self.linearization.manifold.follows_time:
             error = error - self._reference[m : 2 * m]
-        return self._state[velocity] - self._inverse.solve(self._A, error).x
+        moving = self._state[velocity]
+        if self._wish is None:
+            return moving - self._inverse.solve(self._A, error).x
+        n = len(moving)
+        spare = Spare(self._posture[n : 2 * n], self._scale)
+        return self._inverse.solve(self._A, self._A @ moving - error, spare).x
 
     def _judge(self, solution: DecouplingSolution) -> Fault:
         """Return what forbids the use of a result, the root cause first."""
@@ -219,7 +274,8 @@ class FollowingLaw:
             and self._angle[0] < _LARGEST_ANGLE
         ):
             return _NO_FAULT
-        inputs = (self._state, self._reference, self._integral, self._tau_ext, self._friction)
+        inputs = [self._state, self._reference, self._integral, self._tau_ext, self._friction]
+        inputs.append(self._posture)
         if not all(np.isfinite(values).all() for values in inputs):
             return Fault.INPUT_NOT_FINITE
         if status == _NOT_CONVERGED:
@@ -247,79 +303,3 @@ def _assign(argument: np.ndarray, values: np.ndarray | None) -> None:
         argument.fill(0.0)
     else:
         argument[:] = values
-
-
-def _law_function(linearization: Linearization, stabilization: Stabilization) -> ca.Function:
-    """Return everything up to the decoupling matrix's inverse as one function."""
-    n, m = linearization.num_joints, linearization.num_outputs
-    r = linearization.relative_degree
-    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    point = ca.SX.sym("manifold_point", linearization.manifold.layout.size)
-    reference, integral = ca.SX.sym("reference", (r + 1) * m), ca.SX.sym("integral", m)
-    y_p = ca.vertsplit(reference, m)
-    progress = []
-    if linearization.manifold.follows_time:
-        # the reference point moves with time, and the errors from it shall vanish
-        progress = [ca.vertcat(*[y[0] for y in y_p])]
-        y_p = [ca.SX(m, 1)] * (r + 1)
-    Y, A, b, gain, drift, offset = linearization.function(state, tau_ext, point, *progress)
-    last_output, angle = ca.SX.sym("last_output", m), ca.SX(0.0)
-    turning = indices(linearization.manifold.coordinates, Kind.ROTATIONAL)
-    if turning.stop:
-        Y[turning, 0] += _whole_turns(last_output[turning] - Y[turning, 0])
-        angle = ca.mmax(ca.fabs(Y[turning, 0] - y_p[0][turning]))
-    v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
-    return ca.Function(
-        "following_law",
-        [state, point, reference, integral, tau_ext, last_output],
-        [Y, ca.densify(v), A, v - b, gain, drift, offset, ca.densify(angle)],
-        ["state", "manifold_point", "reference", "integral", "tau_ext", "last_output"],
-        ["Y", "v", "A", "rhs", "gain", "drift", "offset", "angle"],
-    )
-
-
-def _whole_turns(angle: ca.SX) -> ca.SX:
-    """Return the multiple of 2 pi nearest to each angle [rad]."""
-    return 2.0 * math.pi * ca.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-def _completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:
-    """Return everything after the decoupling matrix's inverse as one function.
-
-    Its second result is finite only if all that went in and came out is: a sum is finite only if
-    all its terms are, and the limits of the drives turn NaN into numbers.
-    """
-    n, m = linearization.num_joints, linearization.num_outputs
-    r = linearization.relative_degree
-    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    solution, drift, offset, last_held, friction = (ca.SX.sym(name, n) for name in "xdolf")
-    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
-    v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
-    held = gain @ solution + drift
-    wanted = held + lead * (held - last_held) + offset + friction
-    drive = ca.fmin(ca.fmax(wanted, -limits), limits)
-    saturated = ca.sum1(ca.fabs(wanted) > limits)
-    # the fault is judged outside
-    result = ca.vertcat(drive, ca.vec(Y), v, 0.0, rcond, saturated, held)
-    check = sum(ca.sum1(part) for part in (wanted, result, state, tau_ext))
-    arguments = {
-        "solution": solution,
-        "gain": gain,
-        "drift": drift,
-        "offset": offset,
-        "friction": friction,
-        "last_held": last_held,
-        "lead": lead,
-        "Y": Y,
-        "v": v,
-        "rcond": rcond,
-        "state": state,
-        "tau_ext": tau_ext,
-    }
-    return ca.Function(
-        "completion",
-        list(arguments.values()),
-        [ca.densify(result), ca.densify(check)],
-        list(arguments),
-        ["result", "check"],
-    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
-from pfsc_drake.control.manifolds.manifold import Kind, Manifold
+from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
@@ -46,12 +46,12 @@ class Linearization:
 
     Attributes:
         function: CasADi function ``(state, tau_ext, manifold_point) -> (Y, A, b, gain,
-            drift, offset)``; for manifolds that follow time with a fourth argument, the
-            derivatives 0..r of the reference's first coordinate, shape (r + 1,).
+            drift, offset, motion)``; for manifolds that follow time with a fourth argument,
+            the derivatives 0..r of the reference's first coordinate, shape (r + 1,).
             ``state`` is ``[q_J, v_J, q_M, v_M]``, shape (4N,); ``tau_ext`` holds the
             external torques and their derivatives up to order r - 2, shape
             (N max(r - 1, 0),). ``Y`` holds the derivatives 0..r-1 of the virtual output in
-            its columns, shape (m, r).
+            its columns, shape (m, r), ``motion`` those of the joint coordinates, (N, r).
         relative_degree: ``r``.
         manifold: The manifold, which lays out its point.
         num_joints: ``N``.
@@ -72,6 +72,11 @@ class Linearization:
     def num_outputs(self) -> int:
         """Number of coordinates of the virtual output ``m``."""
         return len(self.manifold.coordinates)
+
+    @property
+    def is_redundant(self) -> bool:
+        """Whether there are more joints than outputs."""
+        return self.num_joints > self.num_outputs
 
 
 def linearize(
@@ -103,12 +108,10 @@ def linearize(
             f"law '{law}': manifold of order {manifold.layout.order}; must be {r}, the relative "
             "degree of the law"
         )
-    if n != m:
-        turns = any(c.kind is Kind.ROTATIONAL for c in manifold.coordinates)
+    if n < m:
+        names = ", ".join(coordinate.name for coordinate in manifold.coordinates)
         raise InputError(
-            f"law '{law}': {n} joints for {m} outputs "
-            f"({'position and orientation' if turns else 'position only'}); "
-            "they must be as many"
+            f"law '{law}': {n} joints for {m} outputs ({names}); there must be as many or more"
         )
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("manifold_point", manifold.layout.size)
@@ -128,18 +131,39 @@ def linearize(
     # A = d yhat / dq (3.22): the virtual output's rate is affine in q'
     rate = ca.SX.sym("rate", n)
     slopes = ca.vertcat(*[y.coefficients[1] for y in virtual_output([motion.q[0], rate])])
-    results = [Y, ca.jacobian(slopes, rate), b, motion.gain, motion.drift, motion.offset]
+    A = ca.jacobian(slopes, rate)
+    results = [Y, A, b, motion.gain, motion.drift, motion.offset, ca.horzcat(*motion.q)]
     function = ca.Function(
         f"{manifold.name}_{law}",
         [state, tau_ext, point, *([progress] if manifold.follows_time else [])],
         [ca.densify(e) for e in ca.cse(results)],
         ["state", "tau_ext", "manifold_point", *(["progress"] if manifold.follows_time else [])],
-        ["Y", "A", "b", "gain", "drift", "offset"],
+        ["Y", "A", "b", "gain", "drift", "offset", "motion"],
     )
     ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
     on_motors = law == "rigid" and not robot.is_rigid
     velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
     return Linearization(function, r, manifold, n, ahead, velocity)
+
+
+def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
+    """Return the decoupling matrix ``A = d yhat / dq`` (3.22) of any posture.
+
+    Args:
+        robot: The robot.
+        manifold: What to follow; of one that follows time, A is the same at any pace.
+
+    Returns:
+        CasADi function ``(q, manifold_point) -> A``, shapes (N,), (size,) and (m, N).
+    """
+    q, rate = ca.SX.sym("q", robot.dimension), ca.SX.sym("rate", robot.dimension)
+    point = ca.SX.sym("manifold_point", manifold.layout.size)
+    y, R_e = robot.tool_pose(joint_jets([q, rate]))
+    output = manifold.virtual_output(y, R_e, point, Jet([ca.SX(0)] * (manifold.layout.order + 1)))
+    slopes = ca.jacobian(ca.vertcat(*[x.coefficients[1] for x in output]), rate)
+    return ca.Function(
+        "decoupling", [q, point], ca.cse([ca.densify(slopes)]), ["q", "manifold_point"], ["A"]
+    )
 
 
 def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Function:

@@ -7,9 +7,10 @@ Near rest, and with weight that hardly changes, joints with ``q_M - q_J`` elasti
 
 with the weight's slope ``G = d g_L / d q``; of a rigid joint motor and link are one. Between two
 ticks ``tau_d`` is held, which integrates exactly. The law answers with
-``tau_d = gain A^-1 v + drift + offset``, extrapolated as :class:`FollowingLaw` does it; its slopes
-are differences of its own function :class:`Linearization`, so that no law is written down twice.
-The robot that moves may differ from the one that the law believes.
+``tau_d = gain q^(r) + drift + offset``, extrapolated as :class:`FollowingLaw` does it; its slopes
+are differences of its own function :class:`Linearization`, so that no law is written down twice,
+and ``q^(r)`` is what :class:`DecouplingInverse` makes of outputs and posture. The robot that moves
+may differ from the one that the law believes.
 """
 
 from dataclasses import dataclass
@@ -18,11 +19,15 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
+from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.control.law.posture import Posture, posture_expressions
+from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
 
 _DIFFERENCE = 1e-6
+# reciprocal condition number that a start is never refused for
+_SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -48,10 +53,16 @@ class LoopAtRest:
         linearization: The law, of relative degree 2 or more.
         rest: Where it rests.
         period: Sampling time ``T_s`` [s].
+        posture: What joints beyond the number of outputs do, if there are any.
     """
 
     def __init__(
-        self, robot: RobotModel, linearization: Linearization, rest: RestPosture, period: float
+        self,
+        robot: RobotModel,
+        linearization: Linearization,
+        rest: RestPosture,
+        period: float,
+        posture: Posture | None = None,
     ) -> None:
         n = robot.dimension
         self._robot, self._n, self._period = robot, n, period
@@ -64,10 +75,20 @@ class LoopAtRest:
         q_M = rest.q_J + g.ravel() / robot.K_s
         zero = np.zeros(n)
         state = np.concatenate([rest.q_J, zero, q_M, zero])
-        self._differentiate(linearization, state, rest.point)
+        A, gain = self._differentiate(linearization, state, rest.point)
+        if posture is None:
+            self._per_output = gain @ np.linalg.pinv(A)
+        else:
+            self._solve(A, gain, posture, rest.q_J)
 
-    def _differentiate(self, law: Linearization, state: np.ndarray, point: np.ndarray) -> None:
-        """Take the slopes of virtual output and drive input against the measured joint state."""
+    def _differentiate(
+        self, law: Linearization, state: np.ndarray, point: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Take the slopes of virtual output and drive input against the measured joint state.
+
+        Returns:
+            Decoupling matrix and gain at rest.
+        """
         n, m, r = self._n, law.num_outputs, law.relative_degree
         further = [np.zeros(r + 1)] if law.manifold.follows_time else []
         no_torque = np.zeros(n * (r - 1))
@@ -75,8 +96,9 @@ class LoopAtRest:
         def results(x: np.ndarray) -> list[np.ndarray]:
             return [np.array(y) for y in law.function(x, no_torque, point, *further)]
 
-        _, A, _, gain, _, _ = results(state)
+        _, A, _, gain, *_ = results(state)
         Y, held, offset = np.zeros((4 * n, r, m)), np.zeros((4 * n, n)), np.zeros((4 * n, n))
+        motion = np.zeros((4 * n, r, n))
         for i in range(4 * n):
             shift = np.zeros(4 * n)
             shift[i] = _DIFFERENCE
@@ -84,19 +106,49 @@ class LoopAtRest:
             Y[i] = ((plus[0] - minus[0]) / (2.0 * _DIFFERENCE)).T
             held[i] = ((plus[4] - minus[4]) / (2.0 * _DIFFERENCE)).ravel()
             offset[i] = ((plus[5] - minus[5]) / (2.0 * _DIFFERENCE)).ravel()
+            motion[i] = ((plus[6] - minus[6]) / (2.0 * _DIFFERENCE)).T
         # the point is that of the posture, and what moves with the tool is in the decoupling matrix
         acts_on_motors = r == 2 and np.any(Y[3 * n :, 1])
         Y[:, 0] = 0.0
         first = 2 * n if acts_on_motors else 0
         Y[first : first + n, 0] = A.T
-        self._Y, self._drift, self._offset = Y, held.T, offset.T
-        self._per_output = gain @ np.linalg.pinv(A)
+        self._Y, self._drift, self._offset, self._motion = Y, held.T, offset.T, motion
+        return A, gain
 
-    def closed(self, gains: Stabilization, mass: float = 1.0, stiffness: float = 1.0) -> np.ndarray:
+    def _solve(self, A: np.ndarray, gain: np.ndarray, posture: Posture, q: np.ndarray) -> None:
+        """Find how the drives answer to outputs, wishes and the coordinate of a posture."""
+        n, m, inverse = self._n, len(A), DecouplingInverse(_SINGULAR)
+        symbol, rest = ca.SX.sym("q", n), [ca.SX(n, 1)] * (self._motion.shape[1])
+        expressions = posture_expressions(
+            posture, self._robot, [symbol, *rest[1:]], [symbol, *rest]
+        )
+        values = ca.Function("rest", [symbol], [expressions.weight, expressions.slope])(q)
+        weight, slope = (np.array(x) for x in values)
+        scale = scale_of(weight) if weight.size else posture.scale
+        self._slope = slope.ravel() if slope.size else None
+
+        def answer(rhs: np.ndarray, wish: np.ndarray, rate: float = 0.0) -> np.ndarray:
+            return gain @ inverse.solve(A, rhs, Spare(wish, scale, self._slope, rate)).x
+
+        no_rhs, no_wish = np.zeros(m), np.zeros(n)
+        self._per_output = np.array([answer(e, no_wish) for e in np.eye(m)]).T
+        self._per_wish = np.array([answer(no_rhs, e) for e in np.eye(n)]).T
+        self._per_rate = answer(no_rhs, no_wish, 1.0)
+
+    def _posture_answer(self, gains: Stabilization) -> np.ndarray:
+        """Return the slopes of the drives that the posture adds, shape (N, 4N)."""
+        wish = -np.einsum("km,ikm->mi", gains.proportional, self._motion)
+        answer = self._per_wish @ wish
+        # the rate of the coordinate follows from the same gains
+        return (
+            answer if self._slope is None else answer + np.outer(self._per_rate, self._slope @ wish)
+        )
+
+    def closed(self, gains: LoopGains, mass: float = 1.0, stiffness: float = 1.0) -> np.ndarray:
         """Return the map of one sampling interval, from right after a tick to right after the next.
 
         Args:
-            gains: Of all coordinates.
+            gains: Of all coordinates, and of the posture if there is one.
             mass: Of the robot that moves, in units of the believed one: links' masses and inertias.
             stiffness: The same of joint stiffnesses.
 
@@ -109,10 +161,12 @@ class LoopAtRest:
         exponential = expm(np.block([[F, B], [np.zeros((n, size + n))]]) * period)
         Phi, Gamma = exponential[:size, :size], exponential[:size, size:]
         error = self._Y[:, 0].T @ C
-        v = -np.einsum("km,ikm->mi", gains.proportional, self._Y) @ C
+        v = -np.einsum("km,ikm->mi", gains.outputs.proportional, self._Y) @ C
         held = self._per_output @ v + self._drift @ C
+        if gains.posture is not None:
+            held = held + self._posture_answer(gains.posture) @ C
         drive = held + self._offset @ C
-        summed = -self._per_output * gains.integral
+        summed = -self._per_output * gains.outputs.integral
         # variables: motion, held part of the last tick, summed error, drive input
         m = len(error)
         motion, last, sums = np.split(np.eye(size + n + m + n)[:-n], [size, size + n])

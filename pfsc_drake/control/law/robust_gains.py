@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest
-from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.control.law.stabilization import LoopGains
 from pfsc_drake.control.margins.modes import modes
 
 # of a fast pair, so that no two poles are equal
@@ -68,7 +68,7 @@ class SampledRobot:
     period: float
     is_elastic: bool
 
-    def rate(self, gains: Stabilization, error: RobotError) -> float:
+    def rate(self, gains: LoopGains, error: RobotError) -> float:
         """Return the rate of the slowest or of the fastest growing mode [1/s].
 
         Args:
@@ -101,7 +101,7 @@ class SampledRobot:
                 for stiffness in (1.0 - size, 1.0 + size):
                     yield RobotError(mass, stiffness)
 
-    def unborne(self, gains: Stabilization, size: float) -> RobotError | None:
+    def unborne(self, gains: LoopGains, size: float) -> RobotError | None:
         """Return the error of one kind under which the loop grows fastest; None if it is stable.
 
         Args:
@@ -111,7 +111,7 @@ class SampledRobot:
         worst = max(self.errors(size), key=lambda error: self.rate(gains, error))
         return worst if self.rate(gains, worst) > 0.0 else None
 
-    def borne(self, gains: Stabilization, direction: RobotError) -> float:
+    def borne(self, gains: LoopGains, direction: RobotError) -> float:
         """Return how large a relative error in some direction is borne, up to 0.3.
 
         Args:
@@ -151,7 +151,7 @@ def rule_of_poles(bandwidth: float, fast: float, relative_degree: int) -> list[f
 
 def choose_fast_pole(
     robot: SampledRobot,
-    gains: Callable[[float], Stabilization],
+    gains: Callable[[float], LoopGains],
     bandwidths: Sequence[float],
     error: float,
 ) -> float:

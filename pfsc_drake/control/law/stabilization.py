@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -124,3 +124,16 @@ class Stabilization:
         for gains, y, y_p in zip(self.proportional, Y, reference, strict=False):
             v = v - gains * (y - y_p)
         return v
+
+
+class LoopGains(NamedTuple):
+    """All gains of a law.
+
+    Attributes:
+        outputs: Of the virtual output's m coordinates.
+        posture: Of the N joints' deviations from the posture reference, where there are more
+            joints than outputs.
+    """
+
+    outputs: Stabilization
+    posture: Stabilization | None = None

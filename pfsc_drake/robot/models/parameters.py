@@ -301,7 +301,8 @@ def load_parameters(robot: str | Path) -> RobotParameters:
     """Returns the parameters of a robot.
 
     Args:
-        robot: the name of a shipped robot (``"comau_racer_1_4"``) or the path of a YAML file.
+        robot: the name of a shipped serial robot (``"comau_racer_1_4"``,
+            ``"franka_emika_panda"``) or the path of a YAML file.
 
     Raises:
         InputError: if the file cannot be read or a key is unknown, missing or out of range.

@@ -61,10 +61,10 @@ def write_sdf(
 
 
 def main() -> None:
-    """Writes all variants of all shipped robots next to their parameters."""
-    for path in sorted(models_directory().glob("*/parameters.yaml")):
-        parameters = load_parameters(path)
-        appearance = load_file(Appearance, path.with_name("appearance.yaml"))
+    """Writes all variants of all shipped serial robots next to their parameters."""
+    for path in sorted(models_directory().glob("*/appearance.yaml")):  # parallel robots have none
+        parameters = load_parameters(path.with_name("parameters.yaml"))
+        appearance = load_file(Appearance, path)
         for variant in parameters.variants:
             text = write_sdf(parameters, variant, appearance)
             path.with_name(f"{variant.name}.sdf").write_text(text, encoding="utf-8")

@@ -46,6 +46,8 @@ class FollowingController(LeafSystem):
             Only for r > 1.
         friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
             [Nm or N], shape (N,); zero if not connected, and in the safe state. Only for r > 1.
+        posture_reference (input): Derivatives 0..r of the posture reference by rows, shape
+            ((r + 1) N,); only of a law for more joints than outputs.
         alarms (input, optional): What the robot is to stop for, shape (3,): a
             :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
             tared, before which its range does not matter, and an
@@ -120,6 +122,10 @@ class FollowingController(LeafSystem):
         }
         self._alarms: InputPort = self.DeclareVectorInputPort("alarms", 3)
         sources.add(self._alarms.ticket())
+        self._posture: InputPort | None = None
+        if law.posture is not None:
+            self._posture = self.DeclareVectorInputPort("posture_reference", (r + 1) * n)
+            sources.add(self._posture.ticket())
         if r > 1:
             self._tau_ext = self.DeclareVectorInputPort("tau_ext", (r - 1) * n)
             self._friction = self.DeclareVectorInputPort("friction_torque", n)
@@ -194,6 +200,7 @@ class FollowingController(LeafSystem):
             _value(self._tau_ext, context),
             _value(self._friction, context),
             memory[self._output_before],
+            None if self._posture is None else self._posture.Eval(context),
         )
         if self._supervision is not None:
             self._of_supervision[:] = self._supervision.evaluate(

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
+from pfsc_drake.control.law.linearization import (
+    RELATIVE_DEGREE,
+    ActuationOptions,
+    decoupling_function,
+    linearize,
+)
+from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
@@ -116,7 +122,7 @@ def test_only_sampled_laws_for_elastic_joints_are_extrapolated(load_robot):
     ("law", "oriented", "message"),
     [
         ("flexible", False, r"law 'flexible': unknown; allowed are velocity_servo, rigid"),
-        ("rigid", True, r"law 'rigid': 3 joints for 6 outputs \(position and orientation\)"),
+        ("rigid", True, r"law 'rigid': 3 joints for 6 outputs \(eta, xi_1, .*as many or more"),
         ("elastic", False, r"law 'elastic': needs a robot with elastic joints"),
     ],
 )
@@ -131,13 +137,20 @@ def test_a_manifold_of_another_order_is_refused(load_robot):
         linearize(load_robot("comau_racer_1_4_3r").chain, "rigid", PathManifold(3, oriented=False))
 
 
-def test_six_joints_for_three_outputs_are_refused(load_robot):
-    with pytest.raises(InputError, match=r"6 joints for 3 outputs \(position only\)"):
-        linearize(
-            load_robot("comau_racer_1_4").chain,
-            "rigid",
-            PathManifold(RELATIVE_DEGREE["rigid"], oriented=False),
+@pytest.mark.parametrize("law", ["velocity_servo", "rigid", "elastic"])
+def test_the_decoupling_matrix_alone_is_that_of_the_law(law, load_robot, oriented_path):
+    chain = load_robot("comau_racer_1_4_elastic").chain
+    order = RELATIVE_DEGREE[law]
+    for manifold in (PathManifold(order, oriented=True), MovingPoint(order, oriented=True)):
+        point = oriented_path.evaluator(order).evaluate_at(0.7)
+        state = np.random.default_rng(2).uniform(-0.5, 0.5, 24)
+        q = state[12:18] if law == "rigid" else state[:6]
+        progress = [np.arange(order + 1.0)] if manifold.follows_time else []
+        whole = linearize(chain, law, manifold, ActuationOptions(0.0)).function(
+            state, np.zeros(6 * max(order - 1, 0)), point, *progress
         )
+        alone = np.array(decoupling_function(chain, manifold)(q, point))
+        assert np.allclose(alone, np.array(whole[1]), rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pfsc_drake.control.law.robust_gains import (
     choose_fast_pole,
     rule_of_poles,
 )
-from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
 from pfsc_drake.control.margins.modes import modes
 from pfsc_drake.robot.resonance import joint_resonances
 
@@ -35,7 +35,7 @@ def fixture_arm(load_robot, position_path, make_law):
 
 
 def gains(*poles):
-    return Stabilization([gains_from_poles(poles)] * 3, len(poles), ["x"] * 3)
+    return LoopGains(Stabilization([gains_from_poles(poles)] * 3, len(poles), ["x"] * 3))
 
 
 @pytest.mark.parametrize(
@@ -56,14 +56,36 @@ def test_sampled_fast_the_modes_are_the_poles(arm, law, poles):
 def test_integral_parts_add_a_mode_each(arm):
     period = 2e-5
     robot, _ = arm(period, "visco_elastic")
-    proportional = gains(-20, -25, -60)
-    proportional.integral = np.full(3, 20.0 * 25.0 * 60.0 * 5.0)
-    expected = np.roots([1.0, *proportional.proportional[::-1, 0], proportional.integral[0]])
-    found = modes(robot.loop.closed(proportional), period)
+    tried = gains(-20, -25, -60)
+    tried.outputs.integral = np.full(3, 20.0 * 25.0 * 60.0 * 5.0)
+    expected = np.roots([1.0, *tried.outputs.proportional[::-1, 0], tried.outputs.integral[0]])
+    found = modes(robot.loop.closed(tried), period)
     slow = found.rate > -150.0
     np.testing.assert_allclose(
         np.sort(found.rate[slow]), np.repeat(np.sort(expected.real), 3), rtol=0.03
     )
+
+
+@pytest.mark.parametrize("weight", [np.ones(6), None])
+@pytest.mark.parametrize("kept", [None, lambda q: q[3] + q[0] * q[4]])
+def test_joints_to_spare_have_the_modes_of_their_posture(
+    weight, kept, load_robot, position_path, make_law
+):
+    """Three outputs with their poles, three motions that leave them alone with the posture's."""
+    period, robot = 2e-5, load_robot("comau_racer_1_4_elastic")
+    made = make_law(
+        robot.chain, "elastic", False, sampling_time=period, weight=weight, coordinate=kept
+    )
+    y_t = position_path.position.derivatives(THETA, 0)[0]
+    q, point = robot.reach(y_t), position_path.evaluator(4)(y_t.tolist(), THETA)
+    rest = RestPosture(q, point)
+    loop = LoopAtRest(robot.chain, made.linearization, rest, period, made.posture)
+    own = Stabilization([gains_from_poles((-11.0, -13.0, -17.0, -70.0))] * 6, 4, ["x"] * 6)
+    outputs = gains(-20, -25, -60, -80).outputs
+    found = modes(loop.closed(LoopGains(outputs, own)), period)
+    slow = np.sort(found.rate[found.rate > -150.0])
+    expected = np.repeat([-80.0, -70.0, -60.0, -25.0, -20.0, -17.0, -13.0, -11.0], 3)
+    np.testing.assert_allclose(slow, expected, rtol=0.02)
 
 
 @pytest.mark.parametrize("fast", [25.0, 40.0])

@@ -1,4 +1,4 @@
-"""The shipped models against the DH table, the fitted links and the equations (2.65)."""
+"""The shipped models against their DH tables, (2.65), and the fitted links of the Comau."""
 
 import numpy as np
 import pytest
@@ -16,9 +16,14 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.parameters import load_parameters
 
 COMAU = load_parameters("comau_racer_1_4")
-TABLE = COMAU.denavit_hartenberg.table()
-D_M = COMAU.rotors.reflected_inertia
-VARIANTS = {variant.name: variant for variant in COMAU.variants}
+ROBOTS = {
+    variant.name: robot
+    for robot in (COMAU, load_parameters("franka_emika_panda"))
+    for variant in robot.variants
+}
+VARIANTS = {variant.name: variant for robot in ROBOTS.values() for variant in robot.variants}
+ELASTIC = [name for name, variant in VARIANTS.items() if variant.elasticity]
+RIGID = ["comau_racer_1_4", "franka_emika_panda"]
 GRAVITY = 9.81
 
 # The consistent link set once more, as it came out of the fit: frame i fixed to link i with z_i the
@@ -106,7 +111,7 @@ def fitted_inverse_dynamics(q, v, a) -> np.ndarray:
         alpha = R.T @ alpha + a[i] * z + np.cross(omega_P, v[i] * z)
         bodies = [(mass, np.array(com), symmetric(inertia))]
         if i == 5:  # the flange is d_6 in front of the wrist centre
-            flange = np.array([0, 0, TABLE.d[5]])
+            flange = np.array([0, 0, COMAU.denavit_hartenberg.d[5]])
             tool = COMAU.tool
             bodies.append((tool.mass, flange + tool.center_of_mass, tool.inertia_matrix()))
         force, moment = np.zeros(3), np.zeros(3)
@@ -129,10 +134,11 @@ def fitted_inverse_dynamics(q, v, a) -> np.ndarray:
 @pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.parametrize("seed", range(3))
 def test_kinematics_are_those_of_the_dh_table(name, seed):
-    variant = VARIANTS[name]
+    robot, variant = ROBOTS[name], VARIANTS[name]
+    table = robot.denavit_hartenberg.table()
     plant = make_plant(name)
     context = plant.CreateDefaultContext()
-    axes = 6 - variant.fixed_deg.size
+    axes = table.axes - variant.fixed_deg.size
     q_J, _, _ = random_state(axes, seed)
     if variant.elasticity:
         flex = np.random.default_rng(seed + 100).uniform(-0.5, 0.5, axes)
@@ -141,19 +147,20 @@ def test_kinematics_are_those_of_the_dh_table(name, seed):
     else:
         set_joints(plant, context, "joint", q_J, np.zeros(axes))
     q = np.concatenate([q_J, np.deg2rad(variant.fixed_deg)])
-    for i, H in enumerate(TABLE.link_poses(q)):
+    for i, H in enumerate(table.link_poses(q)):
         body = plant.GetBodyByName(f"link_{i}" if i else "base")
         X_WB = body.EvalPoseInWorld(context)
         np.testing.assert_allclose(X_WB.GetAsMatrix4(), H, atol=1e-12)
-    y_t, R_e = TABLE.pose(q, COMAU.tool.tool_point)
+    y_t, R_e = table.pose(q, robot.tool.tool_point)
     X_WT = plant.GetFrameByName("tool_point").CalcPoseInWorld(context)
     np.testing.assert_allclose(X_WT.translation(), y_t, atol=1e-12)
     np.testing.assert_allclose(X_WT.rotation().matrix(), R_e, atol=1e-12)
 
 
-def test_mass_properties_are_those_of_the_parameters():
-    plant = make_plant("comau_racer_1_4")
-    for body in [*COMAU.links, COMAU.tool]:
+@pytest.mark.parametrize("name", RIGID)
+def test_mass_properties_are_those_of_the_parameters(name):
+    plant, robot = make_plant(name), ROBOTS[name]
+    for body in [*robot.links, robot.tool]:
         M = plant.GetBodyByName(body.name).default_spatial_inertia()
         assert M.get_mass() == pytest.approx(body.mass, rel=1e-12)
         np.testing.assert_allclose(M.get_com(), body.center_of_mass, atol=1e-12)
@@ -170,16 +177,16 @@ def test_rigid_inverse_dynamics_are_those_of_the_fitted_links(seed):
     forces = MultibodyForces(plant)
     plant.CalcForceElementsContribution(context, forces)
     tau = plant.CalcInverseDynamics(context, a, forces)
-    expected = fitted_inverse_dynamics(q, v, a) + D_M * a
+    expected = fitted_inverse_dynamics(q, v, a) + COMAU.rotors.reflected_inertia * a
     np.testing.assert_allclose(tau, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_drives_have_reflected_inertia_and_limits(name):
     plant = make_plant(name)
-    limits = COMAU.joint_limits
-    variant = VARIANTS[name]
-    axes = 6 - variant.fixed_deg.size
+    robot, variant = ROBOTS[name], VARIANTS[name]
+    limits, D_M = robot.joint_limits, robot.rotors.reflected_inertia
+    axes = len(robot.links) - variant.fixed_deg.size
     prefix = "motor" if variant.elasticity else "joint"
     assert plant.num_actuators() == axes
     for i in range(axes):
@@ -194,10 +201,10 @@ def test_drives_have_reflected_inertia_and_limits(name):
         assert joint.default_damping() == 0.0
 
 
-@pytest.mark.parametrize("name", [n for n, v in VARIANTS.items() if v.elasticity])
+@pytest.mark.parametrize("name", ELASTIC)
 def test_flexible_joints_have_springs_dampers_and_no_limits(name):
     plant = make_plant(name)
-    elasticity = COMAU.elasticities[VARIANTS[name].elasticity]
+    elasticity = ROBOTS[name].elasticities[VARIANTS[name].elasticity]
     springs = {}
     for index in range(plant.num_force_elements()):
         element = plant.get_force_element(ForceElementIndex(index))
@@ -212,20 +219,16 @@ def test_flexible_joints_have_springs_dampers_and_no_limits(name):
         assert np.isinf(spring.joint().position_upper_limit())
 
 
-@pytest.mark.parametrize(
-    ("elastic", "rigid"),
-    [
-        ("comau_racer_1_4_elastic", "comau_racer_1_4"),
-        ("comau_racer_1_4_elastic_3r", "comau_racer_1_4_3r"),
-    ],
-)
+@pytest.mark.parametrize("elastic", ELASTIC)
 @pytest.mark.parametrize("seed", range(3))
-def test_elastic_plant_obeys_the_equations_of_elastic_joints(elastic, rigid, seed):
+def test_elastic_plant_obeys_the_equations_of_elastic_joints(elastic, seed):
     """(2.65) with (2.67): D_E and n_E are those of the rigid plant without rotors."""
-    plant, rigid_plant = make_plant(elastic), make_plant(rigid)
+    plant, rigid_plant = make_plant(elastic), make_plant(elastic.replace("_elastic", ""))
     context, rigid_context = plant.CreateDefaultContext(), rigid_plant.CreateDefaultContext()
     n = rigid_plant.num_positions()
-    K_s = COMAU.elasticities[VARIANTS[elastic].elasticity].stiffness
+    robot = ROBOTS[elastic]
+    K_s = robot.elasticities[VARIANTS[elastic].elasticity].stiffness
+    D_M = robot.rotors.reflected_inertia[:n]
     q_J, v_J, _ = random_state(n, seed)
     rng = np.random.default_rng(seed + 50)
     q_M, v_M = q_J + rng.uniform(-0.02, 0.02, n), v_J + rng.uniform(-1, 1, n)
@@ -233,20 +236,20 @@ def test_elastic_plant_obeys_the_equations_of_elastic_joints(elastic, rigid, see
     set_joints(plant, context, "flex", q_J - q_M, v_J - v_M)
     set_joints(rigid_plant, rigid_context, "joint", q_J, v_J)
 
-    D_E = rigid_plant.CalcMassMatrix(rigid_context) - np.diag(D_M[:n])
+    D_E = rigid_plant.CalcMassMatrix(rigid_context) - np.diag(D_M)
     gravity = rigid_plant.CalcGravityGeneralizedForces(rigid_context)
     n_E = rigid_plant.CalcBiasTerm(rigid_context) - gravity
     # velocities in the order (v_M, v_flex), v_J = v_M + v_flex
     rows = velocity_rows(plant, "motor", n) + velocity_rows(plant, "flex", n)
     M = plant.CalcMassMatrix(context)[np.ix_(rows, rows)]
-    expected = np.block([[D_E + np.diag(D_M[:n]), D_E], [D_E, D_E]])
+    expected = np.block([[D_E + np.diag(D_M), D_E], [D_E, D_E]])
     np.testing.assert_allclose(M, expected, atol=1e-9)
 
-    tau_d = rng.uniform(-1, 1, n) * COMAU.joint_limits.effort[:n]
+    tau_d = rng.uniform(-1, 1, n) * robot.joint_limits.effort[:n]
     plant.get_actuation_input_port().FixValue(context, tau_d)
     tau_J = K_s * (q_M - q_J)
     a_J = np.linalg.solve(D_E, tau_J - n_E)
-    a_M = (tau_d - tau_J) / D_M[:n]
+    a_M = (tau_d - tau_J) / D_M
     # What is left of (2.65) for the accelerations that Drake finds
     acceleration = plant.get_generalized_acceleration_output_port().Eval(context)[rows]
     found_a_M, found_a_J = acceleration[:n], acceleration[:n] + acceleration[n:]
@@ -256,17 +259,18 @@ def test_elastic_plant_obeys_the_equations_of_elastic_joints(elastic, rigid, see
     np.testing.assert_allclose(found_a_J, a_J, rtol=1e-9, atol=1e-9 * np.abs(a_J).max())
 
 
-def test_rotor_bodies_do_not_change_the_mass():
-    rigid, elastic = make_plant("comau_racer_1_4"), make_plant("comau_racer_1_4_elastic")
+@pytest.mark.parametrize("name", RIGID)
+def test_rotor_bodies_do_not_change_the_mass(name):
+    rigid, elastic = make_plant(name), make_plant(f"{name}_elastic")
     masses = [p.CalcTotalMass(p.CreateDefaultContext()) for p in (rigid, elastic)]
     # the first rotor stands on the base, whose mass is not modelled
-    assert masses[1] - masses[0] == pytest.approx(COMAU.rotors.body_mass, rel=1e-6)
+    assert masses[1] - masses[0] == pytest.approx(ROBOTS[name].rotors.body_mass, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["comau_racer_1_4_3r", "comau_racer_1_4_elastic_3r"])
 def test_3r_arm_follows_the_bent_lemniscate(name):
     """(3.87): within the limits, elbow up, condition of the position Jacobian below 15."""
-    theta_5 = np.deg2rad(VARIANTS[name].fixed_deg[1])
+    theta_5, dh = np.deg2rad(VARIANTS[name].fixed_deg[1]), COMAU.denavit_hartenberg
     lower, upper = COMAU.joint_limits.position_lower[:3], COMAU.joint_limits.position_upper[:3]
     plant = make_plant("comau_racer_1_4_3r")
     context = plant.CreateDefaultContext()
@@ -290,7 +294,7 @@ def test_3r_arm_follows_the_bent_lemniscate(name):
             q = q + np.linalg.solve(J, miss)
         np.testing.assert_allclose(miss, 0.0, atol=1e-11)
         assert np.all((q > lower + np.deg2rad(30)) & (q < upper - np.deg2rad(30)))
-        forearm = TABLE.d[3] + 0.22 * np.cos(theta_5), TABLE.a[2] + 0.22 * np.sin(theta_5)
+        forearm = dh.d[3] + 0.22 * np.cos(theta_5), dh.a[2] + 0.22 * np.sin(theta_5)
         bend = q[2] + np.arctan2(forearm[1], forearm[0])
         assert -np.pi / 2 < bend < np.pi / 2  # elbow up, (2.10c)
         conditions.append(np.linalg.cond(J))

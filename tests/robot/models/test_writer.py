@@ -1,15 +1,16 @@
 """The SDF text that is written from parameters and appearance."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.framework import DiagramBuilder
 
+from pfsc_drake.robot.models import writer
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.visuals import Appearance
@@ -23,11 +24,17 @@ TABLE = COMAU.denavit_hartenberg.table()
 VARIANTS = {variant.name: variant for variant in COMAU.variants}
 
 
-@pytest.mark.parametrize("name", VARIANTS)
-def test_shipped_file_is_what_the_writer_gives(name):
-    text = write_sdf(COMAU, VARIANTS[name], APPEARANCE)
-    message = f"{name}.sdf is not up to date: run python -m pfsc_drake.robot.models.writer"
-    assert (DIRECTORY / f"{name}.sdf").read_text(encoding="utf-8") == text, message
+def test_shipped_files_are_what_the_writer_gives(tmp_path, monkeypatch):
+    shipped = models_directory()
+    models = shutil.copytree(shipped, tmp_path / "models", ignore=shutil.ignore_patterns("*.sdf"))
+    monkeypatch.setattr(writer, "models_directory", lambda: models)
+    writer.main()
+    files = {file.relative_to(shipped) for file in shipped.glob("*/*.sdf")}
+    assert {file.relative_to(models) for file in models.glob("*/*.sdf")} == files
+    for file in files:
+        message = f"{file} is not up to date: run python -m pfsc_drake.robot.models.writer"
+        text = (models / file).read_text(encoding="utf-8")
+        assert (shipped / file).read_text(encoding="utf-8") == text, message
 
 
 def test_no_collision_geometry_unless_asked_for():

@@ -70,7 +70,7 @@ def test_the_loop_at_rest_is_that_of_the_whole_station(name, overrides):
     rest = RestPosture(station.start_posture, station.task.point(station.task.start(np.zeros(3))))
     at_start = LoopAtRest(station.part.belief.robot, station.law.linearization, rest, period)
     expected = modes(linear.A, period)
-    found = modes(at_start.closed(station.law.stabilization, mass=1.0 / factor), period)
+    found = modes(at_start.closed(station.law.gains, mass=1.0 / factor), period)
     slow = np.sum(expected.rate > -400.0)
     assert slow >= 6
     # poles that are close together part at the least difference: compare what they are together

@@ -1,0 +1,99 @@
+"""The posture reference of joints beyond the number of outputs, as it yields and is pulled."""
+
+import numpy as np
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.control.compliance.null_space_impedance import NullSpaceImpedance
+from pfsc_drake.control.law.decoupling import free_torque, scale_of
+from pfsc_drake.control.law.posture import Posture
+from pfsc_drake.control.law.posture_potential import POTENTIALS, free_motion_function
+from pfsc_drake.control.manifolds.manifold import Manifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+
+
+class YieldingPosture:
+    """A :class:`NullSpaceImpedance` under external torques and the pull of a potential.
+
+    With ``N'`` the projection on what leaves the outputs alone, the posture is driven by
+    ``u = N' (tau_ext + pull_stiffness (-dV/dq))``.
+
+    Args:
+        robot: The robot, N joints.
+        manifold: What it follows.
+        posture: How the law follows the posture; its weight decides the projection.
+        impedance: How the posture moves.
+        potential: ``V``, one of ``POTENTIALS``, or empty for none.
+        pull_stiffness: Of the potential [Nm/rad or N/m], not negative.
+
+    Raises:
+        InputError: If the potential is unknown, or its stiffness negative.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        manifold: Manifold,
+        posture: Posture,
+        impedance: NullSpaceImpedance,
+        potential: str = "",
+        pull_stiffness: float = 0.0,
+    ) -> None:
+        if potential and potential not in POTENTIALS:
+            raise InputError(f"potential: '{potential}'; must be one of {', '.join(POTENTIALS)}")
+        if not 0.0 <= pull_stiffness < np.inf:
+            raise InputError(
+                f"pull_stiffness: {pull_stiffness}; must be zero or positive, and finite"
+            )
+        self.impedance, self._n = impedance, robot.dimension
+        self.size = (impedance.relative_degree + 1) * self._n
+        self._pulls = pull_stiffness if potential else 0.0
+        self._inertial, self._scale = posture.weight is None, posture.scale
+        function = BoundFunction(
+            free_motion_function(robot, manifold, potential, inertial=self._inertial)
+        )
+        self._q, self._point = function.arguments["q"], function.arguments["manifold_point"]
+        self._evaluate, self._pull = function.evaluate, function.results["pull"]
+        self._A = function.results["A"].reshape((len(manifold.coordinates), -1), order="F")
+        self._weight = function.results["weight"]
+
+    def start(self, posture: np.ndarray) -> np.ndarray:
+        """Return the state at rest in a posture (N,), flat, shape ((r + 1) N,)."""
+        return self.impedance.start(posture).ravel()
+
+    def update(
+        self,
+        state: np.ndarray,
+        q: np.ndarray,
+        point: np.ndarray,
+        torque: np.ndarray | None,
+        goal: np.ndarray,
+    ) -> np.ndarray:
+        """Return the state one period later, shape ((r + 1) N,).
+
+        Args:
+            state: Derivatives 0..r of ``q_0`` by rows, shape ((r + 1) N,).
+            q: Joint coordinates, shape (N,).
+            point: The manifold's point next to the tool.
+            torque: External torques, shape (N,) [Nm or N]; None for none.
+            goal: Where the spring pulls, shape (N,).
+        """
+        rows = state.reshape(-1, self._n)
+        free = np.zeros(self._n)
+        if torque is not None or self._pulls:
+            free = self._free_torque(q, point, torque)
+        return self.impedance.update(rows, free, goal).ravel()
+
+    def _free_torque(
+        self, q: np.ndarray, point: np.ndarray, torque: np.ndarray | None
+    ) -> np.ndarray:
+        """Return the part of all torques that does no work on the outputs; NaN if not finite."""
+        self._q[:], self._point[:] = q, point
+        self._evaluate()
+        whole = self._pulls * self._pull
+        if torque is not None:
+            whole = whole + torque
+        if not np.isfinite(self._A.sum() + whole.sum()):
+            return np.full(self._n, np.nan)
+        scale = scale_of(self._weight.reshape((self._n, -1))) if self._inertial else self._scale
+        return free_torque(self._A, whole, scale)

@@ -1,0 +1,121 @@
+"""What joints do that the outputs leave free: the posture next to which they stay."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.control.law.actuation import joint_jets
+from pfsc_drake.control.law.stabilization import Stabilization
+from pfsc_drake.errors import InputError
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.inverse_kinematics import UNLIMITED
+from pfsc_drake.robot.robot_model import RobotModel
+
+# an angle [rad] that depends on the joints, as a map of jets
+PostureCoordinate = Callable[[Sequence[Jet]], Jet]
+
+# rad, the range of a joint without limits
+_WHOLE_TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Posture:
+    """How N joints keep next to a posture reference ``q_0(t)`` as far as the outputs let them.
+
+    The wish for the highest joint derivative is that of linear error dynamics::
+
+        w = q_0^(r) - sum_k a_{k+1} (q - q_0)^(k)
+
+    and what the outputs ask for deviates from it as little as possible, judged by a weight. With
+    a coordinate ``c(q)`` of the joints, its error ``c(q) - c(q_0)`` obeys the same linear
+    dynamics exactly, whatever the outputs do, as long as it can move without them.
+
+    Attributes:
+        stabilization: Gains of the joints' deviations from the reference, all of one kind.
+        weight: ``W``'s diagonal, shape (N,): a joint of larger weight deviates less; None for
+            the robot's inertia in its present posture, rotors included.
+        coordinate: What else is to be kept; None for nothing.
+
+    Raises:
+        InputError: If a weight is not positive, or is not one per joint.
+    """
+
+    stabilization: Stabilization
+    weight: np.ndarray | None
+    coordinate: PostureCoordinate | None = None
+
+    def __post_init__(self) -> None:
+        n, weight = self.stabilization.proportional.shape[1], self.weight
+        if weight is not None and (np.shape(weight) != (n,) or not 0.0 < np.min(weight) < np.inf):
+            raise InputError(f"posture weight: {weight}; must be {n} positive numbers")
+
+    @property
+    def scale(self) -> np.ndarray | None:
+        """``S`` with ``S S' = W^-1``, shape (N, N), where it is constant and not the identity."""
+        if self.weight is None or np.all(self.weight == 1.0):
+            return None
+        return np.diag(1.0 / np.sqrt(self.weight))
+
+
+class PostureExpressions(NamedTuple):
+    """What a posture asks for, as expressions.
+
+    Attributes:
+        wish: ``w``, shape (N, 1).
+        weight: ``W``, shape (N, N), if it varies, else empty.
+        slope: ``dc/dq`` of the coordinate, shape (N, 1), or empty.
+        rate: ``dc/dq q^(r)`` that the coordinate is to have, shape (1, 1), or empty.
+    """
+
+    wish: ca.SX
+    weight: ca.SX
+    slope: ca.SX
+    rate: ca.SX
+
+
+def posture_expressions(
+    posture: Posture, robot: RobotModel, motion: Sequence[ca.SX], reference: Sequence[ca.SX]
+) -> PostureExpressions:
+    """Return what a posture asks for.
+
+    Args:
+        posture: The posture.
+        robot: The robot, N joints.
+        motion: Joint coordinates and derivatives, orders 0..r-1, each (N, 1).
+        reference: Those of the posture reference, orders 0..r, each (N, 1).
+    """
+    empty, stabilization = ca.SX(0, 1), posture.stabilization
+    wish = stabilization.virtual_input(motion, reference, ca.SX(robot.dimension, 1))
+    weight = empty
+    if posture.weight is None:
+        weight = robot.mass_matrix(motion[0]) + ca.diag(robot.D_M)
+    if posture.coordinate is None:
+        return PostureExpressions(wish, weight, empty, empty)
+    actual = posture.coordinate(joint_jets([*motion, ca.SX(robot.dimension, 1)]))
+    wanted = posture.coordinate(joint_jets(reference))
+    q = ca.SX.sym("q", robot.dimension)
+    angle = posture.coordinate(joint_jets([q, ca.SX(robot.dimension, 1)])).coefficients[0]
+    slope = ca.substitute(ca.gradient(angle, q), q, motion[0])
+    rate = wanted.derivative(stabilization.relative_degree) - actual.derivative(
+        stabilization.relative_degree
+    )
+    for k, gains in enumerate(stabilization.proportional):
+        error = actual.derivative(k) - wanted.derivative(k)
+        if k == 0:  # the shorter way round
+            error = ca.atan2(ca.sin(error), ca.cos(error))
+        rate = rate - gains[0] * error
+    return PostureExpressions(wish, weight, ca.densify(slope), rate)
+
+
+def range_weight(robot: RobotModel) -> np.ndarray:
+    """Return the weight by which joints deviate in proportion to their ranges, shape (N,).
+
+    Args:
+        robot: The robot; joints without limits count as ones that turn once.
+    """
+    lower, upper = robot.gather("position_limits").T
+    span = np.where(np.abs(upper - lower) < UNLIMITED, upper - lower, _WHOLE_TURN)
+    return (np.max(span) / span) ** 2

@@ -1,0 +1,71 @@
+"""The swivel angle of an arm: how far its elbow is turned about the line from shoulder to wrist."""
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake import jets
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.serial.links import Linkage
+from pfsc_drake.robot.serial.newton_euler import points_on_links
+
+# of the angle between the arm's line and the direction from which a swivel angle is counted
+_LEAST_SINE = 0.3
+
+
+def swivel_angle(
+    chain: Linkage, q: Sequence[Jet], joints: tuple[int, int, int], upward: np.ndarray
+) -> Jet:
+    """Return the angle from the plane of shoulder, wrist and a direction to that of the elbow.
+
+    It is counted about the direction from shoulder to wrist; zero where the elbow is on the side
+    of ``upward``. It is not defined where shoulder and wrist lie one above the other, or in line
+    with the elbow.
+
+    Args:
+        chain: The arm.
+        q: Its joint coordinates, N scalar jets.
+        joints: Indices of the joints whose origins are shoulder, elbow and wrist.
+        upward: The direction, world axes, shape (3,).
+
+    Returns:
+        Scalar jet [rad].
+    """
+    shoulder, elbow, wrist = _points(chain, q, joints)
+    line, arm = wrist - shoulder, elbow - shoulder
+    length = jets.sqrt(jets.dot(line, line))
+    up = jets.constant(ca.SX(ca.DM(upward)), line.order)
+    sideways = jets.cross(line, up)
+    # both as long as the line squared times the sine of its angle with ``upward``
+    across = jets.dot(arm, sideways) * length
+    towards = jets.dot(arm, jets.cross(sideways, line))
+    return jets.atan2(across, towards)
+
+
+def upward_direction(chain: Linkage, q: np.ndarray, joints: tuple[int, int, int]) -> np.ndarray:
+    """Return a direction from which a swivel angle can be counted, shape (3,).
+
+    That is against gravity, unless shoulder and wrist stand nearly one above the other, or there
+    is no gravity: then it is the axis of the world that is most across.
+
+    Args:
+        chain: The arm.
+        q: Joint coordinates, shape (N,).
+        joints: See :func:`swivel_angle`.
+    """
+    still = [jets.constant(ca.SX(value), 1) for value in q]
+    shoulder, _, wrist = _points(chain, still, joints)
+    line = np.array(ca.evalf((wrist - shoulder).coefficients[0])).ravel()
+    line = line / np.linalg.norm(line)
+    weight = np.linalg.norm(chain.gravity)
+    if weight > 0.0:
+        upward = -chain.gravity / weight
+        if np.linalg.norm(np.cross(upward, line)) > _LEAST_SINE:
+            return upward
+    return np.eye(3)[np.argmin(np.abs(line))]
+
+
+def _points(chain: Linkage, q: Sequence[Jet], joints: tuple[int, int, int]) -> list[Jet]:
+    """Return where shoulder, elbow and wrist are [m]."""
+    return points_on_links(chain, q, [(joint, np.zeros(3)) for joint in joints])
