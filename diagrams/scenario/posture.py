@@ -54,7 +54,7 @@ class PostureParameters:
     inertia: float = 1.0
     damping: float = 20.0
     stiffness: float = 50.0
-    filter_rate: float = 100.0
+    filter_rate: float = 30.0
     yields: str = "none"
     observer_rate: float = 60.0
 

@@ -33,7 +33,9 @@ def add_posture(log: RunLog, station: Station, raw: dict[str, np.ndarray], unit:
     q = ca.SX.sym("q", n)
     angle = law.posture.coordinate([jets.constant(q[i], 1) for i in range(n)]).coefficients[0]
     kept = ca.Function("coordinate", [q], [angle]).map(len(reference))
-    swivel = [np.unwrap(np.array(kept(x.T)).ravel()) for x in (raw["joint_state"][:, :n], reference)]
+    swivel = [
+        np.unwrap(np.array(kept(x.T)).ravel()) for x in (raw["joint_state"][:, :n], reference)
+    ]
     log.add("swivel", np.array(swivel).T, "rad", ["swivel", "swivel_p"])
 
 

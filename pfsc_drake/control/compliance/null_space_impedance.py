@@ -22,7 +22,7 @@ class NullSpaceImpedanceParameters:
     inertia: float = 1.0
     damping: float = 20.0
     stiffness: float = 50.0
-    filter_rate: float = 100.0
+    filter_rate: float = 30.0
 
     def __post_init__(self) -> None:
         for key in ("inertia", "damping", "filter_rate"):

@@ -60,7 +60,7 @@ def free_motion_function(
 
 
 def _from_limits(robot: RobotModel, q: ca.SX) -> ca.SX:
-    lower, upper = robot.gather("position_limits").T
+    lower, upper = np.clip(robot.gather("position_limits"), -UNLIMITED, UNLIMITED).T
     limited = upper - lower < UNLIMITED
     half = np.where(limited, (upper - lower) / 2.0, 1.0)
     middle = np.where(limited, (upper + lower) / 2.0, 0.0)

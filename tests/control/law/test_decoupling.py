@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.decoupling import DecouplingInverse, DecouplingSolution
+from pfsc_drake.control.law.decoupling import (
+    DecouplingInverse,
+    DecouplingSolution,
+    Spare,
+    free_torque,
+    scale_of,
+)
 from pfsc_drake.errors import InputError
 
 
@@ -70,3 +76,119 @@ def test_the_limit_of_the_condition_number():
 def test_the_limit_must_lie_between_zero_and_one(min_rcond):
     with pytest.raises(InputError, match="min_rcond"):
         DecouplingInverse(min_rcond)
+
+
+def redundant(seed, m=6, n=7):
+    """Return a matrix of more columns than rows, a right-hand side, a wish and a weight's root."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    weight = root @ root.T + np.eye(n)
+    return rng.normal(size=(m, n)), rng.normal(size=m), rng.normal(size=n), weight
+
+
+@pytest.mark.parametrize("size", [(6, 7), (3, 6), (5, 6)])
+@pytest.mark.parametrize("weighted", [False, True])
+def test_the_solution_next_to_a_wish_is_the_weighted_least_squares_one(size, weighted):
+    for seed in range(10):
+        A, rhs, wish, W = redundant(seed, *size)
+        W_inv = np.linalg.inv(W) if weighted else np.eye(size[1])
+        scale = scale_of(W) if weighted else None
+        solution = DecouplingInverse().solve(A, rhs, Spare(wish, scale))
+        expected = wish + W_inv @ A.T @ np.linalg.solve(A @ W_inv @ A.T, rhs - A @ wish)
+        assert np.allclose(solution.x, expected, rtol=1e-10, atol=1e-11)
+        # conditioning is that of A, whatever the weight; the 1-norm is within m of the 2-norm
+        assert 1.0 / len(A) < solution.rcond * np.linalg.cond(A) < len(A)
+        assert solution.residual is None
+
+
+def test_the_root_of_a_weight():
+    _, _, _, W = redundant(3)
+    scale = scale_of(W)
+    assert np.allclose(scale @ scale.T, np.linalg.inv(W), rtol=1e-10)
+    assert np.isnan(scale_of(-np.eye(3))).all()
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_a_spare_coordinate_gets_its_rate_and_the_outputs_theirs(weighted):
+    A, rhs, wish, W = redundant(5, 3, 6)
+    slope, scale = np.arange(1.0, 7.0), scale_of(W) if weighted else None
+    plain = DecouplingInverse().solve(A, rhs, Spare(wish, scale)).x
+    x = DecouplingInverse().solve(A, rhs, Spare(wish, scale, slope, 0.7)).x
+    assert np.allclose(A @ x, rhs, atol=1e-12)
+    assert slope @ x == pytest.approx(0.7, abs=1e-12)
+    # of all that do both it is nearest to the one without
+    W = W if weighted else np.eye(6)
+    null = np.linalg.svd(np.vstack([A, slope]))[2][4:]
+    assert np.allclose(null @ W @ (x - plain), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-6, 0.01, 0.5])
+def test_a_coordinate_that_the_outputs_fix_is_given_up_smoothly(share):
+    A, rhs, wish, _ = redundant(6)
+    free, fixed = np.linalg.svd(A)[2][-1], A[0] / np.linalg.norm(A[0])
+    slope = share * free + np.sqrt(1.0 - share**2) * fixed
+    x = DecouplingInverse().solve(A, rhs, Spare(wish, None, slope, 100.0)).x
+    assert np.allclose(A @ x, rhs, atol=1e-9)
+    plain = DecouplingInverse().solve(A, rhs, Spare(wish)).x
+    missing = 100.0 - slope @ plain
+    gain = share / max(share**2, 4e-4)
+    assert np.allclose(x - plain, gain * missing * free, atol=1e-8)
+
+
+def test_free_torques_do_no_work_on_the_outputs():
+    A, _, torque, W = redundant(7, 3, 7)
+    W_inv = np.linalg.inv(W)
+    N = np.eye(7) - W_inv @ A.T @ np.linalg.solve(A @ W_inv @ A.T, A)
+    assert np.allclose(free_torque(A, torque, scale_of(W)), N.T @ torque, atol=1e-12)
+    assert np.allclose(free_torque(A, A.T @ np.ones(3)), 0.0, atol=1e-12)
+    free = np.linalg.svd(A)[2][-1]
+    assert np.allclose(free_torque(A, free), free, atol=1e-12)
+
+
+@pytest.mark.parametrize("spare", [True, False])
+def test_damping_bounds_the_solution_and_tells_what_is_missed(spare):
+    n = 7 if spare else 6
+    rng = np.random.default_rng(8)
+    u, _, v = np.linalg.svd(rng.normal(size=(6, n)), full_matrices=False)
+    rhs, wish = rng.normal(size=6), Spare(np.zeros(n)) if spare else None
+    inverse = DecouplingInverse(1e-3, 0.05)
+    for smallest in (0.0, 1e-9, 1e-3, 0.02):
+        A = u @ np.diag([1.0, 0.9, 0.8, 0.7, 0.6, smallest]) @ v
+        solution = inverse.solve(A, rhs, wish)
+        assert inverse.accepts(solution)
+        assert np.allclose(rhs - A @ solution.x, solution.residual, atol=1e-10)
+        # lambda is about 0.05 |A|, and x at most |rhs| / (2 lambda)
+        assert np.linalg.norm(solution.x) < np.linalg.norm(rhs) / (2.0 * 0.05)
+        undamped = DecouplingInverse(1e-12).solve(A, rhs, wish)
+        if smallest == 1e-9:
+            assert not np.linalg.norm(undamped.x) < 1e6
+
+
+@pytest.mark.parametrize("spare", [True, False])
+def test_damping_sets_in_continuously(spare):
+    n, wish = (7, Spare(np.zeros(7))) if spare else (6, None)
+    rng = np.random.default_rng(9)
+    A, rhs = rng.normal(size=(6, n)), rng.normal(size=6)
+    plain = DecouplingInverse().solve(A, rhs, wish)
+    just = DecouplingInverse(1e-4, plain.rcond * (1.0 + 1e-9)).solve(A, rhs, wish)
+    assert just.residual is not None
+    assert plain.residual is None
+    assert np.allclose(just.x, plain.x, rtol=1e-5)
+    above = DecouplingInverse(1e-4, plain.rcond * (1.0 - 1e-9)).solve(A, rhs, wish)
+    assert np.array_equal(above.x, plain.x)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("damped_below", [0.0, 0.1])
+def test_what_is_not_finite_is_refused_with_joints_to_spare(bad, damped_below):
+    A, rhs, wish, _ = redundant(10)
+    inverse = DecouplingInverse(1e-3, damped_below)
+    A[2, 3] = bad
+    assert not inverse.accepts(inverse.solve(A, rhs, Spare(wish)))
+    assert not inverse.accepts(DecouplingInverse(1e-3).solve(np.zeros((6, 7)), rhs, Spare(wish)))
+
+
+@pytest.mark.parametrize("damped_below", [1e-3, 1.0, -0.1, np.nan])
+def test_damping_begins_above_the_limit(damped_below):
+    with pytest.raises(InputError, match="damped_below"):
+        DecouplingInverse(1e-3, damped_below)
