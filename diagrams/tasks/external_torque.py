@@ -8,6 +8,13 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.external_torque import ExternalTorque
 from pfsc_drake.systems.control.following_controller import FollowingController
 
+# by source the signals that tell, and the ports of ExternalTorque for them
+_SEEN = {
+    "known": {"wrench_ext": "wrench", "push_torque": "link_torque"},
+    "measured": {"wrench_measured": "wrench"},
+}
+_SYSTEMS = {"tau_ext": "external_torque", "posture_torque": "external_torque_of_posture"}
+
 
 def needs_sensor(scenario: Scenario) -> bool:
     """Return whether something in the scenario acts on measured forces."""
@@ -35,33 +42,45 @@ def add_external_torque(
             what there is.
 
     Returns:
-        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the robot.
+        ``tau_ext`` as the law is told, with derivatives by rows, and ``posture_torque`` of shape
+        (N,) as a posture is told that yields to known forces, as far as anything acts on the
+        robot.
 
     Raises:
         InputError: If the law knows no external torques.
     """
-    parameters = scenario.controller.external_torque
-    if parameters.source in ("none", "observed"):
-        return {}
-    seen = {
-        "known": {"wrench_ext": "wrench", "push_torque": "link_torque"},
-        "measured": {"wrench_measured": "wrench"},
-    }[parameters.source]
-    degree = controller.relative_degree
+    parameters, made = scenario.controller.external_torque, dict[str, OutputPort]()
+    period, degree = scenario.controller.sampling_time, controller.relative_degree
+    if scenario.controller.posture.yields == "known":
+        posture = ExternalTorque(robot, 0, period)
+        made |= _add(builder, "posture_torque", posture, _SEEN["known"], ports)
+    if parameters.source not in _SEEN:
+        return made
     if degree == 1:
         raise InputError(
             f"controller.external_torque.source = {parameters.source} with the law "
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
-    acting = {name: ports[name] for name in seen if name in ports}
-    if not acting:  # nothing acts on the robot
+    torque = ExternalTorque(robot, degree - 2, period, parameters.bandwidth)
+    made |= _add(builder, "tau_ext", torque, _SEEN[parameters.source], ports)
+    if "tau_ext" in made:
+        builder.Connect(made["tau_ext"], controller.GetInputPort("tau_ext"))
+    return made
+
+
+def _add(
+    builder: DiagramBuilder,
+    name: str,
+    torque: ExternalTorque,
+    seen: dict[str, str],
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add external torques, and return them by name; nothing if nothing acts on the robot."""
+    acting = {signal: ports[signal] for signal in seen if signal in ports}
+    if not acting:
         return {}
-    torque = builder.AddNamedSystem(
-        "external_torque",
-        ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
-    )
-    for name, port in acting.items():
-        builder.Connect(port, torque.GetInputPort(seen[name]))
+    builder.AddNamedSystem(_SYSTEMS[name], torque)
+    for signal, port in acting.items():
+        builder.Connect(port, torque.GetInputPort(seen[signal]))
     builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
-    builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))
-    return {"tau_ext": torque.GetOutputPort("tau_ext")}
+    return {name: torque.GetOutputPort("tau_ext")}

@@ -62,7 +62,7 @@ def draw_posture(log: RunLog) -> Drawing:
     """How far the joints are from the reference posture, and the swivel angle where it is logged.
 
     Args:
-        log: With ``q_J`` and ``q_posture``, perhaps with ``swivel``.
+        log: With ``q_J`` and ``q_posture``, perhaps with ``swivel`` and its reference.
     """
     signal = log["q_J"]
     factor, unit = position_unit(signal)
@@ -74,7 +74,9 @@ def draw_posture(log: RunLog) -> Drawing:
     panels[0].set(ylabel=f"error in {unit}", title="Distance from the reference posture")
     if swivel:
         angle = np.rad2deg(log["swivel"].values)
-        panels[1].plot(log.time, angle, color=COLOURS[0], label="swivel angle")
+        panels[1].plot(log.time, angle[:, 0], color=COLOURS[0], label="swivel angle")
+        if angle.shape[1] == 2:
+            panels[1].plot(log.time, angle[:, 1], "--", color=INK, linewidth=1.1, label="reference")
         panels[1].set(ylabel="angle in deg", title="Swivel angle of the elbow")
     shade_link_pushes(panels, log)
     for panel in panels:

@@ -58,10 +58,11 @@ def test_no_push_no_figure(pushed_log):
 
 def test_posture_error_and_swivel_angle(pushed_log):
     pushed_log.add("q_posture", pushed_log["q_J"].values - 0.1, "rad")
-    pushed_log.add("swivel", np.full(201, 0.2), "rad")
+    pushed_log.add("swivel", np.tile([0.2, 0.3], (201, 1)), "rad")
     panels = draw_posture(pushed_log).canvas.axes
     assert drawn(panels[0], "axis 3") == pytest.approx(np.rad2deg(0.1))
     assert drawn(panels[1], "swivel angle") == pytest.approx(np.rad2deg(0.2))
+    assert drawn(panels[1], "reference") == pytest.approx(np.rad2deg(0.3))
     assert [patch.get_label() for patch in panels[0].patches] == ["link pushed"]
 
 
