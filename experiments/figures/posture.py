@@ -111,8 +111,8 @@ def draw_pushes(log: RunLog) -> Drawing:
     distance = np.linalg.norm(shift, axis=1)
     panels[-1].plot(log.time, distance, "--", color=INK, linewidth=1.1, label="distance")
     compared, name = "elbow_undisturbed" in log, log["elbow"].labels[0].rsplit(" ", 1)[0]
-    since = "the lap before" if compared else "the first push"
-    panels[-1].set(ylabel="way in mm", title=f"Way of {name} since {since}")
+    title = f"{name} against the lap before" if compared else f"Way of {name} since the first push"
+    panels[-1].set(ylabel="way in mm", title=title)
     for panel in panels:
         place_legend(panel)
     what = "its motion in the lap before" if compared else "where it was when the push began"
