@@ -1,9 +1,9 @@
 """What an arm does beside its tool: posture, conditioning, pushes on its links."""
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from experiments.figures.drives import axis_labels
+from experiments.figures.forces import shade_pushes
 from experiments.figures.positions import position_unit
 from experiments.figures.style import (
     ALERT,
@@ -15,9 +15,8 @@ from experiments.figures.style import (
     largest,
     make_panels,
     place_legend,
-    shade,
 )
-from experiments.results.posture_metrics import PUSHED, elbow_shift, has_spare_joints, push_size
+from experiments.results.posture_metrics import elbow_shift, has_spare_joints
 from experiments.results.run_log import RunLog
 
 MILLI = 1e3
@@ -78,7 +77,7 @@ def draw_posture(log: RunLog) -> Drawing:
         if angle.shape[1] == 2:
             panels[1].plot(log.time, angle[:, 1], "--", color=INK, linewidth=1.1, label="reference")
         panels[1].set(ylabel="angle in deg", title="Swivel angle of the elbow")
-    shade_link_pushes(panels, log)
+    shade_pushes(panels, log)
     for panel in panels:
         place_legend(panel)
     caption = "Joint coordinates less those of the reference posture; the tool needs the difference"
@@ -118,14 +117,3 @@ def draw_pushes(log: RunLog) -> Drawing:
     what = "its motion in the lap before" if compared else "where it was when the push began"
     caption = f"Forces on links, and how far {name} is from {what}, at the point that is pushed."
     return Drawing("pushes", "Forces on links", caption, canvas)
-
-
-def shade_link_pushes(panels: list[Axes], log: RunLog) -> None:
-    """Shades the times at which a link is pushed, where the log has it.
-
-    Args:
-        panels: To shade; the first gets an entry for the legend.
-        log: Perhaps with ``push_force``.
-    """
-    if "push_force" in log and (peak := largest(log["push_force"].values)) > 0.0:
-        shade(panels, log.time, push_size(log) >= PUSHED * peak, "link pushed", "#FEF3C7")

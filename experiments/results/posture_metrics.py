@@ -15,7 +15,7 @@ from experiments.results.run_log import FloatArray, RunLog
 
 REST = 0.1  # s, end of a run over which the joints' speeds are looked at
 AT_REST = 1e-3  # m/s, below which the tool rests
-PUSHED = 0.05  # share of a run's largest push, from which on a link counts as pushed
+PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
 
 
 def has_spare_joints(log: RunLog) -> bool:

@@ -8,11 +8,12 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 _COLOR = Rgba(0.95, 0.65, 0.05, 1.0)
 _LENGTH = 0.25  # m, of the largest force
 _RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.008, 0.022, 0.06  # m
+_AWAY = 0.08  # m, of the tip from the point, which may be inside a link
 _LEAST = 0.02  # of the largest force; what is smaller is not drawn
 
 
 class ForceArrows(LeafSystem):
-    """Draws forces as arrows whose heads are where they act, longer for larger forces.
+    """Draws forces as arrows that point at where they act, longer for larger forces.
 
     Frames carry the time, so that a recording in progress gets them.
 
@@ -40,7 +41,7 @@ class ForceArrows(LeafSystem):
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
 
     def _draw_parts(self, context: Context) -> EventStatus:
-        """Draw the heads at the origins, pointing along z, with shafts of length 1 behind them."""
+        """Draw heads before the origins, pointing along z, with shafts of length 1 behind them."""
         for arrow in self._arrows:
             head, shaft = f"{arrow}/head", f"{arrow}/shaft/cylinder"
             # a cone stands on its tip
@@ -48,10 +49,10 @@ class ForceArrows(LeafSystem):
                 head, MeshcatCone(_HEAD_LENGTH, _HEAD_RADIUS, _HEAD_RADIUS), _COLOR
             )
             turned = RotationMatrix.MakeXRotation(np.pi)
-            self._meshcat.SetTransform(head, RigidTransform(turned, np.zeros(3)))
+            self._meshcat.SetTransform(head, RigidTransform(turned, [0.0, 0.0, -_AWAY]))
             self._meshcat.SetObject(shaft, Cylinder(_RADIUS, 1.0), _COLOR)
             self._meshcat.SetTransform(shaft, RigidTransform([0.0, 0.0, -0.5]))
-            behind = RigidTransform([0.0, 0.0, -_HEAD_LENGTH])
+            behind = RigidTransform([0.0, 0.0, -_AWAY - _HEAD_LENGTH])
             self._meshcat.SetTransform(f"{arrow}/shaft", behind)
         self._draw(context)
         return EventStatus.Succeeded()

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.analysis import Simulator
 from scipy.integrate import solve_ivp
 
 from diagrams.builder import build_station
@@ -152,3 +153,28 @@ def test_a_law_that_does_not_know_of_pushes_warns(six_axes):
         six_axes.controller.external_torque.source = source
         warnings = build_station(six_axes, SCENARIOS).warnings
         assert any("forces act on links" in line for line in warnings) == warned
+
+
+@pytest.mark.parametrize("source", ["known", "observed"])
+def test_a_posture_is_told_of_pushes(six_axes, source):
+    """Whatever the law itself is told."""
+    six_axes.forces = [PULSE]
+    six_axes.controller.posture.yields = source
+    six_axes.controller.posture.observer_rate = 300.0
+    station = build_station(six_axes, SCENARIOS)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.AdvanceTo(0.075)
+
+    def value(name, port):
+        system = station.diagram.GetSubsystemByName(name)
+        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(root))
+
+    truth = value("link_pushes", "tau_ext")
+    assert np.abs(truth).max() > 10.0
+    if source == "known":
+        assert np.array_equal(value("external_torque_of_posture", "tau_ext"), truth)
+    else:
+        seen = value("posture_torque_observer", "estimate")
+        assert np.allclose(seen, truth, rtol=0, atol=0.1 * np.abs(truth).max())

@@ -63,7 +63,8 @@ def test_posture_error_and_swivel_angle(pushed_log):
     assert drawn(panels[0], "axis 3") == pytest.approx(np.rad2deg(0.1))
     assert drawn(panels[1], "swivel angle") == pytest.approx(np.rad2deg(0.2))
     assert drawn(panels[1], "reference") == pytest.approx(np.rad2deg(0.3))
-    assert [patch.get_label() for patch in panels[0].patches] == ["link pushed"]
+    shades = [patch.get_label() for patch in panels[0].patches]
+    assert shades == ["tool pushed", "link pushed"]
 
 
 def test_conditioning_over_time_and_path(drawn_log):
