@@ -22,7 +22,6 @@ from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.notch import NotchedWorkpiece
-from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
@@ -57,7 +56,7 @@ def build_station(
     builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
-    require_orientation(task.path, part.robot.dimension)
+    require_orientation(task.path, scenario.path.orientation.task, part.robot.dimension)
     believed = part.belief.robot
     begin = cache(lambda: _start(scenario, task, part, workpiece))
     rest = cache(lambda: _rest(task, part, *begin()))
@@ -74,7 +73,7 @@ def build_station(
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     forces = add_surroundings(builder, part, task, scenario, around)
-    if needs_sensor(scenario):
+    if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
         forces |= add_sensor(builder, part, scenario, states | forces)
     controller, made = add_law(builder, following, place, forces)
@@ -101,9 +100,7 @@ def build_station(
         start.theta,
         on_motors,
         task.warnings
-        + part.start_warnings(
-            scenario.start, link_state[: part.robot.dimension], start.R_e is not None
-        )
+        + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),
         workpiece,
@@ -141,7 +138,7 @@ def _start(
     if workpiece is not None:
         shift = workpiece.start_shift(upwards(part.gravity, "notch"))
     start = task.start(shift)
-    q_J = part.posture(start.y_t, start.R_e, scenario.start)
+    q_J = part.posture(start.target, scenario.start)
     for position, where in task.way():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)

@@ -182,8 +182,10 @@ def _outside(scene: FaultScene) -> str:
 def _singular(scene: FaultScene) -> str:
     n, state = scene.robot.dimension, scene.now.measured_state
     q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
-    oriented = bool(scene.place.layout.oriented)
-    posture = singular_posture(scene.robot, q, oriented=oriented)
+    place = scene.place
+    posture = singular_posture(
+        scene.robot, q, oriented=place.layout.oriented, tool_axis=place.tool_axis
+    )
     A = _decoupling_matrix(scene)
     distance = float(np.linalg.norm(_beside(scene)))
     beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""

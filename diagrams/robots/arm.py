@@ -31,7 +31,7 @@ from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.inverse_kinematics import solve_pose
+from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -89,13 +89,11 @@ class Arm(RobotPart):
         """See :class:`RobotPart`."""
         return Drives(self.robot.D_M, step=self.model.time_step() or None)
 
-    def posture(
-        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
-    ) -> np.ndarray:
+    def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """See :class:`RobotPart`."""
-        self.check_reach(y_t, "start")
+        self.check_reach(target.y_t, "start")
         near = posture_near(start.posture_deg, self.robot)
-        return solve_pose(self.robot, y_t, R_e, near, "start")
+        return solve_pose(self.robot, target, near, "start")
 
     def check_reach(self, position: np.ndarray, where: str) -> None:
         """See :class:`RobotPart`; what is out of reach for other reasons has to be tried."""
@@ -108,9 +106,11 @@ class Arm(RobotPart):
                 f"robot reaches {reach:.4g} m at most"
             )
 
-    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+    def start_warnings(
+        self, start: StartParameters, q_J: np.ndarray, target: ToolTarget
+    ) -> list[str]:
         """See :class:`RobotPart`."""
-        return self.true.warnings + posture_warnings(start.posture_deg, self.robot, q_J, oriented)
+        return self.true.warnings + posture_warnings(start.posture_deg, self.robot, q_J, target)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""

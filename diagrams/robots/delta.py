@@ -34,6 +34,7 @@ from pfsc_drake.robot.delta.multibody import (
     slide_state_rows,
 )
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
 from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
@@ -74,11 +75,9 @@ class DeltaPart(RobotPart):
         inertia = np.full(self.robot.dimension, mass)
         return Drives(inertia, (friction.coulomb, friction.viscous), step)
 
-    def posture(
-        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
-    ) -> np.ndarray:
+    def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """See :class:`RobotPart`."""
-        return self.robot.joint_coordinates(y_t, "start")
+        return self.robot.joint_coordinates(target.y_t, "start")
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, Outpu
 from diagrams.robots.belief import Belief
 from diagrams.scenario import StartParameters
 from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
@@ -121,27 +122,26 @@ class RobotPart(ABC):
         """
 
     @abstractmethod
-    def posture(
-        self, y_t: np.ndarray, R_e: np.ndarray | None, start: StartParameters
-    ) -> np.ndarray:
+    def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """Return joint coordinates that put the tool where it starts, shape (N,).
 
         Args:
-            y_t: Tool point [m], shape (3,).
-            R_e: Orientation of the tool, shape (3, 3), or None if it does not matter.
+            target: Where that is.
             start: What the scenario says of it.
 
         Raises:
             InputError: If it is out of reach.
         """
 
-    def start_warnings(self, start: StartParameters, q_J: np.ndarray, oriented: bool) -> list[str]:
+    def start_warnings(
+        self, start: StartParameters, q_J: np.ndarray, target: ToolTarget
+    ) -> list[str]:
         """Return what there is to say about the robot and its start, one sentence each.
 
         Args:
             start: What the scenario says of the start.
             q_J: Joint coordinates found, shape (N,).
-            oriented: Whether the tool's orientation mattered.
+            target: Where the tool starts.
         """
         return []
 

@@ -4,8 +4,7 @@ import numpy as np
 
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
-from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.robot.inverse_kinematics import UNLIMITED, ToolTarget, solve_pose
 from pfsc_drake.robot.serial.chain import SerialChain
 
 # from where on a posture that was found is another one than the posture given
@@ -14,7 +13,7 @@ _FAR_SLIDE = 0.3  # m
 
 
 def posture_warnings(
-    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
+    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, target: ToolTarget
 ) -> list[str]:
     """Return what is odd about a given start posture, one sentence each.
 
@@ -22,7 +21,7 @@ def posture_warnings(
         posture_deg: As the scenario gives it; empty for none.
         chain: The robot.
         q_J: The start posture found from there, shape (N,) [rad or m].
-        oriented: Whether the pose that was looked for has an orientation.
+        target: Where the tool starts.
     """
     if not posture_deg:
         return []
@@ -32,7 +31,7 @@ def posture_warnings(
     if distance.max() <= 1.0:
         return []
     found = posture_text(chain, q_J)
-    if _fits_in_radians(posture_deg, chain, q_J, oriented):
+    if _fits_in_radians(posture_deg, chain, target):
         return [
             f"start.posture_deg: {posture_deg} looks like radians; the robot starts at {found}: "
             f"write [{_written(is_angle, np.array(posture_deg))}]"
@@ -50,19 +49,15 @@ def _written(is_angle: np.ndarray, q: np.ndarray) -> str:
     return ", ".join(f"{value:.4g}" for value in np.where(is_angle, np.rad2deg(q), q))
 
 
-def _fits_in_radians(
-    posture_deg: list[float], chain: SerialChain, q_J: np.ndarray, oriented: bool
-) -> bool:
+def _fits_in_radians(posture_deg: list[float], chain: SerialChain, target: ToolTarget) -> bool:
     """Return whether the same digits, as radians, are next to a solution of their own."""
     angles = np.array([link.is_revolute for link in chain.links])
     as_radians = np.array(posture_deg)
     turns = np.abs(as_radians[angles]).max(initial=0.0)
     if not 0.0 < turns <= 2.0 * np.pi:
         return False
-    pose = np.array(pose_function(chain)(q_J)).ravel()
-    R_e = pose[3:].reshape(3, 3) if oriented else None
     try:
-        solution = solve_pose(chain, pose[:3], R_e, as_radians, "start")
+        solution = solve_pose(chain, target, as_radians, "start")
     except InputError:
         return False
     return bool(np.all(np.abs(solution - as_radians)[angles] < np.deg2rad(_FAR_DEG)))

@@ -44,7 +44,7 @@ class ComplianceParameters:
         observed: How they are observed.
         tangential: Of eta.
         transversal: Of xi_1 and xi_2.
-        rotational: Of the three angles; oriented paths only.
+        rotational: Of the angles, three or those of the tool's axis; oriented paths only.
         with_turning: Whether torques act along eta where the path's orientation turns.
     """
 

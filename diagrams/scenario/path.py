@@ -4,10 +4,14 @@ import dataclasses as dc
 import math
 from typing import Union
 
+import numpy as np
+
 from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
+from pfsc_drake.geometry.rotation import rotation_to_axis
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 
 _SHORTEST_TOLERANCE = 1e-7  # m
+TASKS = ("full", "tool_axis", "none")
 
 
 def _require_place(key: str, values: list[float]) -> None:
@@ -145,13 +149,26 @@ class OrientationParameters:
         convention: ``zyx`` (2.7) or ``zyz`` (2.6).
         keyframes: Orientations to interpolate; one alone is kept everywhere; on a
             closed path the first is repeated at the end.
+        task: What of it the tool follows: ``full``, all that the path has; ``tool_axis``, the
+            direction of an axis of the tool, about which it may turn as it likes; ``none``.
+        tool_axis: The axis, in the tool frame, of any length.
     """
 
     convention: str = "zyx"
     keyframes: list[Keyframe] = dc.field(default_factory=list)
+    task: str = "full"
+    tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+
+    @property
+    def axis(self) -> np.ndarray | None:
+        """The axis that alone matters, of length one, shape (3,), or None."""
+        return rotation_to_axis(self.tool_axis)[:, 0] if self.task == "tool_axis" else None
 
     def __post_init__(self) -> None:
         require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
+        require(self.task in TASKS, "task", self.task, ", ".join(TASKS))
+        require_numbers("tool_axis", self.tool_axis, 3)
+        require(any(self.tool_axis), "tool_axis", self.tool_axis, "3 numbers, not all zero")
         for i, keyframe in enumerate(self.keyframes):
             key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
             require_numbers(key, angles, 3)

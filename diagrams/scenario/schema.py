@@ -109,3 +109,9 @@ class Scenario:
         require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:
             require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))
+
+    @property
+    def needs_sensor(self) -> bool:
+        """Whether something acts on measured forces."""
+        measured = self.controller.external_torque.source == "measured"
+        return measured or self.compliance.needs_sensor

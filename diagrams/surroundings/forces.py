@@ -86,8 +86,9 @@ def _scripted(
     pulse = scenario.hold_back
     if pulse.force != 0.0:
         manifold = task.place
-        allowed = "0 without a path with orientation and six axes"
-        require(manifold.layout.oriented, "hold_back.force", pulse.force, allowed)
+        allowed = "0 unless six axes follow a path with all of its orientation"
+        square = len(manifold.coordinates) == part.robot.dimension == 6
+        require(square, "hold_back.force", pulse.force, allowed)
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
         brake = builder.AddNamedSystem(
             "hold_back", DecoupledForce(part.robot, manifold, shape, period)

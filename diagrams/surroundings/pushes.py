@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, ZeroOrderHold
 
-from diagrams.robots.arm import Arm
+from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, Scenario
 from diagrams.tasks.task import Task
@@ -96,21 +96,31 @@ def _pushes(part: RobotPart, scenario: Scenario) -> list[_Push]:
                 push.pulses.append(pulse)
                 break
         else:
-            place = _place(part, f"forces[{i}]", pulse.link, pulse.point)
+            place = _place(part, scenario, f"forces[{i}]", pulse.link, pulse.point)
             scripted.append(_Push(place, [pulse]))
     hands = [
-        _Push(_place(part, f"pushes[{i}]", hand.link, hand.point), [], hand)
+        _Push(_place(part, scenario, f"pushes[{i}]", hand.link, hand.point), [], hand)
         for i, hand in enumerate(scenario.pushes)
     ]
     return scripted + hands
 
 
-def _place(part: RobotPart, where: str, link: str, point: np.ndarray) -> LinkPlace:
+def _place(
+    part: RobotPart, scenario: Scenario, where: str, link: str, point: np.ndarray
+) -> LinkPlace:
     if not isinstance(part, Arm):
         raise InputError(
             f"{where}.link = '{link}'; allowed: none, this robot is pushed at its tool"
         )
     try:
-        return place_on_link(part.model, part.coordinates, link, point)
+        place = place_on_link(part.model, part.coordinates, link, point)
     except InputError as error:
         raise InputError(f"{where}.link = {error}") from None
+    # what a sensor behind the last joint bears is told for forces on the tool point alone
+    last = place.link == part.robot.dimension - 1
+    if last and scenario.needs_sensor and isinstance(part, CoupledArm):
+        raise InputError(
+            f"{where}.link = '{link}' with robot.rotor_coupling and a force sensor; allowed: links "
+            "before the last, or no link, for the tool point"
+        )
+    return place

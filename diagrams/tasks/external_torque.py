@@ -16,12 +16,6 @@ _SEEN = {
 _SYSTEMS = {"tau_ext": "external_torque", "posture_torque": "external_torque_of_posture"}
 
 
-def needs_sensor(scenario: Scenario) -> bool:
-    """Return whether something in the scenario acts on measured forces."""
-    measured = scenario.controller.external_torque.source == "measured"
-    return measured or scenario.compliance.needs_sensor
-
-
 def add_external_torque(
     builder: DiagramBuilder,
     robot: RobotModel,

@@ -46,7 +46,7 @@ def law_warnings(
     causes = [
         *_fast_resonance(parameters, robot, link_state),
         *_fast_damping(parameters, robot),
-        *_soft_joints(parameters, robot, law, link_state),
+        *_soft_joints(scenario, robot, law, link_state),
     ]
     return [
         # where the law does not suit the robot, gains are not to blame
@@ -117,20 +117,23 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
 
 
 def _soft_joints(
-    parameters: ControllerParameters, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
+    scenario: Scenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
 ) -> list[str]:
     """Warn of joints that are too soft for a law that takes them for stiff."""
+    parameters, coordinates = scenario.controller, law.linearization.manifold.coordinates
     if parameters.law not in ("singular_perturbation", "rigid") or not robot.is_elastic:
         return []
     q_J = link_state[: robot.dimension]
-    joints = soft_joints(robot, q_J, law.linearization.num_outputs)
+    turns = any(coordinate.kind is Kind.ROTATIONAL for coordinate in coordinates)
+    axis = scenario.path.orientation.axis
+    joints = soft_joints(robot, q_J, oriented=turns, tool_axis=axis)
     if parameters.law == "rigid":
         softness = bending(joints)
         what = "acts on the motors, and bending joints let the tool leave the path"
     else:
-        softness = composite_law_error(
-            joints, np.array(parameters.boundary_layer_damping), _transversal_gains(law)
-        )
+        posture = None if law.posture is None else law.posture.stabilization.proportional
+        damping = np.array(parameters.boundary_layer_damping)
+        softness = composite_law_error(joints, damping, _transversal_gains(law), posture)
         what = "takes the joints for stiff, and lets the tool leave the path"
     resonance = joint_resonances(robot, q_J)[0] / (2.0 * np.pi)
     instead = "take the law 'elastic' or 'visco_elastic'"

@@ -34,13 +34,17 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.geometry.paths.smoothing import Progress
 
+_GIVE_ORIENTATION = (
+    "give the orientation too: columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
+    "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
+)
 _EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
 def make_path(
     parameters: PathParameters, law: str, folder: FilePath, progress: Progress | None = None
 ) -> Path:
-    """Return the path, smooth enough for the law.
+    """Return the path, smooth enough for the law, without an orientation that is no task.
 
     Args:
         parameters: What the scenario says.
@@ -58,39 +62,49 @@ def make_path(
     else:
         position = _position(shape)
         path = Path(position, _orientation(parameters.orientation, position, smoothness))
+    task = parameters.orientation.task
+    if task == "none" and path.orientation is not None:
+        path = Path(path.position, waypoints=path.waypoints)
+    if task == "tool_axis" and path.orientation is None:
+        raise InputError(
+            f"path.orientation.task = tool_axis: the path has no orientation; {_GIVE_ORIENTATION}"
+        )
     path.require_smoothness(smoothness, f"the law '{law}'")
     return path
 
 
-def require_orientation(path: Path, num_joints: int) -> None:
-    """Refuse a path that asks for more or less than a robot's joints can do.
+def require_orientation(path: Path, task: str, num_joints: int) -> None:
+    """Refuse a path that asks for more than a robot's joints can do, or for less by oversight.
 
     Args:
-        path: The path.
+        path: The path, from :func:`make_path`.
+        task: ``path.orientation.task`` of the scenario.
         num_joints: Of the robot.
 
     Raises:
-        InputError: If six joints have no orientation to follow, or there are too many or too
-            few joints.
+        InputError: If there are too few joints, or four or more that nothing tells to give up the
+            orientation.
     """
-    num_outputs = 3 if path.orientation is None else 6
-    if num_joints == 6 and path.orientation is None:
-        raise InputError(
-            f"path: {num_joints} joints for 3 outputs (position only); give the orientation too: "
-            "columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
-            "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
-        )
-    outputs = "position only" if num_outputs == 3 else "position and orientation"
-    if num_joints > num_outputs:
-        raise InputError(
-            f"path: {num_joints} joints for {num_outputs} outputs ({outputs}); "
-            f"hold {num_joints - num_outputs} of them: robot.fixed_joints: {{NAME: VALUE}}"
-        )
+    if path.orientation is None:
+        num_outputs, outputs = 3, "position only"
+    elif task == "tool_axis":
+        num_outputs, outputs = 5, "position and direction of the tool's axis"
+    else:
+        num_outputs, outputs = 6, "position and orientation"
+    said = f"path: {num_joints} joints for {num_outputs} outputs ({outputs})"
     if num_joints < num_outputs:
-        raise InputError(
-            f"path: {num_joints} joints for {num_outputs} outputs ({outputs}); 3 joints follow a "
-            "path without orientation, 6 one with"
-        )
+        ways = ["3 joints follow a path without orientation, 6 one with"]
+        if num_joints == 5:
+            ways.append("5 the direction of an axis: write path.orientation.task: tool_axis")
+        if num_joints >= 3:
+            ways.append("for a position only write path.orientation.task: none")
+        raise InputError("; ".join([said, *ways]))
+    if num_joints > 3 and path.orientation is None and task != "none":
+        ways = [_GIVE_ORIENTATION, "if none is meant, write path.orientation.task: none"]
+        if num_joints != 6:
+            hold = f"hold {num_joints - 3} of them: robot.fixed_joints: {{NAME: VALUE}}"
+            ways[-1] += f", or {hold}"
+        raise InputError("; ".join([said, *ways]))
 
 
 def _through_waypoints(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -19,6 +20,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix, shape_report, zyx_to_matrix
 from pfsc_drake.geometry.paths.smoothing import Progress
 from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint
 
@@ -53,9 +55,12 @@ class PathTask(Task):
         self.shape = shape_report(self.path)
         self.warnings = path_warnings(self.path, self.shape)
         self.relative_degree = RELATIVE_DEGREE[law]
-        oriented = self.path.orientation is not None
-        self.place = PathManifold(self.relative_degree, oriented=oriented)
-        self.manifold = self._law_manifold(self.relative_degree, oriented=oriented)
+        followed: dict[str, Any] = {
+            "oriented": self.path.orientation is not None,
+            "tool_axis": scenario.path.orientation.axis,
+        }
+        self.place = PathManifold(self.relative_degree, **followed)
+        self.manifold = self._law_manifold(self.relative_degree, **followed)
         self._check_points(reference.points)
         self.motion = rest_to_rest(
             reference.points,
@@ -114,11 +119,12 @@ class PathTask(Task):
         if self.path.orientation is not None:
             deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
-        return StartPoint(y_t, projection.theta, R_e)
+        target = ToolTarget(y_t, R_e, self.place.tool_axis)
+        return StartPoint(target, projection.theta)
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
-        return self.path.evaluator(self.relative_degree)(start.y_t.tolist(), start.theta)
+        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.theta)
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """See :class:`Task`."""

@@ -11,6 +11,7 @@ from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.physics.hand_model import Place
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.path_projector import PathProjector
 
 
@@ -19,14 +20,12 @@ class StartPoint:
     """Where the tool starts, beside the manifold.
 
     Attributes:
-        y_t: Tool point [m], shape (3,).
+        target: Tool point and what of its orientation matters.
         theta: Parameter of the nearest point of the manifold.
-        R_e: Orientation of the tool, shape (3, 3), or None where it does not matter.
     """
 
-    y_t: np.ndarray
+    target: ToolTarget
     theta: float
-    R_e: np.ndarray | None
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import matplotlib
 
 from experiments.figures.coordinates import (
     draw_angles,
+    draw_axis,
     draw_orientation,
     draw_progress,
     draw_transversal,
@@ -70,6 +71,7 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("xi"), draw_transversal),
     (_has("phi"), draw_orientation),
     (_has("angles_e", "angles_d"), draw_angles),
+    (_has("axis_e", "axis_d"), draw_axis),
     (has_forces, draw_forces),
     (_has("notch_position"), draw_notch_position),
     (has_pushes, draw_pushes),

@@ -21,6 +21,7 @@ from experiments.figures.style import (
     scale_to_late,
 )
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.geometry import angle_between
 
 MILLI = 1e3
 FLOOR = 1e-9  # m or rad; zero has no place on a logarithmic axis
@@ -105,11 +106,15 @@ def draw_transversal(log: RunLog) -> Drawing:
 def draw_orientation(log: RunLog) -> Drawing:
     """Orientation errors: components with references and, on a logarithmic scale, their norm."""
     canvas, panels = make_panels(3 if _is_used(log, "phi_p") else 2)
+    of_axis = log["phi"].dim == 2
     labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
-    if log["phi"].dim != 3:
-        labels = log["phi"].labels
+    if of_axis:
+        labels = [r"$\varphi$", r"$\vartheta$"]
     error = _draw_with_references(panels[0], log, "phi", r"\phi", labels)
-    name = "Orientation error" if error is None else "Orientation relative to the path"
+    subject = "Orientation of the tool's axis" if of_axis else "Orientation"
+    name = f"{subject} relative to the path"
+    if error is None:
+        name = "Error of the tool's axis" if of_axis else "Orientation error"
     panels[0].set(ylabel="angle in mrad", title=name)
     sizes = {r"$\|\phi\|$": log["phi"].values}
     if error is not None:
@@ -120,7 +125,12 @@ def draw_orientation(log: RunLog) -> Drawing:
     _draw_sizes(panels[-1], log.time, sizes, "Size of the angles")
     shade_pushes(panels, log)
     place_legend(panels[0])
-    caption = "ZYX angles of the tool against the orientation that belongs to its place"
+    caption = (
+        "Angles by which the tool's axis is turned away from the direction that belongs to its"
+        " place, about two directions across it; the turn about the axis is free"
+        if of_axis
+        else "ZYX angles of the tool against the orientation that belongs to its place"
+    )
     caption += "." if error is None else ", over the reference that yields to torques (broad)."
     return Drawing("orientation", name, caption, canvas)
 
@@ -147,6 +157,30 @@ def draw_angles(log: RunLog) -> Drawing:
         " tool on the path and waits where the tool waits."
     )
     return Drawing("angles", "Orientation of tool and reference", caption, canvas)
+
+
+def draw_axis(log: RunLog) -> Drawing:
+    """Direction of the tool's axis over that of its reference, and the angle between them."""
+    tool, path = log["axis_e"].values, log["axis_d"].values
+    canvas, (direction, between) = make_panels(2)
+    draw_reference(direction, log.time, path, "reference")
+    draw_components(direction, log.time, tool, log["axis_e"].labels)
+    direction.set(ylabel="component", title="Direction of the tool's axis in the world")
+    angle = angle_between(tool, path)
+    between.set(ylabel="angle in mrad")
+    _draw_sizes(between, log.time, {"and its reference": angle[:, None]}, "Angle between the axis")
+    shade_pushes([direction, between], log)
+    place_legend(direction)
+    waits = (
+        "belongs to a point that moves with time and runs on, whatever holds the tool."
+        if "tracking_error" in log
+        else "belongs to the place of the tool on the path and waits where the tool waits."
+    )
+    caption = (
+        "Axis of the tool, about which it may turn as it likes, and the direction that it is to"
+        f" have, which {waits}"
+    )
+    return Drawing("axis", "Direction of the tool's axis and its reference", caption, canvas)
 
 
 def _whole_turns(difference: FloatArray) -> FloatArray:

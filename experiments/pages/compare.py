@@ -1,5 +1,6 @@
 """Several runs on one page."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -30,6 +31,11 @@ _COMPARED = (
     "max_external_force",
 )
 _NEEDED = ("xi", "eta", "eta_p")
+# title, label and factor of what tells orientations in a log
+_ORIENTATIONS = {
+    "angles": ("Angle about {}", "angle in deg", math.degrees(1.0)),
+    "axis": ("Axis of the tool, along {}", "component", 1.0),
+}
 
 
 def write_comparison(folders: Sequence[Path], out: Path) -> Report:
@@ -61,8 +67,9 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
     inputs = [folder / name for folder in folders for name in ("log.h5", "metrics.json")]
     with open_results(out, "comparison", inputs) as results:
         figures = [_deviations(logs)]
-        if all("angles_e" in log for log in logs.values()):
-            figures.append(_orientations(logs))
+        for kind in _ORIENTATIONS:
+            if all(f"{kind}_e" in log for log in logs.values()):
+                figures.append(_orientations(logs, kind))
         if all("orientation_lead" in log for log in logs.values()):
             figures.append(_leads(logs))
         if all("wrench_ext" in log for log in logs.values()):
@@ -148,18 +155,17 @@ def _draw_one(
         return render(Drawing(*named, canvas))
 
 
-def _orientations(logs: dict[str, RunLog]) -> Figure:
+def _orientations(logs: dict[str, RunLog], kind: str) -> Figure:
+    title, ylabel, factor = _ORIENTATIONS[kind]
+    first = next(iter(logs.values()))
     with plt.rc_context(STYLE):
         canvas, panels = make_panels(3)
-        for i, (panel, axis) in enumerate(zip(panels, "zyx", strict=True)):
+        for i, (panel, axis) in enumerate(zip(panels, first[f"{kind}_e"].labels, strict=True)):
             for colour, (name, log) in zip(COLOURS, logs.items(), strict=False):
-                for signal, style, what in (
-                    ("angles_e", "-", "tool"),
-                    ("angles_d", "--", "reference"),
-                ):
-                    angle = np.rad2deg(log[signal].values[:, i])
-                    panel.plot(log.time, angle, style, color=colour, label=f"{name}, {what}")
-            panel.set(title=f"Angle about {axis}", ylabel="angle in deg")
+                for suffix, style, what in (("e", "-", "tool"), ("d", "--", "reference")):
+                    values = factor * log[f"{kind}_{suffix}"].values[:, i]
+                    panel.plot(log.time, values, style, color=colour, label=f"{name}, {what}")
+            panel.set(title=title.format(axis), ylabel=ylabel)
         place_legend(panels[0], columns=2)
         caption = (
             "Tool and the reference that each law compares it with. With path following the "

@@ -1,11 +1,11 @@
 """Metrics of a path following run, each a pure function of its log.
 
 Signals used, as in the log: ``xi`` [samples, 2] m, ``eta``, ``eta_p`` [samples, 1] m, ``eta_dot``
-m/s, ``phi`` [samples, 3] rad, ``tau_d`` [samples, axes] with attribute ``limits``,
-``saturated_drives`` and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or more], the first
-three in N along (eta, xi_1, xi_2), ``tared`` [samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N
-and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A metric over an
-interval that holds no sample is NaN.
+m/s, ``phi`` [samples, 3] rad, or [samples, 2] of an axis, ``tau_d`` [samples, axes] with attribute
+``limits``, ``saturated_drives`` and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or
+more], the first three in N along (eta, xi_1, xi_2), ``tared`` [samples, 1] 0 or 1, ``wrench_ext``
+[samples, 6] N and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A
+metric over an interval that holds no sample is NaN.
 """
 
 import math

@@ -2,7 +2,6 @@
 
 import numpy as np
 from pydrake.systems.framework import Context
-from scipy.spatial.transform import Rotation
 
 from diagrams.drawing.replay import RecordedMotion, RecordedPushes
 from diagrams.station import Station
@@ -12,13 +11,13 @@ from experiments.results.link_signals import (
     has_elbow,
     push_forces,
 )
+from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.manifolds.manifold import Kind, indices
-from pfsc_drake.geometry import PathPointLayout, matrix_to_zyx, quaternion_to_matrix
 from pfsc_drake.robot.robot_model import pose_function
 
 
@@ -63,7 +62,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     log.add("theta", points[:, station.task.place.layout.theta], "1")
     log.add("alpha", points[:, station.task.place.layout.alpha], "1")
     _add_manifold(log, station, raw, Y)
-    _add_orientation(log, station, raw["manifold_point"], points, pose)
+    add_orientation(log, station, raw["manifold_point"], points, pose)
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
     add_link_signals(log, station, raw)
@@ -231,41 +230,6 @@ def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) 
     function = virtual_output_function(station.robot, station.task.place).map(len(points))
     Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)
-
-
-def _rotations(
-    layout: PathPointLayout, pose: np.ndarray, point: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
-    finite = (np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))[:, None]
-    quaternion = np.where(finite, point[:, layout.quaternion][:, :4], [1.0, 0.0, 0.0, 0.0])
-    R_e = np.where(finite, pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
-    return R_e, quaternion_to_matrix(quaternion)
-
-
-def _add_orientation(
-    log: RunLog, station: Station, followed: np.ndarray, place: np.ndarray, pose: np.ndarray
-) -> None:
-    """Add the ZYX angles of the tool and of the reference that the law compares it with.
-
-    And how far that reference is away from the orientation that belongs to the tool's place.
-    """
-    linearization = station.law.linearization
-    if not station.task.place.layout.oriented:
-        return
-    point = followed if linearization.manifold.follows_time else place
-    R_e, R_d = _rotations(station.task.place.layout, pose, point)
-    _, R_place = _rotations(station.task.place.layout, pose, place)
-    unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
-    for name, R in {"angles_e": R_e, "angles_d": R_d}.items():
-        angles = np.unwrap(matrix_to_zyx(R), axis=0)
-        angles[unknown] = np.nan
-        log.add(name, angles, "rad", ["z", "y", "x"])
-    lead = np.full(len(place), np.nan)
-    if not unknown.all():
-        between = np.swapaxes(R_place, 1, 2) @ R_d
-        lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
-    log.add("orientation_lead", lead, "rad")
 
 
 def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:

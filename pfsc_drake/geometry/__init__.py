@@ -20,6 +20,7 @@ from pfsc_drake.geometry.paths.waypoint_file import WaypointTable, read_waypoint
 from pfsc_drake.geometry.paths.waypoints import Tolerance, path_from_waypoints
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
+    angle_between,
     check_rotation_matrix,
     matrix_to_quaternion,
     matrix_to_zyx,
@@ -27,6 +28,7 @@ from pfsc_drake.geometry.rotation import (
     quaternion_to_matrix,
     quaternion_to_zyx,
     quaternion_to_zyz,
+    rotation_to_axis,
     zyx_to_matrix,
     zyx_to_quaternion,
     zyz_to_matrix,
@@ -50,6 +52,7 @@ __all__ = [
     "ShapeReport",
     "Tolerance",
     "WaypointTable",
+    "angle_between",
     "check_rotation_matrix",
     "interpolate",
     "interpolate_orientation",
@@ -63,6 +66,7 @@ __all__ = [
     "quaternion_to_zyx",
     "quaternion_to_zyz",
     "read_waypoints",
+    "rotation_to_axis",
     "shape_report",
     "zyx_to_matrix",
     "zyx_to_quaternion",

@@ -150,6 +150,50 @@ def quaternion_to_zyz(quaternion: ArrayLike) -> np.ndarray:
     return matrix_to_zyz(quaternion_to_matrix(quaternion))
 
 
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angles between directions, accurate for small ones too.
+
+    Args:
+        a: Vectors of any length but zero, [..., 3].
+        b: The same.
+
+    Returns:
+        [...] rad, 0 to pi.
+    """
+    dot = np.einsum("...i,...i->...", a, b)
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), dot)
+
+
+def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
+    """Rotation of least angle that turns the x-axis to a direction.
+
+    Of two half turns, about the x-axis and about the middle between it and the direction. To the
+    opposite of the x-axis all ways are as long; that about the z-axis is taken.
+
+    Args:
+        axis: The direction, of any length but zero, [3].
+
+    Returns:
+        Rotation matrix [3, 3]; its first column is the direction, of length one.
+
+    Raises:
+        InputError: not three finite numbers, or all zero.
+    """
+    a = np.asarray(axis, dtype=float)
+    if a.shape != (3,) or not np.all(np.isfinite(a)) or not np.any(a):
+        raise InputError(f"axis: {a.tolist()}; 3 finite numbers, not all zero, are required")
+    a = a / np.abs(a).max()  # squares of huge or tiny numbers are none
+    a = a / np.linalg.norm(a)
+    across = a[1] ** 2 + a[2] ** 2
+    # 1 + cos(angle), without cancellation where the angle is obtuse
+    middle = np.array([1.0 + a[0] if a[0] >= 0.0 else across / (1.0 - a[0]), a[1], a[2]])
+    if not np.any(middle):
+        middle[1] = 1.0
+    middle = middle / np.abs(middle).max()
+    half_turn = 2.0 * np.outer(middle, middle) / (middle @ middle) - np.eye(3)
+    return half_turn * [1.0, -1.0, -1.0]
+
+
 def check_rotation_matrix(matrix: ArrayLike, name: str = "rotation matrix") -> np.ndarray:
     """Rotation matrices as an array, if they are orthonormal with determinant +1.
 

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
+from pfsc_drake.geometry import rotation_to_axis
 from pfsc_drake.robot.robot_model import RobotModel
 
 # of the largest component of a vector, from which on a component counts
@@ -19,9 +20,10 @@ class SingularPosture:
     Attributes:
         rcond: Smallest over largest singular value of the tool's Jacobian, lengths in units of
             ``length``, by how much at most one joint alone moves the tool point.
-        free: The motion of the joints that moves the tool least, shape (N,), of norm 1.
+        free: The motion of the joints that moves the tool least, shape (N,), of norm 1; on robots
+            with more joints than the tool needs, of those across what never moves it.
         cause: By how much each joint changes the smallest singular value, shape (N,).
-        jacobian: The Jacobian, shape (6, N), or (3, N) without orientation.
+        jacobian: The Jacobian, shape (m, N), see :func:`task_jacobian`.
         length: Unit of length [m].
     """
 
@@ -30,6 +32,11 @@ class SingularPosture:
     cause: np.ndarray
     jacobian: np.ndarray
     length: float
+
+    @property
+    def is_redundant(self) -> bool:
+        """Whether there are more joints than the tool needs."""
+        return self.jacobian.shape[1] > len(self.jacobian)
 
     @property
     def free_joints(self) -> list[int]:
@@ -62,7 +69,35 @@ def tool_jacobian(robot: RobotModel, q: ca.SX) -> ca.SX:
     return ca.densify(ca.vertcat(ca.jacobian(y, q), ca.horzcat(*columns)))
 
 
-def singular_posture(robot: RobotModel, q: np.ndarray, *, oriented: bool) -> SingularPosture:
+def task_jacobian(
+    robot: RobotModel, q: ca.SX, *, oriented: bool, tool_axis: np.ndarray | None = None
+) -> ca.SX:
+    """Return the rows of the tool's Jacobian that matter.
+
+    Args:
+        robot: The robot.
+        q: Joint coordinates, shape (N, 1).
+        oriented: Whether the tool's orientation matters.
+        tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
+
+    Returns:
+        Shape (6, N), (3, N) without orientation, or with an axis (5, N): the angular velocity
+        then is that about two directions across the axis, which turn with the tool.
+    """
+    J = tool_jacobian(robot, q)
+    if not oriented:
+        return J[:3, :]
+    if tool_axis is None:
+        return J
+    still = [jets.constant(q[i], 1) for i in range(robot.dimension)]
+    R_e = robot.tool_pose(still)[1].coefficients[0]
+    across = R_e @ rotation_to_axis(tool_axis)[:, 1:]
+    return ca.densify(ca.vertcat(J[:3, :], across.T @ J[3:, :]))
+
+
+def singular_posture(
+    robot: RobotModel, q: np.ndarray, *, oriented: bool, tool_axis: np.ndarray | None = None
+) -> SingularPosture:
     """Return how close a posture is to a singular one, and through which joints.
 
     With the singular vectors ``u' J v = s`` of the smallest singular value ``s`` of the scaled
@@ -70,19 +105,22 @@ def singular_posture(robot: RobotModel, q: np.ndarray, *, oriented: bool) -> Sin
     ``ds/dq_k = u' (dJ/dq_k) v`` tells which joints lead into the singularity and out of it.
 
     Args:
-        robot: A robot with as many joints as the tool has coordinates.
+        robot: A robot with at least as many joints as the tool needs, N >= m.
         q: Joint coordinates, shape (N,).
         oriented: Whether the tool's orientation matters.
+        tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
     """
-    symbol, rows = ca.SX.sym("q", robot.dimension), 6 if oriented else 3
-    expression = tool_jacobian(robot, symbol)[:rows, :]
+    symbol = ca.SX.sym("q", robot.dimension)
+    expression = task_jacobian(robot, symbol, oriented=oriented, tool_axis=tool_axis)
+    rows = expression.shape[0]
     J = np.array(ca.Function("J", [symbol], [expression])(q))
     length = float(np.max(np.linalg.norm(J[:3], axis=0)))
     scale = np.array([1.0 / length] * 3 + [1.0] * (rows - 3))
     u, s, v = np.linalg.svd(scale[:, None] * J)
-    least = ca.dot(ca.DM(scale * u[:, -1]), expression @ ca.DM(v[-1]))
+    free = v[rows - 1]
+    least = ca.dot(ca.DM(scale * u[:, -1]), expression @ ca.DM(free))
     slope = ca.Function("slope", [symbol], [ca.densify(ca.gradient(least, symbol))])
-    return SingularPosture(float(s[-1] / s[0]), v[-1], np.array(slope(q)).ravel(), J, length)
+    return SingularPosture(float(s[-1] / s[0]), free, np.array(slope(q)).ravel(), J, length)
 
 
 def _large(vector: np.ndarray) -> list[int]:

@@ -22,7 +22,7 @@ from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.inverse_kinematics import solve_pose
+from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 
 STIFFNESS = 500.0
@@ -188,7 +188,8 @@ def shifted(station, shift):
     plant.SetPositionsAndVelocities(context, station.initial_state)
     X_WT = part.tool.CalcPoseInWorld(context)
     near = (part.coordinates.link_rows @ station.initial_state)[: part.robot.dimension]
-    q = solve_pose(part.robot, X_WT.translation() + shift, X_WT.rotation().matrix(), near, "here")
+    target = ToolTarget(X_WT.translation() + shift, X_WT.rotation().matrix())
+    q = solve_pose(part.robot, target, near, "here")
     return part.state_at_rest(q)
 
 

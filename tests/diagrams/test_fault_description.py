@@ -189,3 +189,17 @@ def test_a_robot_without_names(load_scenario):
     sentence = describe(Fault.SINGULAR, scene)
     assert sentence.startswith(f"robot singular at eta = {settings.reference.points[0]:.4g} m")
     assert "q_1 = 0.1781 m" in sentence or "q_2 = 0.186 m" in sentence or "q_3" in sentence
+
+
+@pytest.mark.parametrize(("num_joints", "name"), [(5, "robot"), (6, "wrist")])
+def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
+    """The fourth joint turns nothing but the tool about its axis where both are in line."""
+    if num_joints == 5:
+        through_the_wrist.robot.fixed_joints = {"joint_6": 0.0}
+    through_the_wrist.path.orientation.task = "tool_axis"
+    posture = [0, 105, -25, 0, 25, 0][:num_joints]
+    through_the_wrist.start = StartParameters(posture_deg=posture)
+    station, root = run(through_the_wrist, 1.0)
+    sentence = station.fault(root)
+    assert sentence.startswith(f"{name} singular at eta = 0.")
+    assert "q_5 = " in sentence and "(q_4 can move without the tool)" in sentence

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
+    angle_between,
     check_rotation_matrix,
     matrix_to_quaternion,
     matrix_to_zyx,
@@ -16,6 +17,7 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     quaternion_to_zyx,
     quaternion_to_zyz,
+    rotation_to_axis,
     zyx_to_matrix,
     zyx_to_quaternion,
     zyz_to_matrix,
@@ -106,3 +108,36 @@ def test_errors() -> None:
         zyx_to_matrix([1.0, 2.0])
     with pytest.raises(InputError, match="finite"):
         zyz_to_matrix([1.0, np.inf, 0.0])
+
+
+@given(st.lists(st.floats(-1e200, 1e200), min_size=3, max_size=3).filter(any))
+def test_least_rotation_to_an_axis(axis):
+    C = rotation_to_axis(axis)
+    np.testing.assert_allclose(C.T @ C, np.eye(3), rtol=0, atol=1e-14)
+    assert np.linalg.det(C) > 0.0
+    direction = np.array(axis) / np.abs(axis).max()
+    direction /= np.linalg.norm(direction)
+    np.testing.assert_allclose(C[:, 0], direction, rtol=0, atol=1e-14)
+    # the angle of the rotation is that between the axes, not more
+    least = angle_between(np.array([1.0, 0.0, 0.0]), direction)
+    angle = math.atan2(np.linalg.norm([C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]]),
+                       np.trace(C) - 1.0)  # fmt: skip
+    assert angle == pytest.approx(least, abs=1e-7)
+
+
+def test_rotations_to_the_axes_of_the_frame():
+    np.testing.assert_array_equal(rotation_to_axis([5.0, 0.0, 0.0]), np.eye(3))
+    np.testing.assert_array_equal(rotation_to_axis([-1.0, 0.0, 0.0]), np.diag([-1.0, -1.0, 1.0]))
+    np.testing.assert_array_equal(rotation_to_axis([0, 0, 1]), [[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 0.0], [1.0, 0.0], [1.0, math.nan, 0.0]])
+def test_no_axis(axis):
+    with pytest.raises(InputError, match="3 finite numbers, not all zero"):
+        rotation_to_axis(axis)
+
+
+def test_small_angles_between_directions():
+    for angle in (1e-9, 0.3, 3.0, math.pi - 1e-9):
+        turned = 7.0 * _rz(angle) @ [1.0, 0.0, 0.0]
+        assert angle_between(np.array([1.0, 0.0, 0.0]), turned) == pytest.approx(angle, rel=1e-12)

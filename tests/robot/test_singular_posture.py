@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.robot.robot_model import pose_function
-from pfsc_drake.robot.singular_posture import singular_posture, tool_jacobian
+from pfsc_drake.robot.singular_posture import singular_posture, task_jacobian, tool_jacobian
 
 GENERIC = np.array([0.3, -0.4, 1.1, 0.5, 0.8, -0.7])
 
@@ -50,3 +50,41 @@ def test_slopes_of_the_smallest_singular_value(shoulder_and_elbow, spherical_wri
     assert np.abs(slopes).max() > 0.1
     assert found.rcond == pytest.approx(s[-1] / s[0], rel=1e-6)
     assert found.length == pytest.approx(np.linalg.norm(found.jacobian[:3], axis=0).max())
+
+
+AXIS = np.array([0.6, 0.0, 0.8])
+
+
+def test_rows_of_an_axis(spherical_wrist):
+    """They give the speed of the axis' tip, and nothing of turns about it."""
+    q, pose = ca.SX.sym("q", 6), pose_function(spherical_wrist)
+    expression = task_jacobian(spherical_wrist, q, oriented=True, tool_axis=AXIS)
+    J = np.array(ca.Function("J", [q], [expression])(GENERIC))
+    full, R_e = differences(pose, GENERIC), np.array(pose(GENERIC)).ravel()[3:].reshape(3, 3)
+    assert J.shape == (5, 6)
+    np.testing.assert_allclose(J[:3], full[:3], atol=1e-8)
+    for rates, turn in zip(J[3:].T, full[3:].T, strict=True):
+        tip = np.cross(turn, R_e @ AXIS)
+        assert np.linalg.norm(rates) == pytest.approx(np.linalg.norm(tip), abs=1e-8)
+
+
+@pytest.mark.parametrize("axis", [None, AXIS])
+def test_slopes_with_more_joints_than_the_tool_needs(make_chain, spherical_wrist, axis):
+    robot, q = spherical_wrist, GENERIC
+    found = singular_posture(robot, q, oriented=axis is not None, tool_axis=axis)
+    assert found.is_redundant
+    symbol = ca.SX.sym("q", 6)
+    J = task_jacobian(robot, symbol, oriented=axis is not None, tool_axis=axis)
+    scale = np.ones(J.shape[0])
+    scale[:3] = 1.0 / found.length
+    function = ca.Function("J", [symbol], [J])
+
+    def least(q):
+        return np.linalg.svd(scale[:, None] * np.array(function(q)))[1][-1]
+
+    h = 1e-5
+    slopes = [(least(q + step) - least(q - step)) / (2.0 * h) for step in h * np.eye(6)]
+    np.testing.assert_allclose(found.cause, slopes, atol=1e-7)
+    # the motion is that of the singular value, not one that never moves the tool
+    moved = np.linalg.norm(scale * (found.jacobian @ found.free))
+    assert moved == pytest.approx(least(q), rel=1e-9)

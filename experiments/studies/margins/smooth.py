@@ -10,7 +10,6 @@ from diagrams.scenario import (
     SensorFailureParameters,
 )
 from diagrams.scenario.model_error import ModelErrorParameters
-from diagrams.tasks.external_torque import needs_sensor
 
 
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
@@ -40,7 +39,7 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     if any(encoders.link_increments) or any(encoders.motor_increments):
         result.encoders.link_increments, result.encoders.motor_increments = [], []
         removed.append("increments of the encoders")
-    if needs_sensor(settings) and any(settings.sensor.noise):
+    if settings.needs_sensor and any(settings.sensor.noise):
         result.sensor.noise = 0.0 * settings.sensor.noise
         removed.append("noise of the force sensor")
     if result.hand is not None and result.hand.tremor > 0.0:

@@ -3,18 +3,18 @@
 import casadi as ca
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.path import (
-    PathGeometry,
-    PathManifold,
-    orientation_error,
-    transported,
+from pfsc_drake.control.manifolds.orientation import orientation_error
+from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported
+from pfsc_drake.control.manifolds.path_force import (
+    force_components,
+    rotational_force,
+    torque_across_axis,
 )
-from pfsc_drake.control.manifolds.path_force import force_components, rotational_force
 from pfsc_drake.jets import Jet
 
 
 def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[Jet]:
-    """Return the errors ``y_t - sigma_t(theta_d(t))`` and the ZYX angles of ``R_d' R_e``.
+    """Return the errors ``y_t - sigma_t(theta_d(t))`` and the angles of ``R_d' R_e``.
 
     The classical counterpart of the path coordinates (Sec. 3.8.4): the reference point
     is given by time, ``theta_d' = eta_d' / |sigma'|``, whatever the tool does. The errors are
@@ -28,8 +28,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
         eta_d: Arc length of the reference point over time [m], scalar jet of order r.
 
     Returns:
-        3 or 6 scalar jets of order r [m, m, m, rad, rad, rad]: along the tangent and the two
-        normals of the reference point, and angles.
+        3, 5 or 6 scalar jets of order r [m, m, m, rad, rad, rad]: along the tangent and the two
+        normals of the reference point, and angles, see :func:`orientation_error`.
     """
 
     def rate(theta: Jet) -> Jet:
@@ -45,7 +45,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     position = [jets.dot(axis, error) for axis in axes]
     if not path.quaternion:
         return position
-    return [*position, *orientation_error(R_e, jets.compose(path.quaternion, theta_d))]
+    q_d = jets.compose(path.quaternion, theta_d)
+    return [*position, *orientation_error(R_e, q_d, path.alignment)]
 
 
 class MovingPoint(PathManifold):
@@ -69,5 +70,8 @@ class MovingPoint(PathManifold):
         translational = force_components(wrench[:3], point, self.layout)
         if not self.layout.oriented:
             return translational
-        rotational = rotational_force(wrench[3:], point, self.layout, reference[3:6])
+        torque, phi = wrench[3:], reference[3:]
+        if self.alignment is not None:
+            torque = torque_across_axis(torque, point, self.layout, phi, self.alignment)
+        rotational = rotational_force(torque, point, self.layout, phi, self.alignment)
         return ca.vertcat(translational, rotational)

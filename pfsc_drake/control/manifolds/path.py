@@ -8,12 +8,15 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.orientation import orientation_error
 from pfsc_drake.control.manifolds.path_force import (
     rotational_force,
+    torque_across_axis,
     translational_force,
     turning_force,
 )
-from pfsc_drake.geometry import PathPointLayout
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PathPointLayout, rotation_to_axis
 from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
 
@@ -38,12 +41,15 @@ class PathGeometry:
         quaternion: Quaternion (w, x, y, z) of the reference orientation, of any
             positive norm, and its derivatives by theta, orders 0..r, each (4, 1);
             empty for arms that have no orientation to follow.
+        alignment: Rotation whose first column is the axis of the tool that alone matters, shape
+            (3, 3), see :func:`orientation_error`; None if all of the orientation does.
     """
 
     eta: ca.SX
     normal: ca.SX
     position: Sequence[ca.SX]
     quaternion: Sequence[ca.SX]
+    alignment: np.ndarray | None = None
 
 
 def path_parameter(y: Jet, path: PathGeometry) -> Jet:
@@ -71,8 +77,8 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ``y_t - sigma`` on the parallel transport frame, whose derivatives are
     ``xi_i' = e_i . y_t'`` (3.16), (3.17); ``e_perp' = -(e_par' . e_perp) e_par``
     (3.4), primes being time derivatives. ``phi`` are the ZYX Euler angles of
-    ``R_d' R_e``, see (3.43)-(3.47); that the reference orientation moves with the
-    progress on the path sits in their derivatives.
+    ``R_d' R_e``, see (3.43)-(3.47), or the two of the tool's axis; that the reference
+    orientation moves with the progress on the path sits in their derivatives.
 
     Args:
         y: Tool point ``y_t`` [m], vector jet of order r >= 1.
@@ -80,7 +86,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
         path: The path at the projection of the tool point.
 
     Returns:
-        3 or 6 scalar jets of order r [m, m, m, rad, rad, rad].
+        3, 5 or 6 scalar jets of order r [m, m, m, rad, rad, rad].
     """
     theta = path_parameter(y, path)
     tangent = jets.compose(path.position[1 : y.order + 1], theta)
@@ -96,7 +102,8 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ]
     if not path.quaternion:
         return [eta, *xi]
-    return [eta, *xi, *orientation_error(R_e, jets.compose(path.quaternion, theta))]
+    q_d = jets.compose(path.quaternion, theta)
+    return [eta, *xi, *orientation_error(R_e, q_d, path.alignment)]
 
 
 def transported(normal: ca.SX, e_par: Jet) -> Jet:
@@ -107,65 +114,41 @@ def transported(normal: ca.SX, e_par: Jet) -> Jet:
     return jets.solve_ode(lambda e: -(e_par * jets.dot(turning, e)), normal, e_par.order)
 
 
-def orientation_error(R_e: Jet, q_d: Jet) -> list[Jet]:
-    """Return the ZYX angles (2.7) of ``R_d' R_e``, each from the ratio of two entries.
-
-    The norm of the quaternion scales all entries alike and cancels.
-
-    Args:
-        R_e: Tool orientation, matrix jet.
-        q_d: Quaternion (w, x, y, z) of the reference orientation, of any positive norm.
-
-    Returns:
-        3 scalar jets [rad].
-    """
-    R_d = quaternion_rotation(q_d)
-    x, z = R_d.T @ R_e[:, 0], R_d[:, 2]
-    horizontal = jets.sqrt(x[0] ** 2 + x[1] ** 2)
-    return [
-        jets.atan2(x[1], x[0]),
-        jets.atan2(-x[2], horizontal),
-        jets.atan2(jets.dot(z, R_e[:, 1]), jets.dot(z, R_e[:, 2])),
-    ]
-
-
-def quaternion_rotation(q: Jet) -> Jet:
-    """Return ``|q|^2 R(q)`` of a quaternion signal (w, x, y, z)."""
-    w, x, y, z = (q[i] for i in range(4))
-    ww, xx, yy, zz = w**2, x**2, y**2, z**2
-    xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
-    rows = [
-        [ww + xx - yy - zz, (xy - wz) * 2.0, (xz + wy) * 2.0],
-        [(xy + wz) * 2.0, ww - xx + yy - zz, (yz - wx) * 2.0],
-        [(xz - wy) * 2.0, (yz + wx) * 2.0, ww - xx - yy + zz],
-    ]
-    return Jet(
-        [
-            ca.vertcat(*[ca.horzcat(*[entry.coefficients[k] for entry in row]) for row in rows])
-            for k in range(q.order + 1)
-        ]
-    )
-
-
 class PathManifold:
     """A path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
-    Its coordinates are arc length, two transversal ones and, with orientation, ZYX angles.
+    Its coordinates are arc length, two transversal ones and, with orientation, the three ZYX
+    angles of the tool or the two of an axis of it, about which the tool may then turn as it likes.
 
     Args:
         order: Relative degree r of the law, 1 to 5.
         oriented: Whether the path has an orientation.
+        tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
+            shape (3,); None if the whole tool does.
+
+    Attributes:
+        alignment: Rotation whose first column is the axis, shape (3, 3), or None.
 
     Raises:
-        InputError: If the order is out of range.
+        InputError: If the order is out of range, or the axis has no direction, or no orientation
+            to follow.
     """
 
     name = "path"
     follows_time = False
 
-    def __init__(self, order: int, *, oriented: bool) -> None:
+    def __init__(self, order: int, *, oriented: bool, tool_axis: np.ndarray | None = None) -> None:
+        if tool_axis is not None and not oriented:
+            raise InputError(f"tool axis {list(tool_axis)}: the path has no orientation to follow")
         self.layout = PathPointLayout(order, oriented)
-        self.coordinates = (*_TRANSLATIONAL, *(_ROTATIONAL if oriented else ()))
+        self.alignment = None if tool_axis is None else rotation_to_axis(tool_axis)
+        angles = _ROTATIONAL if tool_axis is None else _ROTATIONAL[:2]
+        self.coordinates = (*_TRANSLATIONAL, *(angles if oriented else ()))
+
+    @property
+    def tool_axis(self) -> np.ndarray | None:
+        """The axis that alone follows the orientation, of length one, shape (3,), or None."""
+        return None if self.alignment is None else self.alignment[:, 0]
 
     def geometry(self, point: ca.SX) -> PathGeometry:
         """Return the parts of a path point as the maps need them."""
@@ -176,6 +159,7 @@ class PathManifold:
             normal=point[layout.normal],
             position=ca.vertsplit(point[layout.position], 3),
             quaternion=quaternion,
+            alignment=self.alignment,
         )
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
@@ -190,15 +174,19 @@ class PathManifold:
         Their power ``tau . yhat'`` is ``f . y_t' + mu . (omega - omega_d)``: the power of the
         wrench, the rotation being that relative to the path's orientation. With
         ``with_turning`` :func:`turning_force` is added to the tangential one; the power is then
-        ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``.
+        ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where
+        only an axis of the tool matters, all of this holds for torques across it; what acts about
+        it moves none of the coordinates and has no part in the forces.
         """
         force, torque, layout = wrench[:3], wrench[3:], self.layout
         translational = translational_force(force, point, layout)
         if not layout.oriented:
             return translational
+        if self.alignment is not None:
+            torque = torque_across_axis(torque, point, layout, reference[3:], self.alignment)
         if with_turning:
             translational[0] += turning_force(torque, point, layout)
-        rotational = rotational_force(torque, point, layout, reference[3:6])
+        rotational = rotational_force(torque, point, layout, reference[3:], self.alignment)
         return ca.vertcat(translational, rotational)
 
     def axes(self, point: np.ndarray) -> np.ndarray:

@@ -42,7 +42,8 @@ def singularity_name(chain: Linkage, q: np.ndarray, posture: SingularPosture) ->
     three joints, or with six of which the last three meet in a point. Of these a wrist
     is singular when axes 4 and 6 are in line, an elbow when it is stretched out or folded
     (joints 2 and 3 can then move, joint 1 cannot), and a shoulder when the centre of the
-    wrist, or the tool point, is on axis 1.
+    wrist, or the tool point, is on axis 1. Where there are more joints than the tool needs, a
+    wrist alone is recognized by the joints that can move.
 
     Args:
         chain: The chain.
@@ -62,6 +63,8 @@ def singularity_name(chain: Linkage, q: np.ndarray, posture: SingularPosture) ->
             return None
         if free <= _WRIST:
             return "wrist"
+        if posture.is_redundant:
+            return None
     if 0 in free:
         return "shoulder"
     return "elbow" if {1, 2} <= free else None

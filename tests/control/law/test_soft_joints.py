@@ -104,3 +104,23 @@ def test_bending_under_the_worst_acceleration(n):
     moved = np.linalg.norm((joints.J @ (torque / joints.K_s[:, None]))[:3], axis=0)
     assert moved.max() <= bending(joints) * (1.0 + 1e-12)
     assert moved.max() == pytest.approx(bending(joints), rel=1e-2)
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e5])
+def test_a_joint_that_the_tool_does_not_need(stiffness):
+    """It has no part in the error, and is held by gains of its own."""
+    needed, one = arm(3, stiffness), np.ones(1)
+    more = SoftJoints(
+        np.block([[needed.D_E, np.zeros((3, 1))], [np.zeros((1, 3)), 2.0]]),
+        np.append(needed.D_M, one),
+        np.append(needed.K_s, stiffness),
+        np.hstack([needed.J, np.zeros((3, 1))]),
+    )
+    damping = 300.0 * needed.D_M / needed.K_s
+    expected = composite_law_error(needed, damping, gains(3))
+    damping = np.append(damping, 300.0 / stiffness)
+    assert composite_law_error(more, damping, gains(3)) == np.inf
+    found = composite_law_error(more, damping, gains(3), gains(4))
+    assert 0.0 < expected < np.inf
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert bending(more) == pytest.approx(bending(needed), rel=1e-12)

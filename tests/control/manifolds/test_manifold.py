@@ -23,16 +23,20 @@ def test_coordinates_by_kind(oriented):
     assert all(c.kind.unit == "rad" for c in coordinates[3:])
 
 
-@pytest.mark.parametrize("oriented", [False, True])
-def test_force_of_a_moving_point_is_its_power(oriented):
+@pytest.mark.parametrize(
+    ("oriented", "axis"), [(False, None), (True, None), (True, [0.0, 0.6, 0.8])]
+)
+def test_force_of_a_moving_point_is_its_power(oriented, axis):
     """At rest, the power of a wrench is that of the force along the errors' rates."""
-    rng, manifold = np.random.default_rng(3), MovingPoint(1, oriented=oriented)
+    rng, manifold = np.random.default_rng(3), MovingPoint(1, oriented=oriented, tool_axis=axis)
     point = rng.uniform(-1.0, 1.0, manifold.layout.size)
     slope = point[manifold.layout.position][3:6]
     normal = np.cross(slope, rng.uniform(-1.0, 1.0, 3))
     point[manifold.layout.normal] = normal / np.linalg.norm(normal)
     twist, wrench = rng.uniform(-1, 1, 6), rng.uniform(-1, 1, 6)
     y_t, R_e = rng.uniform(-1, 1, 3), Rotation.random(random_state=3).as_matrix()
+    if axis is not None:
+        wrench[3:] -= R_e @ axis * (R_e @ axis @ wrench[3:])
     spin = np.cross(np.eye(3), twist[3:])
     y = Jet([ca.SX(y_t), ca.SX(twist[:3])])
     errors = manifold.virtual_output(

@@ -10,7 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, path_coordinates
-from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, quaternion_to_matrix
+from pfsc_drake.geometry import (
+    FourierCurve,
+    Path,
+    PiecewisePolynomialCurve,
+    quaternion_to_matrix,
+    rotation_to_axis,
+)
 from pfsc_drake.jets import Jet
 
 ORDER = 4
@@ -74,7 +80,7 @@ class ToolMotion:
         return pose[:3], pose[3:].reshape(3, 3, order="F")
 
 
-def jets_of_outputs(path, theta, motion, order=ORDER):
+def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
     """Return derivatives 0..order of the outputs, one row each."""
     evaluator = path.evaluator(order)
     point, layout = evaluator(motion.at(0.0)[0].tolist(), theta), evaluator.layout
@@ -84,13 +90,14 @@ def jets_of_outputs(path, theta, motion, order=ORDER):
         ca.SX(point[layout.normal]),
         [ca.SX(row) for row in point[layout.position].reshape(-1, 3)],
         [ca.SX(row) for row in quaternion],
+        alignment,
     )
     outputs = path_coordinates(motion.y.truncate(order), motion.R.truncate(order), geometry)
     rows = [[float(ca.evalf(y.derivative(k))) for y in outputs] for k in range(order + 1)]
     return np.array(rows), point
 
 
-def outputs_over_time(path, point, motion, times):
+def outputs_over_time(path, point, motion, times, alignment=None):
     """Return the outputs from root finding, quadrature and transport, one row per time."""
     curve, (theta, eta) = path.position, point[:2]
 
@@ -118,7 +125,9 @@ def outputs_over_time(path, point, motion, times):
         row = [eta + length, e_perp @ (y - sigma), np.cross(e_par, e_perp) @ (y - sigma)]
         if path.orientation is not None:
             R_d = quaternion_to_matrix(path.orientation.derivatives(s, 0)[0])
-            row += Rotation.from_matrix(R_d.T @ R_e).as_euler("ZYX").tolist()
+            C = np.eye(3) if alignment is None else alignment
+            angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX").tolist()
+            row += angles if alignment is None else angles[:2]
         rows.append(row)
     return np.array(rows)
 
@@ -127,10 +136,23 @@ def outputs_over_time(path, point, motion, times):
 def test_jets_are_derivatives_of_the_outputs(situation, seed):
     path, theta, offset = situation
     motion = ToolMotion(path, theta, np.asarray(offset), np.random.default_rng(seed))
-    jets, point = jets_of_outputs(path, theta, motion)
+    check_jets(path, theta, motion)
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [0.2, -0.4, 0.3]])
+def test_jets_of_an_axis_are_derivatives_of_the_outputs(oriented_path, axis):
+    motion = ToolMotion(
+        oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
+    )
+    check_jets(oriented_path, 2.45, motion, rotation_to_axis(axis))
+
+
+def check_jets(path, theta, motion, alignment=None):
+    jets, point = jets_of_outputs(path, theta, motion, alignment=alignment)
     degree = 14
     times = HALF_WINDOW * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    outputs = outputs_over_time(path, point, motion, times)
+    outputs = outputs_over_time(path, point, motion, times, alignment)
+    assert outputs.shape[1] == jets.shape[1]
     for i, samples in enumerate(outputs.T):
         fit = Chebyshev.fit(times, samples, degree, domain=[-HALF_WINDOW, HALF_WINDOW])
         for k, tolerance in enumerate(TOLERANCES):

@@ -14,18 +14,30 @@ from pfsc_drake.geometry import (
     PiecewisePolynomialCurve,
     ProjectionStatus,
     quaternion_to_matrix,
+    rotation_to_axis,
 )
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
 
 OFFSET = np.array([0.02, -0.03, 0.025])
 
 
-def manifold_force(wrench, point, layout, phi=None, *, with_turning=False):
+def manifold_force(wrench, point, layout, phi=None, *, with_turning=False, tool_axis=None):
     """Return the force along the coordinates for a reference with angles phi."""
-    manifold = PathManifold(layout.order, oriented=layout.oriented)
+    manifold = PathManifold(layout.order, oriented=layout.oriented, tool_axis=tool_axis)
     function = manifold_force_function(manifold, with_turning=with_turning)
     reference = np.concatenate([np.full(3, 0.7), [] if phi is None else phi])
     return np.array(function(wrench, point, reference)).ravel()
+
+
+def axis_output(virtual_output, C):
+    """Return the virtual output with the two angles of the axis ``C e_x``."""
+
+    def calc(path, y_t, R_e):
+        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX")
+        return np.append(virtual_output(path, y_t, R_e)[:3], angles[:2])
+
+    return calc
 
 
 def random_phi(rng):
@@ -77,6 +89,61 @@ def test_power_of_random_motions_off_the_path(oriented_path, virtual_output, the
         assert manifold_force(wrench, point, layout, phi) @ rates == pytest.approx(
             relative, abs=2e-8
         )
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [0.4, -0.2, 0.3]])
+def test_power_of_torques_across_an_axis(oriented_path, virtual_output, axis):
+    """What acts about the axis moves none of the coordinates, whatever they are."""
+    rng, C = np.random.default_rng(12), rotation_to_axis(axis)
+    for theta in (0.4, 2.5):
+        y_t, R_e, point, layout, _ = place(oriented_path, theta, rng)
+        output = axis_output(virtual_output, C)
+        phi = output(oriented_path, y_t, R_e)[3:]
+        assert np.abs(phi).min() > 0.01
+        wrench, twist = rng.uniform(-20, 20, 6), 0.3 * rng.uniform(-1, 1, 6)
+        about = R_e @ C[:, 0]
+        rates = output_rates(output, oriented_path, y_t, R_e, *np.split(twist, 2))
+        keys = {"tool_axis": axis, "with_turning": True}
+        tau = manifold_force(wrench, point, layout, phi, **keys)
+        across = wrench[3:] - about * (about @ wrench[3:])
+        power = wrench[:3] @ twist[:3] + across @ twist[3:]
+        assert tau @ rates == pytest.approx(power, abs=2e-8)
+        spin = np.append(np.zeros(3), 5.0 * about)
+        still = manifold_force(spin, point, layout, phi, **keys)
+        assert np.abs(still).max() < 1e-12
+        turned = output_rates(output, oriented_path, y_t, R_e, np.zeros(3), about)
+        assert np.abs(turned).max() < 1e-8
+
+
+def test_virtual_work_of_an_axis_with_the_jacobian_of_a_robot(
+    load_robot, oriented_path, virtual_output
+):
+    """A' tau = J_g' wrench of six joints and five coordinates, for torques across the axis."""
+    robot, C = load_robot("comau_racer_1_4"), rotation_to_axis([0.0, 0.0, 1.0])
+    rng = np.random.default_rng(8)
+    y_t, R_e, *_ = place(oriented_path, 1.1, rng)
+    q = robot.reach(y_t, R_e)
+    evaluator = oriented_path.evaluator(2)
+    point, layout = evaluator(y_t.tolist(), 1.1), evaluator.layout
+
+    def output(q):
+        pose = robot.tool_pose(np.concatenate([q, np.zeros(6)]))
+        return axis_output(virtual_output, C)(oriented_path, *pose)
+
+    h = 4e-4
+    A = np.array(
+        [
+            (8 * (output(q + d) - output(q - d)) - (output(q + 2 * d) - output(q - 2 * d))) / 12 / h
+            for d in h * np.eye(6)
+        ]
+    ).T
+    wrench = rng.uniform(-30.0, 30.0, 6)
+    wrench[3:] -= R_e[:, 2] * (R_e[:, 2] @ wrench[3:])
+    tau = manifold_force(
+        wrench, point, layout, output(q)[3:], with_turning=True, tool_axis=[0.0, 0.0, 1.0]
+    )
+    joint_torques = robot.jacobian(q).T @ np.concatenate([wrench[3:], wrench[:3]])
+    assert np.allclose(A.T @ tau, joint_torques, rtol=0, atol=1e-8)
 
 
 def test_virtual_work_with_the_jacobian_of_a_robot(load_robot, oriented_path, virtual_output):

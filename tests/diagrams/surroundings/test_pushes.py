@@ -141,6 +141,12 @@ def test_what_cannot_be_pushed_is_refused(three_axes, load_scenario):
     three_axes.forces, three_axes.pushes = [], [LinkHandParameters("base")]
     with pytest.raises(InputError, match=r"pushes\[0\]\.link = 'base' does not move .*link_1"):
         build_station(three_axes, SCENARIOS)
+    coupled = load_scenario("pfc_elastic_6r")
+    coupled.robot.rotor_coupling = "comau_racer_1_4"
+    coupled.controller.external_torque.source = "measured"
+    coupled.forces = [ForcePulse(link="tool")]
+    with pytest.raises(InputError, match=r"forces\[0\]\.link = 'tool' with robot\.rotor_coupling"):
+        build_station(coupled, SCENARIOS)
     delta = load_scenario("pfc_delta")
     delta.forces = [ForcePulse(link="link_2")]
     with pytest.raises(InputError, match=r"forces\[0\]\.link = 'link_2'; allowed: none"):

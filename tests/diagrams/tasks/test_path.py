@@ -32,8 +32,8 @@ def write_csv(folder, columns, rows, name="points.csv"):
     return name
 
 
-def make(shape, keyframes=(), law="elastic", folder=None, convention="zyx"):
-    orientation = OrientationParameters(convention, list(keyframes))
+def make(shape, keyframes=(), law="elastic", folder=None, convention="zyx", task="full"):
+    orientation = OrientationParameters(convention, list(keyframes), task)
     return make_path(PathParameters(shape, orientation), law, folder)
 
 
@@ -276,19 +276,70 @@ def test_axes_of_a_circle_may_have_any_length():
 
 
 @pytest.mark.parametrize(
-    ("num_joints", "oriented", "said"),
+    ("num_joints", "task", "said"),
     [
-        (7, True, r"path: 7 joints for 6 outputs.*hold 1 of them: robot\.fixed_joints"),
-        (4, False, r"path: 4 joints for 3 outputs.*hold 1 of them: robot\.fixed_joints"),
-        (3, True, r"path: 3 joints for 6 outputs \(position and orientation\)"),
-        (6, False, r"give the orientation too"),
+        (2, "full", r"path: 2 joints for 6 outputs \(position and orientation\); 3 joints [^;]*$"),
+        (3, "full", r"3 joints for 6 outputs.*; for a position only write [a-z.]+task: none$"),
+        (4, "full", r"4 joints for 6 outputs [^_]*task: none$"),
+        (5, "full", r"5 joints for 6 outputs.*task: tool_axis; .*task: none$"),
+        (4, "tool_axis", r"4 joints for 5 outputs \(position and direction of .*task: none$"),
+        (2, "none", r"path: 2 joints for 3 outputs \(position only\); 3 joints [^;]*$"),
     ],
 )
-def test_joints_must_suit_the_path(num_joints, oriented, said):
-    path = make(Line(), [Keyframe()] if oriented else [])
+def test_too_few_joints_for_the_path(num_joints, task, said):
+    path = make(Line(), [Keyframe()], task=task)
     with pytest.raises(InputError, match=said):
-        require_orientation(path, num_joints)
-    require_orientation(path, 6 if oriented else 3)
+        require_orientation(path, task, num_joints)
+    for enough in (6, 7):
+        require_orientation(path, task, enough)
+
+
+@pytest.mark.parametrize("num_joints", [4, 5, 6, 7])
+def test_no_orientation_is_lost_unknowingly(num_joints):
+    path = make(Line())
+    require_orientation(path, "none", num_joints)
+    require_orientation(path, "full", 3)
+    with pytest.raises(InputError) as caught:
+        require_orientation(path, "full", num_joints)
+    parts = ["give the orientation too: columns", "keyframes: [{angles_deg", "task: none"]
+    if num_joints != 6:
+        parts.append(f"hold {num_joints - 3}")
+    assert all(part in str(caught.value) for part in parts)
+
+
+def test_what_is_no_task_is_dropped(tmp_path):
+    columns = ["x", "y", "z", "zyx_1", "zyx_2", "zyx_3"]
+    write_csv(tmp_path, columns, np.hstack([POSITIONS, ZYX]))
+    path = make(Waypoints("points.csv"), folder=tmp_path, task="none")
+    assert path.orientation is None
+    np.testing.assert_array_equal(path.waypoints.positions, POSITIONS)
+    # which nothing needs to be smooth
+    fast = [Keyframe(0.0, [0.0, 0.0, 0.0]), Keyframe(1.0, [90.0, 0.0, 0.0])]
+    assert make(Line(), fast, task="none").orientation is None
+    assert make(Line(), fast, task="tool_axis").orientation is not None
+    with pytest.raises(InputError, match=r"tool_axis: the path has no orientation; give the"):
+        make(Line(), task="tool_axis")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"task": "axis"}, "task = axis; allowed: full, tool_axis, none"),
+        ({"tool_axis": [0.0, 0.0, 0.0]}, "tool_axis = [0.0, 0.0, 0.0]; allowed: 3 numbers, not"),
+        ({"tool_axis": [0.0, 1.0]}, "tool_axis = [0.0, 1.0]; allowed: 3 finite numbers"),
+        ({"tool_axis": [0.0, 1.0, math.inf]}, "tool_axis = [0.0, 1.0, inf]"),
+    ],
+)
+def test_tasks_of_the_orientation(keys, said):
+    with pytest.raises(InputError) as caught:
+        OrientationParameters(**keys)
+    assert said in str(caught.value)
+
+
+def test_the_axis_alone_is_told_where_it_alone_matters():
+    assert OrientationParameters(tool_axis=[1.0, 0.0, 0.0]).axis is None
+    axis = OrientationParameters(task="tool_axis", tool_axis=[0.0, -3e200, 4e200]).axis
+    np.testing.assert_allclose(axis, [0.0, -0.6, 0.8], rtol=1e-15)
 
 
 def test_too_few_points_may_be_corners(tmp_path):

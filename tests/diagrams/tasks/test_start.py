@@ -15,7 +15,9 @@ from diagrams.scenario import Circle, Line
 from diagrams.tasks.path_following import make_task
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.model_error import ModelError
+from pfsc_drake.robot.robot_model import pose_function
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 LINE = Line([0.8, -0.1, 1.0], [0.8, 0.3, 1.0])
@@ -27,6 +29,12 @@ def _part(arm):
     return MultibodyArm(true, belief, true)
 
 
+def target(arm, q):
+    """Return the pose of a tool at joint coordinates."""
+    pose = np.array(pose_function(arm.chain)(q)).ravel()
+    return ToolTarget(pose[:3], pose[3:].reshape(3, 3))
+
+
 @pytest.fixture
 def start(load_arm):
     """Return path, theta and robot, put at the start of a scenario."""
@@ -36,7 +44,7 @@ def start(load_arm):
         task = make_task(settings, None)
         begin = task.start(np.zeros(3))
         part = _part(arm)
-        x = part.state_at_rest(part.posture(begin.y_t, begin.R_e, settings.start))
+        x = part.state_at_rest(part.posture(begin.target, settings.start))
         arm.set_state(x)
         return task.path, begin.theta, arm, x
 
@@ -255,8 +263,9 @@ def test_slides_of_the_posture_are_in_metres(on_rails, start, side):
     _, _, arm, x = start(on_rails)
     q = (arm.coordinates.link_rows @ x)[:3]
     np.testing.assert_allclose(q, [0.8 * side, 0.2, np.arccos(-0.8 * side)], atol=1e-8)
-    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, False) == []
-    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, False)
+    there = ToolTarget(arm.tool_pose()[0])
+    assert posture_warnings(on_rails.start.posture_deg, arm.chain, q, there) == []
+    (warning,) = posture_warnings([0.8 * side, -0.3, 90.0], arm.chain, q, there)
     assert "lift_joint most" in warning and f"q_1 = {0.8 * side:g} m" in warning
 
 
@@ -265,10 +274,10 @@ def test_a_posture_in_radians(load_scenario, start):
     given = settings.start.posture_deg
     _, _, arm, x = start(settings)
     found = (arm.coordinates.link_rows @ x)[:6]
-    assert posture_warnings(given, arm.chain, found, True) == []
-    assert posture_warnings([], arm.chain, found, True) == []
+    assert posture_warnings(given, arm.chain, found, target(arm, found)) == []
+    assert posture_warnings([], arm.chain, found, target(arm, found)) == []
     in_radians = np.deg2rad(given).round(2).tolist()
-    (warning,) = posture_warnings(in_radians, arm.chain, found, True)
+    (warning,) = posture_warnings(in_radians, arm.chain, found, target(arm, found))
     line = posture_text(arm.chain, found)
     assert "radians" in warning and line in warning
     assert "write [25.21, 115.2, -40.11, -5.157, 95.11, -17.19]" in warning
@@ -278,10 +287,10 @@ def test_a_posture_in_radians(load_scenario, start):
 def test_a_posture_far_from_any_solution(load_scenario, start):
     _, _, arm, x = start(load_scenario(SIX))
     found = (arm.coordinates.link_rows @ x)[:6]
-    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found, True)
+    (warning,) = posture_warnings([25, 115, -40, -5, 95, 340], arm.chain, found, target(arm, found))
     assert "far from any solution, motor_6 most" in warning
     # small angles in degrees are no radians
-    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found, True)
+    (warning,) = posture_warnings([0, 0, 0, 0, 0, 0], arm.chain, found, target(arm, found))
     assert "far from any solution" in warning
 
 
@@ -292,7 +301,7 @@ def test_a_posture_in_radians_that_leads_astray(load_scenario, start):
     _, _, arm, x = start(settings)
     other = (arm.coordinates.link_rows @ x)[:6]
     in_radians = np.deg2rad([25, 115, -40, -5, 95, -17]).round(2).tolist()
-    (warning,) = posture_warnings(in_radians, arm.chain, other, True)
+    (warning,) = posture_warnings(in_radians, arm.chain, other, target(arm, other))
     assert "radians" in warning
 
 

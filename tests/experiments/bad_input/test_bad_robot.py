@@ -110,6 +110,20 @@ def test_as_many_outputs_as_joints(refused, mine):
     refused(mine(), *parts, changes=["path.orientation.keyframes=[{theta: 0}]"])
 
 
+def test_more_outputs_than_joints_and_what_would_fit(refused, mine):
+    changes = ["robot.model=comau_racer_1_4", "robot.fixed_joints={joint_6: 0}"]
+    parts = ("5 joints for 6 outputs", "path.orientation.task: tool_axis", "task: none")
+    refused(mine(SIX), *parts, changes=changes)
+    refused(
+        mine(), "task = tool_axis", "no orientation", changes=["path.orientation.task=tool_axis"]
+    )
+
+
+def test_what_holds_back_needs_all_of_the_orientation(refused, mine):
+    changes = ["hold_back.force=-10", "path.orientation.task=tool_axis"]
+    refused(mine(SIX), "hold_back.force = -10", "all of its orientation", changes=changes)
+
+
 def test_a_servo_that_does_not_fit_the_controller(refused, mine):
     gains = "{eta: {poles: [-10]}, xi: {poles: [-10]}}"
     changes = ["controller.law=velocity_servo", f"controller.gains.velocity_servo={gains}"]

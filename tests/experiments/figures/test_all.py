@@ -63,12 +63,16 @@ def test_all_figures_are_drawn(drawn_log):
         (["tau_f", "v_J"], ["velocities", "friction"]),
         (["angles_e"], []),
         (["angles_e", "angles_d"], ["angles"]),
+        (["axis_e"], []),
+        (["axis_e", "axis_d"], ["axis"]),
         (["manifold_force"], ["forces"]),
         (["wrench_ext"], ["forces"]),
         (["tared", "sensor_fault"], []),
     ],
 )
 def test_missing_signals_are_skipped(drawn_log, signals, expected):
+    for name in ("axis_e", "axis_d"):
+        drawn_log.add(name, np.tile([0.0, 0.6, 0.8], (201, 1)), "1", ["x", "y", "z"])
     drawn_log.signals = {name: drawn_log[name] for name in signals}
     assert names(drawn_log) == expected
 

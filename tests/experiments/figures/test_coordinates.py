@@ -5,6 +5,7 @@ import pytest
 
 from experiments.figures.coordinates import (
     draw_angles,
+    draw_axis,
     draw_orientation,
     draw_progress,
     draw_transversal,
@@ -163,3 +164,30 @@ def test_constant_angles_are_not_blown_up(drawn_log):
     low, high = draw_angles(drawn_log).canvas.axes[0].get_ylim()
     assert high - low == pytest.approx(2.0)
     assert 0.5 * (low + high) == pytest.approx(np.rad2deg(1.0), abs=1e-3)
+
+
+def test_orientation_of_an_axis(drawn_log):
+    drawn_log["phi"].values = drawn_log["phi"].values[:, :2]
+    drawn_log["phi"].labels = ["phi_z", "phi_y"]
+    drawn_log.signals.pop("phi_p", None)
+    drawing = draw_orientation(drawn_log)
+    assert titles(drawing)[0] == "Error of the tool's axis"
+    assert "the turn about the axis is free" in drawing.caption
+    angles, _ = drawing.canvas.axes
+    assert set(lines(angles)) == {r"$\varphi$", r"$\vartheta$"}
+
+
+def test_direction_of_an_axis(drawn_log):
+    angle = 1e-3 * (1.0 + drawn_log.time)
+    tool = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    drawn_log.add("axis_e", tool, "1", ["x", "y", "z"])
+    drawn_log.add("axis_d", np.tile([0.0, 0.0, 1.0], (201, 1)), "1", ["x", "y", "z"])
+    drawing = draw_axis(drawn_log)
+    direction, between = drawing.canvas.axes
+    np.testing.assert_array_equal(lines(direction)["x"], tool[:, 0])
+    (drawn,) = between.get_lines()
+    np.testing.assert_allclose(drawn.get_ydata(), 1e3 * angle, rtol=1e-9)
+    assert between.get_ylabel() == "angle in mrad"
+    assert "waits" in drawing.caption
+    drawn_log.add("tracking_error", np.zeros((201, 3)), "m")
+    assert "runs on" in draw_axis(drawn_log).caption

@@ -12,7 +12,7 @@ from experiments.results.run_log import RunLog
 
 @pytest.fixture(name="make_run")
 def fixture_make_run(tmp_path):
-    def make(name, deviation, oriented=True, pushed=False):
+    def make(name, deviation, oriented=True, pushed=False, told="angles"):
         folder = tmp_path / name
         folder.mkdir()
         time = np.linspace(0.0, 1.0, 50)
@@ -21,8 +21,9 @@ def fixture_make_run(tmp_path):
         log.add("eta", time, "m")
         log.add("eta_p", time + 0.001, "m")
         if oriented:
-            for signal in ("angles_e", "angles_d"):
-                log.add(signal, np.outer(time, [0.1, 0.2, 0.3]), "rad")
+            for suffix in ("e", "d"):
+                values = np.outer(time, [0.1, 0.2, 0.3])
+                log.add(f"{told}_{suffix}", values, "rad", ["a", "b", "c"])
             log.add("orientation_lead", 0.1 * time, "rad")
         if pushed:
             log.add("wrench_ext", np.outer(time, [3.0, 0.0, 4.0, 0.0, 0.0, 1.0]), "N, Nm")
@@ -55,6 +56,15 @@ def test_without_orientation_there_is_no_picture_of_it(make_run, tmp_path):
     folders = [make_run("slow", 0.01), make_run("fast", 0.02, oriented=False)]
     assert main(["compare", *map(str, folders), "--out", str(tmp_path / "page")]) == 0
     assert not (tmp_path / "page" / "figures" / "orientations.png").exists()
+
+
+def test_axes_are_compared_with_axes(make_run, tmp_path):
+    folders = [make_run("a", 0.01, told="axis"), make_run("b", 0.02, told="axis")]
+    assert main(["compare", *map(str, folders), "--out", str(tmp_path / "page")]) == 0
+    assert (tmp_path / "page" / "figures" / "orientations.png").exists()
+    folders = [make_run("c", 0.01, told="axis"), make_run("d", 0.02)]
+    assert main(["compare", *map(str, folders), "--out", str(tmp_path / "other")]) == 0
+    assert not (tmp_path / "other" / "figures" / "orientations.png").exists()
 
 
 def test_forces_are_compared_where_both_have_them(make_run, tmp_path):

@@ -1,5 +1,7 @@
 """Names of singular postures, on small arms of our own."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -83,3 +85,17 @@ def test_no_names_where_they_do_not_fit(make_chain, offset_wrist):
     q = np.where(np.arange(6) == 4, 2e-4, GENERIC)
     found = singular_posture(offset_wrist, q, oriented=True)
     assert singularity_name(offset_wrist, q, found) is None
+
+
+def test_names_with_an_axis_to_follow(spherical_wrist):
+    """The last joint turns the tool about its axis; in line with it, the fourth does as well."""
+    q = np.where(np.arange(6) == 4, 2e-4, GENERIC)
+    robot = dataclasses.replace(spherical_wrist, p_LT=np.array([0.2, 0.0, 0.0]))
+    found = singular_posture(robot, q, oriented=True, tool_axis=X)
+    assert found.rcond < 2e-4
+    assert (found.free_joints, found.causing_joints) == ([3], [4])
+    assert singularity_name(robot, q, found) == "wrist"
+    q = np.where(np.arange(6) == 2, 1e-4, GENERIC)
+    # more joints than needed get by without the elbow
+    assert singular_posture(robot, q, oriented=False).rcond > 1e-2
+    assert singularity_name(robot, q, singular_posture(robot, q, oriented=False)) is None

@@ -1,0 +1,63 @@
+"""The orientation of a tool and of its reference in the log of a run."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from diagrams.station import Station
+from experiments.results.run_log import RunLog
+from pfsc_drake.geometry import (
+    PathPointLayout,
+    angle_between,
+    matrix_to_zyx,
+    quaternion_to_matrix,
+)
+
+
+def add_orientation(
+    log: RunLog, station: Station, followed: np.ndarray, place: np.ndarray, pose: np.ndarray
+) -> None:
+    """Add the ZYX angles of the tool and of the reference that the law compares it with.
+
+    And how far that reference is away from the orientation that belongs to the tool's place.
+    Where only an axis of the tool matters, its directions take the place of the angles.
+
+    Args:
+        log: To add to; nothing without an orientation to follow.
+        station: The station that was simulated.
+        followed: Points of the manifold that the law acted on, shape (samples, size).
+        place: Points of the path next to the tool, shape (samples, size).
+        pose: ``[y_t, R_e by rows]`` of the tool, shape (samples, 12).
+    """
+    linearization = station.law.linearization
+    if not station.task.place.layout.oriented:
+        return
+    point = followed if linearization.manifold.follows_time else place
+    R_e, R_d = _rotations(station.task.place.layout, pose, point)
+    _, R_place = _rotations(station.task.place.layout, pose, place)
+    unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
+    axis = station.task.place.tool_axis
+    for name, R in {"e": R_e, "d": R_d}.items():
+        if axis is None:
+            angles = np.unwrap(matrix_to_zyx(R), axis=0)
+            angles[unknown] = np.nan
+            log.add(f"angles_{name}", angles, "rad", ["z", "y", "x"])
+        else:
+            directions = np.where(unknown[:, None], np.nan, R @ axis)
+            log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])
+    lead = np.full(len(place), np.nan)
+    if axis is not None:
+        lead[~unknown] = angle_between(R_place @ axis, R_d @ axis)[~unknown]
+    elif not unknown.all():
+        between = np.swapaxes(R_place, 1, 2) @ R_d
+        lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
+    log.add("orientation_lead", lead, "rad")
+
+
+def _rotations(
+    layout: PathPointLayout, pose: np.ndarray, point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
+    finite = (np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))[:, None]
+    quaternion = np.where(finite, point[:, layout.quaternion][:, :4], [1.0, 0.0, 0.0, 0.0])
+    R_e = np.where(finite, pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
+    return R_e, quaternion_to_matrix(quaternion)
