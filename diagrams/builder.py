@@ -22,7 +22,6 @@ from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.notch import NotchedWorkpiece
-from diagrams.tasks.external_torque import needs_sensor
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
@@ -74,7 +73,7 @@ def build_station(
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     forces = add_surroundings(builder, part, task, scenario, around)
-    if needs_sensor(scenario):
+    if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
         forces |= add_sensor(builder, part, scenario, states | forces)
     controller, made = add_law(builder, following, place, forces)

@@ -22,8 +22,10 @@ from experiments.progress import ProgressListener
 from experiments.results.folder import ResultsFolder, check_folder, open_results
 from experiments.results.friction_metrics import friction_metrics
 from experiments.results.joint_limits import JointLimits
+from experiments.results.link_signals import lap_length
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
+from experiments.results.posture_metrics import posture_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, collect_motion
@@ -174,6 +176,7 @@ def _measure(
         )
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
+        log["rcond"].limits = np.array([[settings.controller.min_rcond, np.inf]])
         log.attributes = standard_attributes(name) | {
             "integration": str(prepared.integration),
             "start_posture": posture_text(station.robot, station.start_posture),
@@ -198,6 +201,7 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape))
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
+    metrics.update(posture_metrics(log, lap_length(station)))
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
     metrics.add("controller_tick_us", float(median), "us", source="median")

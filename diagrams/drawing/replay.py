@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -17,12 +17,28 @@ from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
 from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
+from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
 
 # towards the camera if the path is in front of the robot, and its distance beside what is seen
 _VIEW = np.array([0.53, -0.79, 0.31])
 _DISTANCE = 0.95
+_TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class RecordedPushes:
+    """What pushes K points of a robot's links, at the recording's frames.
+
+    Attributes:
+        points: Where [m], shape (frames, 3K).
+        forces: World axes [N], shape (frames, 3K).
+    """
+
+    points: np.ndarray
+    forces: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -34,12 +50,16 @@ class RecordedMotion:
         positions: The plant's positions, shape (frames, nq).
         tool_pose: ``[y_t, R_e]``, shape (frames, 12).
         path_point: The path next to the tool, shape (frames, layout.size).
+        elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
+        pushes: What pushes its links.
     """
 
     times: np.ndarray
     positions: np.ndarray
     tool_pose: np.ndarray
     path_point: np.ndarray
+    elbow: np.ndarray | None = None
+    pushes: RecordedPushes | None = None
 
 
 def build_replay(
@@ -89,7 +109,7 @@ def add_motion(
 
     Args:
         builder: Builder of the diagram.
-        drawing: Draws the path and the tool's trail.
+        drawing: Draws the path.
         motion: What to draw.
         workpiece: What the tool touches, if anything.
         meshcat: Where to draw.
@@ -105,11 +125,44 @@ def add_motion(
     }
     sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
     builder.AddNamedSystem("path_visualizer", drawing)
-    builder.Connect(sources["tool_pose"], drawing.GetInputPort("tool_pose"))
     builder.Connect(sources["path_point"], drawing.GetInputPort("path_point"))
     if workpiece is not None:
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
+    _add_trail(builder, "path_following", _TOOL, motion, motion.tool_pose[:, :3], meshcat, period)
+    _add_links(builder, motion, meshcat, period)
     return sources["positions"]
+
+
+def _add_trail(
+    builder: DiagramBuilder,
+    name: str,
+    color: Rgba,
+    motion: RecordedMotion,
+    points: np.ndarray,
+    meshcat: Meshcat,
+    period: float,
+) -> None:
+    """Add the way of a point, shape (frames, 3)."""
+    trail = builder.AddNamedSystem(f"{name}_trail", TrailVisualizer(name, color, meshcat, period))
+    source = add_source(builder, f"{name}_point", motion.times, points)
+    builder.Connect(source, trail.GetInputPort("point"))
+
+
+def _add_links(
+    builder: DiagramBuilder, motion: RecordedMotion, meshcat: Meshcat, period: float
+) -> None:
+    """Add the way of the elbow, and the forces on links, where they are recorded."""
+    if motion.elbow is not None:
+        _add_trail(builder, "elbow", _ELBOW, motion, motion.elbow, meshcat, period)
+    if motion.pushes is not None:
+        points, forces = motion.pushes.points, motion.pushes.forces
+        size = np.linalg.norm(forces.reshape(len(forces), -1, 3), axis=2).max(initial=0.0)
+        arrows = builder.AddNamedSystem(
+            "push_arrows", ForceArrows(points.shape[1] // 3, size, meshcat, period)
+        )
+        for name, samples in (("points", points), ("forces", forces)):
+            source = add_source(builder, f"push_{name}", motion.times, samples)
+            builder.Connect(source, arrows.GetInputPort(name))
 
 
 def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,7 @@
 """A serial arm in a diagram, whichever model moves it."""
 
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
@@ -7,7 +9,7 @@ import numpy as np
 from pydrake.geometry import GeometryId, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
 from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
 from diagrams.robots.belief import Belief
@@ -20,6 +22,7 @@ from diagrams.robots.plant_wiring import (
     connect_actuation,
     connect_push,
     connect_resistance,
+    connect_torques,
     joint_state_of,
 )
 from diagrams.robots.start_posture import posture_near, posture_warnings
@@ -37,6 +40,7 @@ from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.link_pushes import LinkPushes
 
 _ROUNDING = 1e-6  # m
 
@@ -116,6 +120,43 @@ class Arm(RobotPart):
             np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
         )
 
+    def connect_wrench(
+        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
+    ) -> None:
+        """See :class:`RobotPart`."""
+        self._apply(
+            builder, [add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)]
+        )
+
+    def connect_pushes(
+        self,
+        builder: DiagramBuilder,
+        pushes: LinkPushes,
+        wrench: OutputPort | None,
+        joint_state: OutputPort,
+    ) -> None:
+        """Let forces act on links, and a wrench at the tool point if there is one.
+
+        Args:
+            builder: Builder of the diagram.
+            pushes: What acts on links.
+            wrench: At the tool point, world axes, shape (6,) [N, Nm].
+            joint_state: The true ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        """
+        forces: list[LeafSystem] = [pushes]
+        if wrench is not None:
+            forces.append(add_external_wrench(builder, self.tool, self.robot, wrench, joint_state))
+        self._apply(builder, forces)
+
+    @abstractmethod
+    def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
+        """Let everything from outside act.
+
+        Args:
+            builder: Builder of the diagram.
+            forces: One system or more with the ports ``applied_spatial_force`` and ``tau_ext``.
+        """
+
     def _believed_load(self, joint: str) -> ToolLoad:
         """Return what is believed to be behind a sensor."""
         return self.belief.tool_load(self.believed.tool_load(joint))
@@ -149,12 +190,9 @@ class MultibodyArm(Arm):
         rows = self.coordinates.motor_rows[self.robot.dimension :]
         connect_resistance(builder, self.model, rows, resistance)
 
-    def connect_wrench(
-        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
-    ) -> None:
-        """See :class:`RobotPart`."""
-        push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
-        connect_push(builder, self.model, push)
+    def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
+        """See :class:`Arm`."""
+        connect_push(builder, self.model, forces)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
@@ -197,12 +235,9 @@ class CoupledArm(Arm):
         """See :class:`RobotPart`."""
         builder.Connect(resistance, self.full.GetInputPort("resistance"))
 
-    def connect_wrench(
-        self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
-    ) -> None:
-        """See :class:`RobotPart`."""
-        push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
-        builder.Connect(push.GetOutputPort("tau_ext"), self.full.GetInputPort("external_torque"))
+    def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
+        """See :class:`Arm`."""
+        connect_torques(builder, self.full.GetInputPort("external_torque"), forces)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""

@@ -18,6 +18,7 @@ from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
+from pfsc_drake.robot.serial.link_places import link_frames
 from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
 
 
@@ -68,23 +69,13 @@ class ArmModel:
 
     def tool_mass(self) -> ToolMass:
         """Return what the body of the tool frame weighs, of a body beside the last link's own."""
-        body, link = self.tool.body(), self._last_link_frame()
+        body, link = self.tool.body(), link_frames(self.plant, self.coordinates)[-1]
         context = self.plant.CreateDefaultContext()
         if body.index() == link.body().index():
             return ToolMass(0.0, self.chain.p_LT)
         center = body.CalcCenterOfMassInBodyFrame(context)
         X_LB = self.plant.CalcRelativeTransform(context, link, body.body_frame())
         return ToolMass(body.get_mass(context), X_LB @ center)
-
-    def _last_link_frame(self) -> Frame:
-        body = self.tool.body()
-        fixed = {b.index() for b in self.plant.GetBodiesWeldedTo(body)}
-        joints = (self.plant.get_joint(i) for i in self.plant.GetJointIndices())
-        return next(
-            joint.frame_on_child()
-            for joint in joints
-            if joint.num_velocities() > 0 and joint.child_body().index() in fixed
-        )
 
 
 def read_arm(

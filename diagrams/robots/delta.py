@@ -193,7 +193,7 @@ class TouchingDelta(DeltaPart):
     ) -> None:
         """See :class:`RobotPart`."""
         push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
-        connect_push(builder, self.multibody, push)
+        connect_push(builder, self.multibody, [push])
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""

@@ -1,10 +1,12 @@
 """What drives, friction and forces of a robot mean for the MultibodyPlant that moves it."""
 
+from collections.abc import Sequence
+
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import MatrixGain
+from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.primitives import Adder, MatrixGain
 
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.robot_model import RobotModel
@@ -69,17 +71,42 @@ def add_external_wrench(
     return push
 
 
-def connect_push(builder: DiagramBuilder, plant: MultibodyPlant, push: ExternalWrench) -> None:
-    """Let a wrench act on the tool's body.
+def connect_push(
+    builder: DiagramBuilder, plant: MultibodyPlant, pushes: Sequence[LeafSystem]
+) -> None:
+    """Let wrenches act on the bodies of a plant.
 
     Args:
         builder: Builder of the diagram.
         plant: The plant.
-        push: The wrench.
+        pushes: One system or more with the port ``applied_spatial_force``.
     """
-    builder.Connect(
-        push.GetOutputPort("applied_spatial_force"), plant.get_applied_spatial_force_input_port()
-    )
+    ports = [push.GetOutputPort("applied_spatial_force") for push in pushes]
+    if len(ports) > 1:
+        both = builder.AddNamedSystem(
+            "spatial_forces", ExternallyAppliedSpatialForceMultiplexer(len(ports))
+        )
+        for i, port in enumerate(ports):
+            builder.Connect(port, both.get_input_port(i))
+        ports = [both.get_output_port()]
+    builder.Connect(ports[0], plant.get_applied_spatial_force_input_port())
+
+
+def connect_torques(builder: DiagramBuilder, port: InputPort, pushes: Sequence[LeafSystem]) -> None:
+    """Let wrenches act as what they mean in the joints.
+
+    Args:
+        builder: Builder of the diagram.
+        port: Of the plant, for external torques, shape (N,).
+        pushes: One system or more with the port ``tau_ext``.
+    """
+    torques = [push.GetOutputPort("tau_ext") for push in pushes]
+    if len(torques) > 1:
+        total = builder.AddNamedSystem("external_torques", Adder(len(torques), port.size()))
+        for i, torque in enumerate(torques):
+            builder.Connect(torque, total.get_input_port(i))
+        torques = [total.get_output_port()]
+    builder.Connect(torques[0], port)
 
 
 def add_tool_reaction(

@@ -22,6 +22,7 @@ from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
+from pfsc_drake.physics.link_hand import LinkHandParameters
 from pfsc_drake.systems.physics.joint_encoders import EncoderOptions
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "Keyframe",
     "LawGains",
     "Line",
+    "LinkHandParameters",
     "ModelErrorParameters",
     "OrientationParameters",
     "PathParameters",

@@ -24,6 +24,7 @@ from diagrams.scenario.simulation import SimulationParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.link_hand import LinkHandParameters
 from pfsc_drake.systems.physics.joint_encoders import EncoderOptions
 
 
@@ -55,7 +56,8 @@ class Scenario:
         reference: Motion along the path.
         start: Where it starts.
         simulation: How it is integrated.
-        forces: Wrenches on the tool over time.
+        forces: Wrenches on the tool, or on a link, over time.
+        pushes: Hands that take hold of links and move them.
         hand: An operator's hand on the tool, in addition to the forces; none without the block
             or with ``hand: null``.
         hold_back: A wrench that only slows the robot down.
@@ -85,6 +87,7 @@ class Scenario:
     start: StartParameters = dc.field(default_factory=StartParameters)
     simulation: SimulationParameters = dc.field(default_factory=SimulationParameters)
     forces: list[ForcePulse] = dc.field(default_factory=list)
+    pushes: list[LinkHandParameters] = dc.field(default_factory=list)
     hand: HandParameters | None = None
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
@@ -106,3 +109,9 @@ class Scenario:
         require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:
             require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))
+
+    @property
+    def needs_sensor(self) -> bool:
+        """Whether something acts on measured forces."""
+        measured = self.controller.external_torque.source == "measured"
+        return measured or self.compliance.needs_sensor

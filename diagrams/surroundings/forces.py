@@ -1,12 +1,14 @@
-"""Everything that acts on the tool."""
+"""Everything that acts on the robot."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, ZeroOrderHold
 
+from diagrams.robots.arm import Arm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
+from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import Task
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -21,7 +23,7 @@ def add_surroundings(
     scenario: Scenario,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Add the scenario's forces on the tool, and return their signals for the log.
+    """Add the scenario's forces on the robot, and return their signals for the log.
 
     Args:
         builder: Builder of the diagram.
@@ -31,14 +33,16 @@ def add_surroundings(
         ports: ``joint_state``, the true one, ``manifold_point``.
 
     Returns:
-        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there.
+        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, and
+        what :func:`add_pushes` returns of the links.
 
     Raises:
         InputError: If a force does not suit the robot.
     """
     sources = _scripted(builder, part, task, scenario, ports)
     sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
-    wrenches = []
+    pushes, signals = add_pushes(builder, part, task, scenario, ports)
+    wrenches, held = [], None
     if part.contact is not None:
         # the law's own pose is what encoders make of it, or that of the motors
         view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
@@ -52,9 +56,15 @@ def add_surroundings(
             "wrench_hold", ZeroOrderHold(scenario.controller.sampling_time, 6)
         )
         builder.Connect(total, hold.get_input_port())
-        part.connect_wrench(builder, hold.get_output_port(), ports["joint_state"])
-        wrenches.append(hold.get_output_port())
-    return {"wrench_ext": _sum(builder, "all_wrenches", wrenches)} if wrenches else {}
+        held = hold.get_output_port()
+        wrenches.append(held)
+    if pushes is not None and isinstance(part, Arm):
+        part.connect_pushes(builder, pushes, held, ports["joint_state"])
+    elif held is not None:
+        part.connect_wrench(builder, held, ports["joint_state"])
+    if wrenches:
+        signals["wrench_ext"] = _sum(builder, "all_wrenches", wrenches)
+    return signals
 
 
 def _scripted(
@@ -64,10 +74,11 @@ def _scripted(
     scenario: Scenario,
     ports: dict[str, OutputPort],
 ) -> list[OutputPort]:
-    """Add the forces that are written down beforehand."""
+    """Add the forces on the tool that are written down beforehand."""
     period, sources = scenario.controller.sampling_time, []
-    if scenario.forces:
-        profile = ForceProfile(scenario.forces)
+    pulses = [pulse for pulse in scenario.forces if not pulse.link]
+    if pulses:
+        profile = ForceProfile(pulses)
         operator = builder.AddNamedSystem("operator", ScriptedForce(profile, task.manifold, period))
         if profile.needs_manifold:
             builder.Connect(ports["manifold_point"], operator.GetInputPort("manifold_point"))

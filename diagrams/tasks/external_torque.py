@@ -1,4 +1,4 @@
-"""What the law is told about forces on the tool."""
+"""What the law is told about forces on the robot."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -8,11 +8,12 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.external_torque import ExternalTorque
 from pfsc_drake.systems.control.following_controller import FollowingController
 
-
-def needs_sensor(scenario: Scenario) -> bool:
-    """Return whether something in the scenario acts on measured forces."""
-    measured = scenario.controller.external_torque.source == "measured"
-    return measured or scenario.compliance.needs_sensor
+# by source the signals that tell, and the ports of ExternalTorque for them
+_SEEN = {
+    "known": {"wrench_ext": "wrench", "push_torque": "link_torque"},
+    "measured": {"wrench_measured": "wrench"},
+}
+_SYSTEMS = {"tau_ext": "external_torque", "posture_torque": "external_torque_of_posture"}
 
 
 def add_external_torque(
@@ -22,38 +23,58 @@ def add_external_torque(
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Tell the law the external torques in the joints, as far as they come from a wrench.
+    """Tell the law the external torques in the joints, as far as they come from known forces.
+
+    A sensor in the flange does not see what acts on links in front of it.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
         scenario: The scenario.
         controller: The controller.
-        ports: ``joint_state``, and of ``wrench_ext`` and ``wrench_measured`` what there is.
+        ports: ``joint_state``, and of ``wrench_ext``, ``wrench_measured`` and ``push_torque``
+            what there is.
 
     Returns:
-        ``tau_ext`` as the law is told, with derivatives by rows, if anything acts on the tool.
+        ``tau_ext`` as the law is told, with derivatives by rows, and ``posture_torque`` of shape
+        (N,) as a posture is told that yields to known forces, as far as anything acts on the
+        robot.
 
     Raises:
         InputError: If the law knows no external torques.
     """
-    parameters = scenario.controller.external_torque
-    if parameters.source in ("none", "observed"):
-        return {}
-    wrench = ports.get({"known": "wrench_ext", "measured": "wrench_measured"}[parameters.source])
-    degree = controller.relative_degree
+    parameters, made = scenario.controller.external_torque, dict[str, OutputPort]()
+    period, degree = scenario.controller.sampling_time, controller.relative_degree
+    if scenario.controller.posture.yields == "known":
+        posture = ExternalTorque(robot, 0, period)
+        made |= _add(builder, "posture_torque", posture, _SEEN["known"], ports)
+    if parameters.source not in _SEEN:
+        return made
     if degree == 1:
         raise InputError(
             f"controller.external_torque.source = {parameters.source} with the law "
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
-    if wrench is None:  # nothing acts on the tool
+    torque = ExternalTorque(robot, degree - 2, period, parameters.bandwidth)
+    made |= _add(builder, "tau_ext", torque, _SEEN[parameters.source], ports)
+    if "tau_ext" in made:
+        builder.Connect(made["tau_ext"], controller.GetInputPort("tau_ext"))
+    return made
+
+
+def _add(
+    builder: DiagramBuilder,
+    name: str,
+    torque: ExternalTorque,
+    seen: dict[str, str],
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add external torques, and return them by name; nothing if nothing acts on the robot."""
+    acting = {signal: ports[signal] for signal in seen if signal in ports}
+    if not acting:
         return {}
-    torque = builder.AddNamedSystem(
-        "external_torque",
-        ExternalTorque(robot, degree - 2, scenario.controller.sampling_time, parameters.bandwidth),
-    )
-    builder.Connect(wrench, torque.GetInputPort("wrench"))
+    builder.AddNamedSystem(_SYSTEMS[name], torque)
+    for signal, port in acting.items():
+        builder.Connect(port, torque.GetInputPort(seen[signal]))
     builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
-    builder.Connect(torque.GetOutputPort("tau_ext"), controller.GetInputPort("tau_ext"))
-    return {"tau_ext": torque.GetOutputPort("tau_ext")}
+    return {name: torque.GetOutputPort("tau_ext")}

@@ -188,13 +188,18 @@ def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
 
 def _unknown_forces(scenario: Scenario, robot: RobotModel) -> list[str]:
     parameters = scenario.controller
-    scripted = bool(scenario.forces) or scenario.hold_back.force != 0.0
-    pushed = scripted or scenario.hand is not None
+    on_links = bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces)
+    scripted = any(not pulse.link for pulse in scenario.forces) or scenario.hold_back.force != 0.0
+    on_tool = scripted or scenario.hand is not None
     exact = parameters.law in ("elastic", "visco_elastic") and robot.is_elastic
-    if not (exact and pushed and parameters.external_torque.source == "none"):
+    source = parameters.external_torque.source
+    unknown = {"none": on_tool or on_links, "measured": on_links}.get(source, False)
+    if not (exact and unknown):
         return []
+    # the sensor in the flange does not see what acts on links
+    where, better = ("links", "observed") if on_links else ("the tool", "measured")
     return [
-        f"forces act on the tool that the law '{parameters.law}' does not know of; it takes them "
+        f"forces act on {where} that the law '{parameters.law}' does not know of; it takes them "
         "for deflections of the joints and may leave the path: choose "
-        "controller.external_torque.source 'measured' or 'known'"
+        f"controller.external_torque.source '{better}' or 'known'"
     ]

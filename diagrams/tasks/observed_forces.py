@@ -22,7 +22,7 @@ def add_observed_forces(
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
-    """Observe external torques, for the law and for compliance, whichever is to know them.
+    """Observe external torques, for law, compliance and posture, whichever is to know them.
 
     Args:
         builder: Builder of the diagram.
@@ -33,17 +33,24 @@ def add_observed_forces(
 
     Returns:
         ``tau_ext_observed`` of shape (N,), with compliance without a sensor also
-        ``wrench_observed`` and ``ready``; empty if nothing is observed.
+        ``wrench_observed`` and ``ready``, for a posture that yields ``posture_torque`` of shape
+        (N,); empty if nothing is observed.
 
     Raises:
         InputError: If the law, the robot or what is done about friction does not allow it.
     """
     told = scenario.controller.external_torque
     yields = scenario.compliance.is_given and scenario.compliance.source == "observed"
-    if told.source != "observed" and not yields:
+    posture = scenario.controller.posture
+    keys = {
+        "controller.external_torque.source": told.source == "observed",
+        "compliance.source": yields,
+        "controller.posture.yields": posture.yields == "observed",
+    }
+    needed = [key for key, is_needed in keys.items() if is_needed]
+    if not needed:
         return {}
-    key = "compliance.source" if told.source != "observed" else "controller.external_torque.source"
-    _check(scenario, robot, controller, key)
+    _check(scenario, robot, controller, needed[0])
     inputs = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
     made: dict[str, OutputPort] = {}
     if told.source == "observed":
@@ -53,6 +60,11 @@ def add_observed_forces(
         )
         builder.Connect(torque, controller.GetInputPort("tau_ext"))
         made["tau_ext_observed"] = _first(builder, torque, robot.dimension)
+    if posture.yields == "observed":
+        made["posture_torque"] = _add_observer(
+            builder, "posture_torque_observer", robot, scenario, inputs, posture.observer_rate, 0
+        )
+        made.setdefault("tau_ext_observed", made["posture_torque"])
     if yields:
         parameters = scenario.compliance.observed
         torque = _add_observer(

@@ -15,13 +15,20 @@ from experiments.figures.drives import (
     draw_deflection,
     draw_efforts,
     draw_friction,
-    draw_positions,
     draw_velocities,
 )
 from experiments.figures.forces import draw_forces, has_forces
 from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
+from experiments.figures.positions import draw_positions
+from experiments.figures.posture import (
+    draw_conditioning,
+    draw_posture,
+    draw_pushes,
+    has_conditioning,
+    has_pushes,
+)
 from experiments.figures.style import STYLE, Drawing, Figure, render
 from experiments.results.run_log import FloatArray, RunLog
 
@@ -67,7 +74,10 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("axis_e", "axis_d"), draw_axis),
     (has_forces, draw_forces),
     (_has("notch_position"), draw_notch_position),
+    (has_pushes, draw_pushes),
     (_has("q_J"), draw_positions),
+    (_has("q_J", "q_posture"), draw_posture),
+    (has_conditioning, draw_conditioning),
     (_has("v_J"), draw_velocities),
     (_has("tau_d"), draw_efforts),
     (_has("tau_f", "v_J"), draw_friction),

@@ -1,4 +1,4 @@
-"""The drives over time: positions, velocities, torques or forces, friction, deflection.
+"""The drives over time: velocities, torques or forces, friction, deflection.
 
 Rotary drives have joints, velocities in rad/s and torques in Nm; linear ones have slides, m/s and
 forces in N. The words follow the units of the signals.
@@ -27,42 +27,14 @@ AT_REST = 0.01  # share of an axis' largest velocity, below which it counts as a
 PEAK_RATIO = 4.0  # first peak to the rest of the run, from which on the rest is drawn enlarged
 _EFFORTS = {"Nm": "torque", "N": "force"}
 _EFFORT_TITLES = {"Nm": "torques", "N": "forces"}
-_MOVERS = {"rad/s": "joint", "m/s": "slide"}
-_POSITION_UNITS = {"rad": (180.0 / np.pi, "deg")}
-_REACH = 0.1  # of the range of an axis, below which its distance from a limit matters
-_BEYOND = "#FECACA"
+MOVERS = {"rad/s": "joint", "m/s": "slide"}
 _MILLI_UNITS = {"rad": "mrad", "m": "mm"}
-
-
-def draw_positions(log: RunLog) -> Drawing:
-    """Positions of joints or slides, with limits near enough to matter (dashed)."""
-    signal = log["q_J"]
-    mover = _MOVERS.get(f"{signal.unit}/s", "joint and slide")
-    factor, unit = _POSITION_UNITS.get(signal.unit, (1.0, signal.unit))
-    title = f"{mover.capitalize()} positions"
-    canvas, (panel,) = make_panels(1, height=3.2)
-    draw_components(panel, log.time, factor * signal.values, _axis_labels(signal.dim))
-    near = _position_limits_within_reach(signal)
-    for axis, level, is_passed in near:
-        colour = ALERT if is_passed else COLOURS[axis % len(COLOURS)]
-        panel.axhline(factor * level, linestyle="--", color=colour, linewidth=1.0)
-    panel.set(ylabel=f"position in {unit}", title=f"{title} $q_J$")
-    caption = f"Positions of the {_plural(mover)}"
-    if near:
-        caption += "; dashed lines are limits within reach"
-    if any(is_passed for _, _, is_passed in near):
-        q, ends = signal.values, np.asarray(signal.limits)
-        beyond = np.any((q < ends[:, 0]) | (q > ends[:, 1]), axis=1)
-        shade([panel], log.time, beyond, "beyond a limit", _BEYOND)
-        caption += ", red where they are passed"
-    place_legend(panel)
-    return Drawing("positions", title, f"{caption}.", canvas)
 
 
 def draw_velocities(log: RunLog) -> Drawing:
     """Velocities of joints or slides and of motors, and their difference where both are logged."""
     signals = {name: log[name] for name in ("v_J", "v_M") if name in log}
-    mover = _MOVERS.get(signals["v_J"].unit, "joint and slide")
+    mover = MOVERS.get(signals["v_J"].unit, "joint and slide")
     titles = {
         "v_J": f"{mover.capitalize()} velocities " + r"$\dot q_J$",
         "v_M": r"Motor velocities $\dot q_M$",
@@ -70,7 +42,7 @@ def draw_velocities(log: RunLog) -> Drawing:
     both = len(signals) == 2
     canvas, panels = make_panels(len(signals) + both)
     for panel, (name, signal) in zip(panels, signals.items(), strict=False):
-        draw_components(panel, log.time, signal.values, _axis_labels(signal.dim))
+        draw_components(panel, log.time, signal.values, axis_labels(signal.dim))
         for axis in range(signal.dim):
             _draw_limit(panel, signal, axis)
         panel.set(ylabel=f"velocity in {signal.unit}", title=titles[name])
@@ -79,9 +51,9 @@ def draw_velocities(log: RunLog) -> Drawing:
     limits = "; dashed lines are limits within reach" if limited else ""
     if not both:
         title = f"{mover.capitalize()} velocities"
-        return Drawing("velocities", title, f"Velocities of the {_plural(mover)}{limits}.", canvas)
+        return Drawing("velocities", title, f"Velocities of the {plural(mover)}{limits}.", canvas)
     difference = log["v_M"].values - log["v_J"].values
-    draw_components(panels[2], log.time, difference, _axis_labels(difference.shape[1]))
+    draw_components(panels[2], log.time, difference, axis_labels(difference.shape[1]))
     title = r"Difference $\dot q_M - \dot q_J$"
     panels[2].set(ylabel=f"velocity in {log['v_M'].unit}", title=title)
     caption = "They differ through the elastic transmissions, where the load on them changes"
@@ -99,7 +71,7 @@ def draw_efforts(log: RunLog) -> Drawing:
     groups = [range(i, min(i + 3, signal.dim)) for i in range(0, signal.dim, 3)]
     dwarfed = [is_dwarfed(log.time, signal.values[:, group], PEAK_RATIO) for group in groups]
     canvas, panels = make_panels(len(groups) + sum(dwarfed), height=2.6)
-    labels = _axis_labels(signal.dim)
+    labels = axis_labels(signal.dim)
     places = iter(panels)
     for group, enlarge in zip(groups, dwarfed, strict=True):
         panel = next(places)
@@ -127,7 +99,7 @@ def draw_friction(log: RunLog) -> Drawing:
     friction = log["tau_f"]
     motors = "v_M" in log
     velocity = log["v_M" if motors else "v_J"]
-    mover = "motor" if motors else _MOVERS.get(velocity.unit, "joint or slide")
+    mover = "motor" if motors else MOVERS.get(velocity.unit, "joint or slide")
     word = _EFFORTS.get(friction.unit, "torque or force")
     canvas, panels = make_panels(friction.dim, height=2.0)
     for axis, panel in enumerate(panels):
@@ -169,7 +141,7 @@ def draw_deflection(log: RunLog) -> Drawing:
     canvas, (panel,) = make_panels(1, height=3.2)
     deflection = MILLI * (log["q_M"].values - log["q_J"].values)
     panel.axhline(0.0, color=REFERENCE, linewidth=0.8)
-    draw_components(panel, log.time, deflection, _axis_labels(deflection.shape[1]))
+    draw_components(panel, log.time, deflection, axis_labels(deflection.shape[1]))
     unit = _MILLI_UNITS.get(log["q_M"].unit, "mrad or mm")
     panel.set(ylabel=f"deflection in {unit}", title=r"Deflection $q_M - q_J$")
     place_legend(panel)
@@ -177,7 +149,7 @@ def draw_deflection(log: RunLog) -> Drawing:
     return Drawing("deflection", "Joint deflection", caption, canvas)
 
 
-def _axis_labels(count: int) -> list[str]:
+def axis_labels(count: int) -> list[str]:
     """Labels ``axis 1`` and so on."""
     return [f"axis {i + 1}" for i in range(count)]
 
@@ -187,7 +159,7 @@ def _effort_label(unit: str) -> str:
     return f"{_EFFORTS[unit]} in {unit}" if unit in _EFFORTS else f"torque or force\nin {unit}"
 
 
-def _plural(words: str) -> str:
+def plural(words: str) -> str:
     """``joints and slides`` of ``joint and slide``."""
     return " and ".join(f"{word}s" for word in words.split(" and "))
 
@@ -210,21 +182,6 @@ def _draw_limit(panel: Axes, signal: Signal, axis: int) -> None:
     colour = ALERT if at_limit else COLOURS[axis % len(COLOURS)]
     for level in (-limit, limit):
         panel.axhline(level, linestyle="--", color=colour, linewidth=1.0)
-
-
-def _position_limits_within_reach(signal: Signal) -> list[tuple[int, float, bool]]:
-    """Axis, limit and whether it is passed, for the limits that axes come near."""
-    if signal.limits is None:
-        return []
-    near = []
-    for axis, (lower, upper) in enumerate(signal.limits):
-        q = signal.values[np.isfinite(signal.values[:, axis]), axis]
-        reach = _REACH * (upper - lower) if np.isfinite(upper - lower) else 0.0
-        for limit, sign in ((lower, -1.0), (upper, 1.0)):
-            beyond = float(np.max(sign * (q - limit), initial=-np.inf))
-            if beyond > -reach:
-                near.append((axis, float(limit), beyond > 0.0))
-    return near
 
 
 def _nears_limit(signal: Signal, axis: int) -> bool:

@@ -16,11 +16,11 @@ from experiments.figures.style import (
     place_legend,
     shade,
 )
+from experiments.results.posture_metrics import PUSHED, push_size
 from experiments.results.run_log import FloatArray, RunLog
 
 FORCE_SIGNALS = ("manifold_force", "wrench_ext", "wrench_measured")
 LEVER = 1e-3  # m; moments below the largest force times this lever are noise and not drawn
-PUSHED = 0.05  # share of a run's largest force, from which on the tool counts as pushed
 PAUSE = 0.02  # share of a run, up to which a break counts as part of a push
 _SYMBOLS = {
     "tau_par": r"$\tau_\parallel$",
@@ -71,19 +71,23 @@ def draw_forces(log: RunLog) -> Drawing:
 
 
 def shade_pushes(panels: list[Axes], log: RunLog) -> None:
-    """Shades the times at which a force acts on the tool, where the log has it.
+    """Shades the times at which a force acts on the tool, or on a link, where the log has it.
 
     Args:
         panels: To shade; the first gets an entry for the legend.
-        log: Perhaps with ``wrench_ext``.
+        log: Perhaps with ``wrench_ext`` and ``push_force``.
     """
-    if "wrench_ext" not in log:
-        return
-    force = np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
-    peak = largest(force)
-    if peak > 0.0:
-        pushed = _bridged(force >= PUSHED * peak, round(PAUSE * len(force)))
-        shade(panels, log.time, pushed, "tool pushed", "#DBEAFE")
+    pushes = []
+    if "wrench_ext" in log:
+        on_tool = np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1)
+        pushes.append((on_tool, "tool pushed", "#DBEAFE"))
+    if "push_force" in log:
+        pushes.append((push_size(log), "link pushed", "#FEF3C7"))
+    for force, label, colour in pushes:
+        peak = largest(force)
+        if peak > 0.0:
+            pushed = _bridged(force >= PUSHED * peak, round(PAUSE * len(force)))
+            shade(panels, log.time, pushed, label, colour)
 
 
 def _bridged(where: NDArray[np.bool_], gap: int) -> NDArray[np.bool_]:

@@ -98,19 +98,23 @@ class Drawing:
     canvas: Canvas
 
 
-def make_panels(count: int, height: float = 2.3) -> tuple[Canvas, list[Axes]]:
-    """A canvas with panels one above the other on a common time axis.
+def make_panels(
+    count: int, height: float = 2.3, common_time: bool = True
+) -> tuple[Canvas, list[Axes]]:
+    """A canvas with panels one above the other, on a common time axis unless told otherwise.
 
     Args:
         count: Number of panels.
         height: Height of one panel [inches].
+        common_time: Whether time is the horizontal axis of all.
 
     Returns:
         The canvas and its panels from top to bottom.
     """
     canvas = Canvas(figsize=(WIDTH, height * count + 0.5))
-    panels = canvas.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    panels[-1].set_xlabel("time in s")
+    panels = canvas.subplots(count, 1, sharex=common_time, squeeze=False)[:, 0]
+    if common_time:
+        panels[-1].set_xlabel("time in s")
     return canvas, list(panels)
 
 

@@ -3,8 +3,14 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.replay import RecordedMotion
+from diagrams.drawing.replay import RecordedMotion, RecordedPushes
 from diagrams.station import Station
+from experiments.results.link_signals import (
+    add_link_signals,
+    elbow_motion,
+    has_elbow,
+    push_forces,
+)
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.run_log import RunLog
@@ -59,6 +65,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_orientation(log, station, raw["manifold_point"], points, pose)
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
+    add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
         log.add(name, length.values, "m", length.labels, length.limit)
@@ -81,6 +88,8 @@ def optional_signals(station: Station) -> set[str]:
         names |= {"f_c_estimate", "f_v_estimate"}
         if "tau_f" in names:
             names |= {"f_c", "f_v"}
+    if "push_wrench" in names:
+        names.add("push_force")
     if station.on_motors:
         names.add("xi_M")
     names |= posture_signals(station)
@@ -122,8 +131,16 @@ def collect_motion(station: Station, root: Context, period: float) -> RecordedMo
     states = [station.part.coordinates.plant_state(x) for x in state]
     half = station.part.coordinates.num_states // 2
     positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
+    pushes = None
+    if "push_wrench" in raw:
+        pushes = RecordedPushes(raw["push_point"][frames], push_forces(raw)[frames])
     return RecordedMotion(
-        times[frames], positions, _tool_poses(station, state), raw["manifold_point"][frames]
+        times[frames],
+        positions,
+        _tool_poses(station, state),
+        raw["manifold_point"][frames],
+        elbow_motion(station, state) if has_elbow(station) else None,
+        pushes,
     )
 
 
@@ -231,7 +248,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     for name, (unit, labels) in known.items():
         if name in raw:
             log.add(name, raw[name], unit, labels)
-    if "wrench_ext" in raw:
+    if "wrench_ext" in raw or "push_torque" in raw:
         labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
         log.add("tau_ext", _joint_torques(station, raw), effort, labels)
     if "tau_ext_observed" in raw:
@@ -245,11 +262,13 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
-    """Return what the wrench on the tool means in the joints, shape (samples, N)."""
-    q_J, wrench = raw["joint_state"][:, : station.robot.dimension], raw["wrench_ext"]
-    if len(q_J) == 0:
-        return np.zeros_like(q_J)
-    return np.array(joint_torque_function(station.robot).map(len(q_J))(q_J.T, wrench.T)).T
+    """Return what acts on tool and links means in the joints, shape (samples, N)."""
+    q_J = raw["joint_state"][:, : station.robot.dimension]
+    pushes = raw.get("push_torque", np.zeros_like(q_J))
+    if len(q_J) == 0 or "wrench_ext" not in raw:
+        return pushes
+    function = joint_torque_function(station.robot).map(len(q_J))
+    return np.array(function(q_J.T, raw["wrench_ext"].T)).T + pushes
 
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:

@@ -4,7 +4,9 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.results.friction_metrics import friction_metric_names
 from experiments.results.joint_limits import JointLimits
+from experiments.results.link_signals import is_redundant
 from experiments.results.path_metrics import metric_names
+from experiments.results.posture_metrics import posture_metric_names
 from experiments.results.run_signals import optional_signals
 from experiments.results.shape_metrics import shape_metrics
 from pfsc_drake.errors import InputError
@@ -37,6 +39,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape),
             *JointLimits.of(station.robot).metric_names(),
+            *posture_metric_names(signals, is_redundant(station), station.path.closed),
             "real_time_factor",
             "controller_tick_us",
             "controller_tick_us_p99",

@@ -27,9 +27,25 @@ def smooth_pulse(time: float, begin: float, end: float, ramp: float) -> float:
     return min(smooth_step((time - begin) / ramp), smooth_step((end - time) / ramp))
 
 
+def require_vector(key: str, value: np.ndarray) -> np.ndarray:
+    """Return three numbers as an array, shape (3,).
+
+    Args:
+        key: For the message.
+        value: What was given.
+
+    Raises:
+        InputError: If it is anything else.
+    """
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise InputError(f"{key} = {vector.tolist()}: must be 3 finite numbers")
+    return vector
+
+
 @dataclass
 class ForcePulse:
-    """A wrench at the tool point that comes, stays and goes, smoothly (C^2 in time).
+    """A wrench on the robot that comes, stays and goes, smoothly (C^2 in time).
 
     Attributes:
         begin: When it leaves zero [s].
@@ -40,6 +56,8 @@ class ForcePulse:
         frame: ``world``: components along the world's axes; ``manifold``: along
             ``e_par, e_perp, e_cross`` of the path next to the tool, so that
             ``force = [-100, 0, 0]`` pushes against a motion with growing ``eta``.
+        link: Link or frame of the robot's model that it acts on; empty for the tool.
+        point: Where, in the axes of that link or frame [m], shape (3,).
     """
 
     begin: float = 0.0
@@ -48,13 +66,14 @@ class ForcePulse:
     torque: np.ndarray = field(default_factory=lambda: np.zeros(3))
     ramp: float = 0.05
     frame: str = "world"
+    link: str = ""
+    point: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        self.force, self.torque = (np.asarray(x, dtype=float) for x in (self.force, self.torque))
-        for key in ("force", "torque"):
-            value = getattr(self, key)
-            if value.shape != (3,) or not np.all(np.isfinite(value)):
-                raise InputError(f"{key} = {value.tolist()}: must be 3 finite numbers")
+        for key in ("force", "torque", "point"):
+            setattr(self, key, require_vector(key, getattr(self, key)))
+        if not self.link and self.point.any():
+            raise InputError(f"point = {self.point.tolist()}: must be [0, 0, 0] without a link")
         if not (np.isfinite(self.begin) and self.begin < self.end < np.inf):
             raise InputError(f"begin, end = {self.begin}, {self.end}: must be finite and ascending")
         longest = (self.end - self.begin) / 2.0
@@ -72,7 +91,7 @@ class ForcePulse:
 
 
 class ForceProfile:
-    """A sum of pulses.
+    """A sum of pulses at one point.
 
     Args:
         pulses: The pulses; they may overlap, and so make stairs.
@@ -94,7 +113,7 @@ class ForceProfile:
         return any(first <= end and begin <= last for first, last in self._spans)
 
     def at(self, time: float, axes: np.ndarray) -> np.ndarray:
-        """Return the wrench at the tool point in world axes, shape (6,) [N, Nm].
+        """Return the wrench in world axes, shape (6,) [N, Nm].
 
         Args:
             time: [s].

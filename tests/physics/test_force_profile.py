@@ -111,3 +111,9 @@ def test_when_it_acts():
 def test_pulses_out_of_range(changes, message):
     with pytest.raises(InputError, match=message):
         ForcePulse(**{**PUSH, **changes})
+
+
+def test_a_point_needs_a_link():
+    assert ForcePulse(**PUSH, link="link_3", point=[0.0, 0.1, 0.0]).point.tolist() == [0, 0.1, 0]
+    with pytest.raises(InputError, match=r"point = \[0.0, 0.1, 0.0\]: must be \[0, 0, 0\] without"):
+        ForcePulse(**PUSH, point=[0.0, 0.1, 0.0])

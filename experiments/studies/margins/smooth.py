@@ -10,7 +10,6 @@ from diagrams.scenario import (
     SensorFailureParameters,
 )
 from diagrams.scenario.model_error import ModelErrorParameters
-from diagrams.tasks.external_torque import needs_sensor
 
 
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
@@ -40,15 +39,16 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     if any(encoders.link_increments) or any(encoders.motor_increments):
         result.encoders.link_increments, result.encoders.motor_increments = [], []
         removed.append("increments of the encoders")
-    if needs_sensor(settings) and any(settings.sensor.noise):
+    if settings.needs_sensor and any(settings.sensor.noise):
         result.sensor.noise = 0.0 * settings.sensor.noise
         removed.append("noise of the force sensor")
     if result.hand is not None and result.hand.tremor > 0.0:
         result.hand.tremor = 0.0
         removed.append("tremor of the hand")
-    if settings.forces or settings.hold_back.force != 0.0:
-        result.forces, result.hold_back = [], HoldBackParameters()
-        removed.append("forces on the tool")
+    on_links = bool(settings.pushes) or any(pulse.link for pulse in settings.forces)
+    on_tool = any(not pulse.link for pulse in settings.forces) or settings.hold_back.force != 0.0
+    result.forces, result.pushes, result.hold_back = [], [], HoldBackParameters()
+    removed += ["forces on the tool"] * on_tool + ["forces on links"] * on_links
     if any(settings.start.offset) or any(settings.start.rotation_deg):
         result.start.offset, result.start.rotation_deg = [0.0, 0.0], [0.0, 0.0, 0.0]
         removed.append("start beside the path")

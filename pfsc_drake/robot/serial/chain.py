@@ -1,7 +1,7 @@
 """A serial chain of revolute and prismatic joints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -31,6 +31,15 @@ class SerialChain(Linkage, RobotModel):
     def gather(self, attribute: str) -> np.ndarray:
         """Return one attribute of all links as an array, shape (N,) or (N, ...)."""
         return np.array([getattr(link, attribute) for link in self.links])
+
+    def up_to(self, link: int, point: np.ndarray) -> "SerialChain":
+        """Return the chain that ends with a link and has a point of it as its tool point.
+
+        Args:
+            link: Index of the link, from 0.
+            point: In that link's frame [m], shape (3,).
+        """
+        return replace(self, links=self.links[: link + 1], R_LT=np.eye(3), p_LT=point)
 
     def tool_pose(self, q: Sequence[Jet]) -> tuple[Jet, Jet]:
         """Return tool point [m] and orientation, see :func:`newton_euler.tool_pose`."""

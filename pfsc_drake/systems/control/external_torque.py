@@ -1,4 +1,4 @@
-"""External joint torques, and how they change, from the wrench on the tool."""
+"""External joint torques, and how they change, from the wrench on the tool and more."""
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
@@ -10,7 +10,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 
 class ExternalTorque(LeafSystem):
-    """``tau_ext = J_g(q_J)^T wrench`` (2.11) with as many derivatives as a law asks for.
+    """``tau_ext = J_g(q_J)^T wrench + link_torque`` (2.11), with derivatives as a law asks for.
 
     A law of relative degree r counts on ``tau_ext`` up to the derivative r - 2. A sensor
     gives none; they are estimated from the samples (:class:`SignalDerivatives`). Without an
@@ -18,7 +18,9 @@ class ExternalTorque(LeafSystem):
 
     Ports:
         wrench (input): ``[force, torque]`` on the tool at the tool point, world axes,
-            shape (6,) [N, Nm].
+            shape (6,) [N, Nm]; zero if not connected.
+        link_torque (input): What acts elsewhere on the robot means in the joints, shape (N,)
+            [Nm or N]; zero if not connected.
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         tau_ext (output): Derivatives 0..num_derivatives by rows, shape
             ((num_derivatives + 1) N,) [Nm or N, per s, per s^2].
@@ -48,7 +50,9 @@ class ExternalTorque(LeafSystem):
         self._tau, self._evaluate = function.results["tau_ext"], function.evaluate
         self._wrench = self.DeclareVectorInputPort("wrench", 6)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
-        sources = {self._wrench.ticket(), self._joint_state.ticket()}
+        self._link_torque = self.DeclareVectorInputPort("link_torque", n)
+        inputs = (self._wrench, self._joint_state, self._link_torque)
+        sources = {port.ticket() for port in inputs}
         self._estimator = None
         if bandwidth != 0.0:
             self._estimator = SignalDerivatives(num_derivatives, bandwidth, period)
@@ -62,8 +66,10 @@ class ExternalTorque(LeafSystem):
 
     def _calc_tau_ext(self, context: Context, output: BasicVector) -> None:
         self._q[:] = self._joint_state.Eval(context)[: len(self._q)]
-        self._argument[:] = self._wrench.Eval(context)
+        self._argument[:] = self._wrench.Eval(context) if self._wrench.HasValue(context) else 0.0
         self._evaluate()
+        if self._link_torque.HasValue(context):
+            self._tau += self._link_torque.Eval(context)
         if self._estimator is None:
             result = np.zeros((self._rows, len(self._q)))
             result[0] = self._tau

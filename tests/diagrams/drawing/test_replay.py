@@ -9,7 +9,13 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.drawing.replay import RecordedMotion, build_replay, camera_and_target, record
+from diagrams.drawing.replay import (
+    RecordedMotion,
+    RecordedPushes,
+    build_replay,
+    camera_and_target,
+    record,
+)
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.scenario import Line, PathParameters, RobotParameters
 from diagrams.tasks.path import make_path
@@ -18,6 +24,7 @@ from pfsc_drake.geometry import PathPointLayout
 MODEL = "comau_racer_1_4_elastic_3r"
 PERIOD = 0.04
 LAYOUT = PathPointLayout(2, oriented=False)
+MOVING = ("path_following/trail", "elbow/trail", "push/1", "push/1/shaft")
 DRAWING = ("path", "frame", "frame/axis_0", "frame/axis_1", "frame/axis_2")
 
 
@@ -40,7 +47,10 @@ def motion(path):
     evaluator = path.evaluator(2)
     points = [evaluator([0.8, 0.1 * i, 1.0], 0.1 * i) for i in range(4)]
     poses = [np.concatenate([[0.8, 0.1 * i, 1.0], np.eye(3).ravel()]) for i in range(4)]
-    return RecordedMotion(times, positions, np.array(poses), np.array(points))
+    elbow = np.array([[0.4, 0.05 * i, 0.9] for i in range(4)])
+    forces = np.outer([0.0, 1.0, 2.0, 0.0], [0.0, 20.0, 0.0])
+    pushes = RecordedPushes(elbow, forces)
+    return RecordedMotion(times, positions, np.array(poses), np.array(points), elbow, pushes)
 
 
 @pytest.fixture
@@ -63,6 +73,8 @@ def test_draws_robot_path_and_frame(build, motion, meshcat):
     assert not meshcat.HasPath("/drake/path_following/trail")
     simulator.AdvanceTo(motion.times[-1])
     assert meshcat.HasPath("/drake/path_following/trail")
+    assert meshcat.HasPath("/drake/elbow/trail")
+    assert meshcat.HasPath("/drake/push/1/shaft/cylinder")
 
 
 def test_robot_is_drawn_from_the_recorded_positions(build):
@@ -83,7 +95,7 @@ def test_recording_is_one_page_with_the_animation(build, motion, meshcat):
         for chunk in re.findall(r"data:application/octet-binary;base64,([A-Za-z0-9+/=]+)", page)
     ]
     (animation,) = [chunk for chunk in chunks if b"set_animation" in chunk]
-    for name in (f"visualizer/{MODEL}/link_3", "path_following/frame", "path_following/trail"):
+    for name in (f"visualizer/{MODEL}/link_3", "path_following/frame", *MOVING):
         assert name.encode() in animation
     path_line = [chunk for chunk in chunks if b"path_following/path" in chunk]
     assert path_line

@@ -7,10 +7,8 @@ from experiments.figures.drives import (
     draw_deflection,
     draw_efforts,
     draw_friction,
-    draw_positions,
     draw_velocities,
 )
-from experiments.figures.style import ALERT
 
 
 def set_units(log, units):
@@ -104,35 +102,6 @@ def test_only_limits_within_reach_are_drawn(drawn_log):
     assert "limits" in draw_efforts(drawn_log).caption
     drawn_log["tau_d"].values *= 0.4  # 2.4 Nm at most
     assert "limits" not in draw_efforts(drawn_log).caption
-
-
-def test_positions_with_limits_within_reach(drawn_log):
-    """Axis i moves from 0 to i - 1 rad."""
-    assert "limits" not in draw_positions(drawn_log).caption
-    ends = np.array([[-1.0, 1.0], [-9.0, 9.0], [-9.0, 2.2], [-9.0, 2.0], [-9, np.inf], [-99, 99.0]])
-    drawn_log["q_J"].limits = ends
-    drawing = draw_positions(drawn_log)
-    (panel,) = drawing.canvas.axes
-    dashed = [line for line in panel.lines if line.get_linestyle() == "--"]
-    # axis 3 stays 0.2 below, axis 4 passes 2; the others are far away
-    np.testing.assert_allclose([x.get_ydata()[0] for x in dashed], np.rad2deg([2.2, 2.0]))
-    assert dashed[1].get_color() == ALERT != dashed[0].get_color()
-    assert panel.get_ylabel() == "position in deg"
-    np.testing.assert_allclose(panel.lines[5].get_ydata()[-1], np.rad2deg(5.0))
-    (beyond,) = panel.patches
-    begin, end = panel.transData.inverted().transform(beyond.get_extents())[:, 0]
-    assert (begin, end) == pytest.approx((2.0 / 3.0, 1.0), abs=0.006)
-    assert drawing.caption.endswith("red where they are passed.")
-    assert beyond.get_label() == "beyond a limit"
-
-
-def test_positions_of_slides(drawn_log):
-    set_units(drawn_log, SLIDES)
-    drawing = draw_positions(drawn_log)
-    assert drawing.title == "Slide positions"
-    assert drawing.canvas.axes[0].get_ylabel() == "position in m"
-    set_units(drawn_log, MIXED)
-    assert draw_positions(drawn_log).title == "Joint and slide positions"
 
 
 def test_velocities_with_limits_within_reach(drawn_log):

@@ -1,0 +1,126 @@
+"""What acts on links of the robot, beside its tool."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, ZeroOrderHold
+
+from diagrams.robots.arm import Arm, CoupledArm
+from diagrams.robots.part import RobotPart
+from diagrams.scenario import ForcePulse, Scenario
+from diagrams.tasks.task import Task
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_profile import ForceProfile
+from pfsc_drake.physics.link_hand import LinkHandParameters
+from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
+from pfsc_drake.systems.physics.link_hand import LinkHand
+from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.plants.link_pushes import LinkPushes
+
+
+@dataclass
+class _Push:
+    """What acts at one point of a link: pulses, or a hand."""
+
+    place: LinkPlace
+    pulses: list[ForcePulse]
+    hand: LinkHandParameters | None = None
+
+
+def add_pushes(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    task: Task,
+    scenario: Scenario,
+    ports: dict[str, OutputPort],
+) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
+    """Add the scenario's forces on links of the robot, by scripts and by hands.
+
+    Args:
+        builder: Builder of the diagram.
+        part: The robot.
+        task: What it is to do, for the axes of its manifold.
+        scenario: The scenario.
+        ports: ``joint_state``, the true one, ``manifold_point``.
+
+    Returns:
+        What is to be applied to the robot's plant, or None if nothing is; and for the log and
+        the law ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,) and ``push_torque``
+        of shape (N,).
+
+    Raises:
+        InputError: If the robot has no such link, or its links cannot be pushed.
+    """
+    found = _pushes(part, scenario)
+    if not found or not isinstance(part, Arm):
+        return None, {}
+    period = scenario.controller.sampling_time
+    system = LinkPushes(part.robot, [push.place for push in found])
+    builder.AddNamedSystem("link_pushes", system)
+    points = builder.AddNamedSystem("pushed_points", Demultiplexer(3 * len(found), 3))
+    wrenches = builder.AddNamedSystem("link_wrenches", Multiplexer([6] * len(found)))
+    # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
+    hold = builder.AddNamedSystem("push_hold", ZeroOrderHold(period, 6 * len(found)))
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    builder.Connect(system.GetOutputPort("points"), points.get_input_port())
+    builder.Connect(wrenches.get_output_port(), hold.get_input_port())
+    builder.Connect(hold.get_output_port(), system.GetInputPort("wrenches"))
+    for k, push in enumerate(found):
+        if push.hand is not None:
+            source = builder.AddNamedSystem(f"link_hand_{k + 1}", LinkHand(push.hand, period))
+            builder.Connect(points.get_output_port(k), source.GetInputPort("point"))
+        else:
+            profile = ForceProfile(push.pulses)
+            source = builder.AddNamedSystem(
+                f"link_script_{k + 1}", ScriptedForce(profile, task.manifold, period)
+            )
+            if profile.needs_manifold:
+                builder.Connect(ports["manifold_point"], source.GetInputPort("manifold_point"))
+        builder.Connect(source.GetOutputPort("wrench"), wrenches.get_input_port(k))
+    return system, {
+        "push_wrench": hold.get_output_port(),
+        "push_point": system.GetOutputPort("points"),
+        "push_torque": system.GetOutputPort("tau_ext"),
+    }
+
+
+def _pushes(part: RobotPart, scenario: Scenario) -> list[_Push]:
+    """Return what acts on links, pulses at one point together."""
+    scripted: list[_Push] = []
+    for i, pulse in enumerate(scenario.forces):
+        if not pulse.link:
+            continue
+        for push in scripted:
+            if push.place.name == pulse.link and np.array_equal(push.pulses[0].point, pulse.point):
+                push.pulses.append(pulse)
+                break
+        else:
+            place = _place(part, scenario, f"forces[{i}]", pulse.link, pulse.point)
+            scripted.append(_Push(place, [pulse]))
+    hands = [
+        _Push(_place(part, scenario, f"pushes[{i}]", hand.link, hand.point), [], hand)
+        for i, hand in enumerate(scenario.pushes)
+    ]
+    return scripted + hands
+
+
+def _place(
+    part: RobotPart, scenario: Scenario, where: str, link: str, point: np.ndarray
+) -> LinkPlace:
+    if not isinstance(part, Arm):
+        raise InputError(
+            f"{where}.link = '{link}'; allowed: none, this robot is pushed at its tool"
+        )
+    try:
+        place = place_on_link(part.model, part.coordinates, link, point)
+    except InputError as error:
+        raise InputError(f"{where}.link = {error}") from None
+    # what a sensor behind the last joint bears is told for forces on the tool point alone
+    last = place.link == part.robot.dimension - 1
+    if last and scenario.needs_sensor and isinstance(part, CoupledArm):
+        raise InputError(
+            f"{where}.link = '{link}' with robot.rotor_coupling and a force sensor; allowed: links "
+            "before the last, or no link, for the tool point"
+        )
+    return place

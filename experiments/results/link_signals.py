@@ -1,0 +1,124 @@
+"""Signals of what happens to the links of a run's arm: pushes, and where its elbow goes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.robots.arm import Arm
+from diagrams.station import Station
+from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.physics.link_forces import link_points_function
+
+# what stands in a station's log where links are pushed
+_PUSHES = "push_wrench"
+
+
+def is_redundant(station: Station) -> bool:
+    """Return whether a station's robot has more joints than its task needs.
+
+    Args:
+        station: The station.
+    """
+    return station.robot.dimension > station.law.linearization.num_outputs
+
+
+def lap_length(station: Station) -> float | None:
+    """Return the length of a station's path [m] if it is closed, else None.
+
+    Args:
+        station: The station.
+    """
+    return station.path.length if station.path.closed else None
+
+
+def has_elbow(station: Station) -> bool:
+    """Return whether a point of a station's arm is worth a look beside its tool.
+
+    Args:
+        station: The station.
+    """
+    arm = isinstance(station.part, Arm)
+    return arm and (_PUSHES in station.log.rows or is_redundant(station))
+
+
+def elbow_motion(station: Station, joint_state: FloatArray) -> FloatArray:
+    """Return where the elbow is [m], shape (samples, 3).
+
+    It is the point that is pushed, the first of several; else, of a redundant arm, the origin of
+    the middle link's joint frame.
+
+    Args:
+        station: The station, with an elbow, see :func:`has_elbow`.
+        joint_state: ``[q_J, v_J, q_M, v_M]``, shape (samples, 4N).
+    """
+    assert isinstance(station.part, Arm)  # see has_elbow
+    if len(joint_state) == 0:
+        return np.zeros((0, 3))
+    chain = station.part.robot
+    point = (chain.dimension // 2, np.zeros(3))
+    if _PUSHES in station.log.rows:
+        first = station.diagram.GetSubsystemByName("link_pushes").places[0]
+        point = (first.link, first.p_LQ)
+    function = link_points_function(chain, [point]).map(len(joint_state))
+    return np.array(function(joint_state[:, : chain.dimension].T)).T
+
+
+def push_forces(raw: dict[str, FloatArray]) -> FloatArray:
+    """Return the forces on K points of links, world axes [N], shape (samples, 3K).
+
+    Args:
+        raw: Logged signals of a station, with ``push_wrench``.
+    """
+    wrenches = raw[_PUSHES]
+    force = wrenches.reshape(len(wrenches), -1, 2, 3)[:, :, 0]
+    return force.reshape(len(wrenches), -1)
+
+
+def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
+    """Add pushes, three columns for each point, and where the elbow is and would have been.
+
+    Args:
+        log: With ``eta``.
+        station: The station that was simulated.
+        raw: Its logged signals.
+    """
+    labels = [f"{station.robot.names[station.robot.dimension // 2]} {axis}" for axis in "xyz"]
+    if _PUSHES in raw:
+        places = station.diagram.GetSubsystemByName("link_pushes").places
+        labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
+        log.add("push_force", push_forces(raw), "N", labels)
+        log.add("push_point", raw["push_point"], "m", labels)
+    if not has_elbow(station):
+        return
+    elbow = elbow_motion(station, raw["joint_state"])
+    log.add("elbow", elbow, "m", labels[:3])
+    undisturbed = None
+    if _PUSHES in raw and station.path.closed:
+        force, eta = log["push_force"].values, log["eta"].values[:, 0]
+        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.path.length)
+    if undisturbed is not None:
+        log.add("elbow_undisturbed", undisturbed, "m", labels[:3])
+
+
+def lap_before(
+    eta: FloatArray, values: FloatArray, disturbed: NDArray[np.bool_], lap: float
+) -> FloatArray | None:
+    """Return what was at the same place of a closed path in the lap before a disturbance.
+
+    Args:
+        eta: Arc length, laps counted [m], shape (samples,).
+        values: Shape (samples, dim).
+        disturbed: Whether something disturbs, shape (samples,).
+        lap: Length of the path [m].
+
+    Returns:
+        Shape (samples, dim), the values themselves before the disturbance; None where it never
+        comes, or before a whole lap forwards is driven.
+    """
+    first = int(np.argmax(disturbed))
+    if not disturbed[first] or not eta[first] - eta[0] >= lap:
+        return None
+    along = np.maximum.accumulate(eta[:first])
+    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap), 0.0)
+    place = eta[first:] - lap * beyond
+    expected = [np.interp(place, along, column[:first]) for column in values.T]
+    return np.vstack([values[:first], np.stack(expected, axis=1)])

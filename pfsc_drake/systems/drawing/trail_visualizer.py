@@ -1,0 +1,55 @@
+"""The way of a point in Meshcat."""
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+_WIDTH = 4.0
+
+
+class TrailVisualizer(LeafSystem):
+    """Draws the way that a point has come, piece by piece.
+
+    Frames carry the time, so that a recording in progress gets them.
+
+    Ports:
+        point (input): World axes [m], shape (3,); nothing is drawn where it is not finite.
+
+    State:
+        Discrete: the point at the last frame [m], shape (3,), NaN before the first, and the
+        number of frames, shape (1,).
+
+    Args:
+        name: Meshcat path of the trail.
+        color: Its colour.
+        meshcat: Where to draw, axes of the world.
+        period: Time between frames [s].
+    """
+
+    def __init__(self, name: str, color: Rgba, meshcat: Meshcat, period: float) -> None:
+        super().__init__()
+        self._name, self._color, self._meshcat = name, color, meshcat
+        self._last = self.DeclareDiscreteState(np.full(3, np.nan))
+        self._frames = self.DeclareDiscreteState(1)
+        self._point = self.DeclareVectorInputPort("point", 3)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+
+    def _draw(self, context: Context) -> None:
+        ends = np.column_stack(
+            [context.get_discrete_state(self._last).value(), self._point.Eval(context)]
+        )
+        if not np.isfinite(ends).all():
+            return
+        time = context.get_time()
+        frame = int(context.get_discrete_state(self._frames).value()[0])
+        piece = f"{self._name}/trail/{frame:05d}"
+        self._meshcat.SetLine(piece, ends, _WIDTH, self._color)
+        if time > 0.0:
+            self._meshcat.SetProperty(piece, "visible", False, 0.0)
+        self._meshcat.SetProperty(piece, "visible", True, time)
+
+    def _remember(self, context: Context, state: DiscreteValues) -> None:
+        state.set_value(self._last, self._point.Eval(context))
+        frames = context.get_discrete_state(self._frames).value()
+        state.set_value(self._frames, frames + 1)

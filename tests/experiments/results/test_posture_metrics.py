@@ -1,0 +1,82 @@
+"""Metrics of posture and pushes, and the lap before, from made-up logs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from experiments.results.link_signals import lap_before
+from experiments.results.posture_metrics import (
+    elbow_travel,
+    posture_metric_names,
+    posture_metrics,
+)
+from experiments.results.run_log import RunLog
+
+LAP = 1.0
+
+
+@pytest.fixture
+def log():
+    """Seven joints over two and a half laps; in the second lap joint 3 is 0.1 rad off."""
+    time = np.linspace(0.0, 5.0, 5001)
+    eta = np.minimum(0.5 * time, 2.3)
+    q = np.outer(np.sin(2.0 * np.pi * eta / LAP), np.ones(7))
+    q[:, 2] += 0.1 * (eta > 1.2) * (eta < 1.8)
+    log = RunLog(time)
+    log.add("q_J", q, "rad")
+    log.add("v_J", np.gradient(q, time, axis=0), "rad/s")
+    log.add("q_posture", q + 0.02, "rad")
+    log.add("eta", eta, "m")
+    log.add("eta_dot", np.gradient(eta, time), "m/s")
+    log.add("xi", np.zeros((5001, 2)), "m")
+    log.add("phi", np.zeros((5001, 3)), "rad")
+    pushed = (eta > 1.2) & (eta < 1.8)
+    log.add("push_force", np.outer(pushed, [3.0, 4.0, 0.0, 0.0, 0.0, 1.0]), "N")
+    log.add("elbow", np.outer(0.5 * q[:, 0] + 0.1 * pushed, [1.0, 0.0, 0.0]), "m")
+    return log
+
+
+def test_all_metrics(log):
+    metrics = posture_metrics(log, LAP)
+    assert list(metrics) == posture_metric_names(log.signals, redundant=True, closed=True)
+    assert metrics["max_posture_error"].value == pytest.approx(0.02)
+    assert metrics["posture_return"].value == pytest.approx(0.1, rel=1e-3)
+    assert metrics["final_joint_speed"].value == pytest.approx(0.0, abs=1e-9)
+    assert metrics["largest_push"].value == pytest.approx(5.0)
+
+
+def test_a_run_that_ends_in_motion_has_no_final_speed(log):
+    log["eta_dot"].values[:] = 0.5
+    assert math.isnan(posture_metrics(log, LAP)["final_joint_speed"].value)
+
+
+def test_without_a_second_lap_the_posture_does_not_return(log):
+    assert math.isnan(posture_metrics(log, 2.5)["posture_return"].value)
+    assert "posture_return" not in posture_metrics(log, None)
+
+
+def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
+    elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
+    disturbed = log["push_force"].values.any(axis=1)
+    undisturbed = lap_before(eta, elbow, disturbed, LAP)
+    expected = 0.5 * np.sin(2.0 * np.pi * eta / LAP)
+    np.testing.assert_allclose(undisturbed[:, 0], expected, atol=1e-5)
+    # without it: from where it was when the push began, the tool's own motion included
+    assert elbow_travel(log) > 0.2
+    log.add("elbow_undisturbed", undisturbed, "m")
+    assert elbow_travel(log) == pytest.approx(0.1, rel=1e-3)
+
+
+def test_no_lap_before_no_undisturbed_motion(log):
+    elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
+    assert lap_before(eta, elbow, eta > 0.5, LAP) is None
+    assert lap_before(eta, elbow, eta > 9.0, LAP) is None
+
+
+def test_square_robots_have_none_of_them(log):
+    for name in ("q_posture", "push_force"):
+        del log.signals[name]
+    log["q_J"].values = log["q_J"].values[:, :6]
+    assert not posture_metrics(log, LAP)
+    assert not posture_metric_names(log.signals, redundant=False, closed=True)
