@@ -69,7 +69,7 @@ def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
 
 
 def test_a_push_while_the_tool_rests_after_a_lap():
-    """It rests a hair before and beyond the lap's end; what it did before its start is forgotten."""
+    """A hair before or beyond the lap's end; what it did before the lap began is forgotten."""
     eta = np.concatenate([np.zeros(50), np.linspace(0.0, 0.99995, 500), np.full(50, 1.00004)])
     eta = np.concatenate([eta, np.linspace(1.00004, 1.5, 250)])
     values = np.sin(2.0 * np.pi * eta)[:, None]
