@@ -10,6 +10,8 @@ from pfsc_drake.physics.link_forces import link_points_function
 
 # what stands in a station's log where links are pushed
 _PUSHES = "push_wrench"
+# of a lap, by which a tool that rests after a lap may miss its end
+_SAME = 1e-4
 
 
 def is_redundant(station: Station) -> bool:
@@ -115,10 +117,10 @@ def lap_before(
         comes, or before a whole lap forwards is driven.
     """
     first = int(np.argmax(disturbed))
-    if not disturbed[first] or not eta[first] - eta[0] >= lap:
+    if not disturbed[first] or not eta[first] - eta[0] >= lap * (1.0 - _SAME):
         return None
     along = np.maximum.accumulate(eta[:first])
-    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap), 0.0)
+    beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap - _SAME), 0.0)
     place = eta[first:] - lap * beyond
     expected = [np.interp(place, along, column[:first]) for column in values.T]
     return np.vstack([values[:first], np.stack(expected, axis=1)])

@@ -61,11 +61,21 @@ def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
     disturbed = log["push_force"].values.any(axis=1)
     undisturbed = lap_before(eta, elbow, disturbed, LAP)
     expected = 0.5 * np.sin(2.0 * np.pi * eta / LAP)
-    np.testing.assert_allclose(undisturbed[:, 0], expected, atol=1e-5)
+    np.testing.assert_allclose(undisturbed[:, 0], expected, atol=4e-4)
     # without it: from where it was when the push began, the tool's own motion included
     assert elbow_travel(log) > 0.2
     log.add("elbow_undisturbed", undisturbed, "m")
     assert elbow_travel(log) == pytest.approx(0.1, rel=1e-3)
+
+
+def test_a_push_while_the_tool_rests_after_a_lap():
+    """A hair before or beyond the lap's end; what it did before the lap began is forgotten."""
+    eta = np.concatenate([np.zeros(50), np.linspace(0.0, 0.99995, 500), np.full(50, 1.00004)])
+    eta = np.concatenate([eta, np.linspace(1.00004, 1.5, 250)])
+    values = np.sin(2.0 * np.pi * eta)[:, None]
+    values[:20] += 0.5
+    expected = lap_before(eta, values, np.arange(len(eta)) > 560, LAP)
+    np.testing.assert_allclose(expected, values, atol=2e-3)
 
 
 def test_no_lap_before_no_undisturbed_motion(log):
