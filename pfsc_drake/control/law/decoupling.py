@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +37,9 @@ class DecouplingSolution(NamedTuple):
 
     Attributes:
         x: Highest joint derivative, shape (N,); NaN where A is singular.
-        rcond: Estimated reciprocal condition number of A (1-norm) in [0, 1]; where A has more
-            columns than rows that of its triangular factor.
+        rcond: Reciprocal condition number of A in [0, 1]: estimated in the 1-norm; where A has
+            more columns than rows, or damping may set in, ``m / (|A| |A^+|)`` (Frobenius), which
+            changes as smoothly as A does.
         residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves; None where
             nothing is damped.
     """
@@ -64,8 +66,8 @@ class DecouplingInverse:
     which keeps x bounded through a singular posture; what the outputs miss is told.
 
     Attributes:
-        min_rcond: Smallest reciprocal condition number (1-norm, rows in m and
-            rad) at which the solution may be used, unless it is damped.
+        min_rcond: Smallest reciprocal condition number (rows in m and rad) at which the solution
+            may be used, unless it is damped.
         damped_below: Reciprocal condition number below which the solution is damped; 0 for never.
     """
 
@@ -91,18 +93,13 @@ class DecouplingInverse:
             rhs: Right-hand side, shape (m,).
             spare: What joints beyond the number of outputs are to do; needed if N > m.
         """
-        if spare is not None:
-            return self._solve_next_to(A, rhs, spare)
+        if spare is not None or self.damped_below:
+            return self._solve_next_to(A, rhs, spare or Spare(np.zeros(A.shape[1])))
         lu, _, x, info = lapack.dgesv(A, rhs)
-        if info == 0:
-            rcond = float(lapack.dgecon(lu, lapack.dlange("1", A))[0])
-            if rcond >= self.damped_below:
-                return DecouplingSolution(x, rcond)
-        elif not self.damped_below:
+        if info != 0:
             return DecouplingSolution(np.full(len(rhs), np.nan), 0.0)
-        else:
-            rcond = 0.0
-        return self._damped(A, rhs, rcond, Spare(np.zeros(len(rhs))))
+        rcond, _ = lapack.dgecon(lu, lapack.dlange("1", A))
+        return DecouplingSolution(x, float(rcond))
 
     def accepts(self, solution: DecouplingSolution) -> bool:
         """Return whether the solution may be used."""
@@ -110,11 +107,11 @@ class DecouplingInverse:
         return solution.rcond >= self.min_rcond or solution.residual is not None
 
     def _solve_next_to(self, A: np.ndarray, rhs: np.ndarray, spare: Spare) -> DecouplingSolution:
-        """Solve a system of fewer rows than columns."""
+        """Solve a system with a wish, or with damping."""
         wish, scale = spare.wish, spare.scale
         Q, R = _factors(A if scale is None else A @ scale)
         # conditioning is that of the outputs, whatever the weight
-        rcond = _rcond(R if scale is None else _factors(A)[1])
+        rcond = _rcond(A, R if scale is None else _factors(A)[1])
         if rcond < self.damped_below:
             return self._damped(A, rhs, rcond, spare)
         z, info = lapack.dtrtrs(R, rhs - A @ wish, trans=1)
@@ -172,9 +169,19 @@ def _factors(B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return Q, qr[: len(B)]
 
 
-def _rcond(R: np.ndarray) -> float:
-    """Return the reciprocal condition number of an upper triangular matrix; NaN if not finite."""
-    return float(lapack.dtrcon(R)[0]) if math.isfinite(R.sum()) else math.nan
+def _rcond(B: np.ndarray, R: np.ndarray) -> float:
+    """Return ``m / (|B| |R^-1|)``, Frobenius, of ``B' = Q R``; 0 if B is singular or not finite."""
+    inverse, info = lapack.dtrtri(R)
+    if info != 0:
+        return 0.0
+    square = float(np.vdot(B, B)) * float(np.vdot(inverse * _upper(len(R)), inverse))
+    return len(R) / math.sqrt(square) if 0.0 < square < math.inf else 0.0
+
+
+@cache
+def _upper(size: int) -> np.ndarray:
+    """Return ones on and above the diagonal; below, LAPACK keeps other things."""
+    return np.triu(np.ones((size, size)))
 
 
 def _next_to(Q: np.ndarray, y: np.ndarray, spare: Spare) -> np.ndarray:
