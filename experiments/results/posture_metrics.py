@@ -15,6 +15,7 @@ from experiments.results.run_log import FloatArray, RunLog
 
 REST = 0.1  # s, end of a run over which the joints' speeds are looked at
 AT_REST = 1e-3  # m/s, below which the tool rests
+MOVED_OFF = 1e-4  # of a lap
 PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
 
 
@@ -108,6 +109,9 @@ def final_joint_speed(log: RunLog) -> float:
 def posture_return(log: RunLog, lap: float) -> float:
     """Largest difference of a joint from where it was in the first lap at the same place.
 
+    The first lap begins when the tool moves off, so that a start beside path or posture does not
+    count.
+
     Args:
         log: With ``q_J`` and ``eta`` of a closed path.
         lap: Length of the path [m].
@@ -117,7 +121,8 @@ def posture_return(log: RunLog, lap: float) -> float:
     """
     eta, q = log["eta"].values[:, 0], log["q_J"].values
     along = np.maximum.accumulate(eta)
-    first = along <= eta[0] + lap
+    begin, end = np.searchsorted(along, [eta[0] + MOVED_OFF * lap, eta[0] + lap])
+    first = slice(max(int(begin) - 1, 0), int(end))
     later = eta > eta[0] + lap
     if not later.any():
         return math.nan
