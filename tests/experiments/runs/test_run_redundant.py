@@ -74,7 +74,10 @@ def test_a_task_in_full_ends_at_the_wrist(tmp_path, run_scenario, capfd):
 
 
 def test_damping_goes_through_the_wrist(tmp_path, run_scenario):
-    """The tool leaves path and orientation by micrometres; what is left undone is told."""
+    """The tool turns round where damping is on; joints that it leaves free come to rest.
+
+    They would go on, at 15 rad/s in the end, and take the tool off its path by 6 mm.
+    """
     run = run_short(
         tmp_path,
         run_scenario,
@@ -84,16 +87,16 @@ def test_damping_goes_through_the_wrist(tmp_path, run_scenario):
     )
     assert run.status == 0
     # there and back
-    assert run["eta"].max() > 0.27 and run["eta"][-1, 0] < 0.2
+    assert run["eta"].max() > 0.27 and run["eta"][-1, 0] < 0.21
     assert run["rcond"].min() < 1e-3
     left = np.abs(run["decoupling_residual"]).max(axis=1)
     damped = run["rcond"][:, 0] < 0.05
     assert left[damped].max() > 0.0
     assert np.all(left[~damped] == 0.0)
-    settled = run.after(0.3)
-    assert np.linalg.norm(run["xi"], axis=1)[settled].max() < 5e-5
+    settled = run.after(0.32)
+    assert np.linalg.norm(run["xi"], axis=1)[settled].max() < 5e-4
     assert np.abs(run["phi"][settled]).max() < 5e-4
-    assert np.abs(run["v_J"]).max() < 2.0
+    assert np.abs(run["v_J"]).max() < 1.0
     assert run.metrics["saturated_samples"]["value"] == 0
 
 
