@@ -93,10 +93,10 @@ def test_a_posture_far_away_does_not_take_the_tool_off_its_path(run, posture):
     assert speed.max() > 0.5
 
 
-@pytest.mark.parametrize("own", [GainParameters(poles=["auto"], bandwidth=20.0), GainParameters()])
+@pytest.mark.parametrize("own", [GainParameters(bandwidth=20.0), GainParameters()])
 def test_poles_are_chosen_for_more_joints_than_outputs(load_scenario, own):
     settings = load_scenario("pfc_elastic_7r")
-    kinds = [GainParameters(poles=["auto"], bandwidth=60.0) for _ in range(3)]
+    kinds = [GainParameters(bandwidth=60.0) for _ in range(3)]
     settings.controller.gains = {"elastic": LawGains(*kinds, own)}
     station = build_station(settings, Path())
     found = settings.controller.gains["elastic"]
