@@ -112,6 +112,20 @@ class OnePeriodMap:
             section: Context right after a tick; unchanged.
             x: Variables in place of its own, shape (size,).
         """
+        self.approach(section, x)
+        self._simulator.AdvancePendingEvents()
+        return self.variables(self.context)
+
+    def approach(self, section: Context, x: np.ndarray | None = None) -> None:
+        """Go to the next tick, which is not made yet.
+
+        What watches differences between ticks finds there what it finds in a run; right after a
+        tick it would compare a state with itself.
+
+        Args:
+            section: Context right after a tick; unchanged.
+            x: Variables in place of its own, shape (size,).
+        """
         context, time = self.context, section.get_time()
         # a product as in Drake's own schedule, so that rounding does not lose the tick
         next_tick = (round(time / self.period) + 1) * self.period
@@ -122,8 +136,6 @@ class OnePeriodMap:
         context.SetTime(time + _BEHIND)
         self._simulator.Initialize(self._silent)
         self._simulator.AdvanceTo(next_tick)
-        self._simulator.AdvancePendingEvents()
-        return self.variables(context)
 
     def derivative(self, section: Context, chosen: np.ndarray | None = None) -> SectionDerivative:
         """Return the map's derivative by central differences.
