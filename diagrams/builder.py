@@ -97,7 +97,7 @@ def build_station(
         controller,
         log,
         initial_state,
-        start.theta,
+        start.place,
         on_motors,
         task.warnings
         + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)

@@ -120,11 +120,11 @@ class PathTask(Task):
             deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
         target = ToolTarget(y_t, R_e, self.place.tool_axis)
-        return StartPoint(target, projection.theta)
+        return StartPoint(target, np.array([projection.theta]))
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
-        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.theta)
+        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.place[0])
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """See :class:`Task`."""
@@ -169,7 +169,7 @@ class TrajectoryTask(PathTask):
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
-        return self.path.evaluator(self.relative_degree).evaluate_at(start.theta)
+        return self.path.evaluator(self.relative_degree).evaluate_at(start.place[0])
 
 
 TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}

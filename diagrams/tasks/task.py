@@ -12,7 +12,7 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class StartPoint:
 
     Attributes:
         target: Tool point and what of its orientation matters.
-        theta: Parameter of the nearest point of the manifold.
+        place: Nearest place on the manifold, as its projector remembers it.
     """
 
     target: ToolTarget
-    theta: float
+    place: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class PlaceFinder:
         manifold_point: The point that the law acts on, laid out by the task's manifold.
     """
 
-    projector: PathProjector
+    projector: ManifoldProjector
     manifold_point: OutputPort
 
 
@@ -48,7 +48,7 @@ class Task(ABC):
         path: The path.
         place: Manifold in whose coordinates the tool's true place is told.
         manifold: Manifold that the law makes linear.
-        motion: First coordinate of the reference over time, of dimension 1.
+        motion: Tangential coordinates of the reference over time, of as many dimensions.
         shape: Numbers of the path that decide whether it can be followed.
         warnings: What is out of proportion in it, one sentence each.
     """

@@ -216,7 +216,7 @@ def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.nda
     path = station.path
     evaluator = path.evaluator(relative_degree)
     points = np.full((len(pose), evaluator.layout.size), np.nan)
-    theta = station.initial_theta
+    theta = station.initial_place[0]
     for k, y_t in enumerate(pose[:, :3]):
         if np.isfinite(y_t).all():
             points[k] = evaluator(y_t.tolist(), theta)

@@ -37,7 +37,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     elapsed = []
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
-        station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
+        station.projector.set_place(projector, log["theta"].values[k - 1])
         station.place_robot(root, x)
         # the controller compares what it measures with what it measured before
         station.controller.set_last_state(controller, states[k - 1])
