@@ -17,7 +17,7 @@ class SurfacePointLayout:
     | `alpha`      | 1                   | below one in the feasible neighbourhood (4.11)-(4.13)   |
     | `status`     | 1                   | a `ProjectionStatus`                                    |
     | `position`   | 3 count(order + 1)  | partial derivatives of sigma_t up to order + 1, m       |
-    | `quaternion` | 4 count(order)      | partial derivatives of q up to order; empty if not oriented |
+    | `quaternion` | 4 count(order)      | the same of q up to order; empty if not oriented        |
 
     Rows of partial derivatives stand as in `partials`, with count(n) = (n + 1) (n + 2) / 2 of them.
     alpha is the largest of (d . sigma_uu) / (sigma_u . sigma_u) over all directions u of the
