@@ -1,0 +1,131 @@
+"""Samples of a surface, fine enough to see its shape, and whether it is regular there (4.4)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+_SAMPLES_PER_CELL = 4
+_FEWEST_SAMPLES, _MOST_SAMPLES = 32, 256
+# rad, which the normal may turn by from one sample to the next before more are taken, ...
+_FINE = 0.25
+# ... and from which on it does not turn but flips.
+_FLIP = math.pi / 2.0
+# |sigma_1 x sigma_2| over the largest |sigma_1| times the largest |sigma_2|.
+_REGULAR = 1e-6
+
+
+@dataclass(frozen=True)
+class SampleGrid:
+    """Samples of a surface on a grid of its parameters.
+
+    Attributes:
+        theta_1: Increasing, [n_1]; without the end of a closed direction, as theta_2.
+        theta_2: [n_2].
+        position: sigma_t, [n_1, n_2, 3], m.
+        normal: e_perp (4.3), [n_1, n_2, 3].
+        closed: Whether the last sample of a direction is a neighbour of the first.
+    """
+
+    theta_1: np.ndarray
+    theta_2: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    closed: tuple[bool, bool]
+
+    @property
+    def theta(self) -> np.ndarray:
+        """Parameters of all samples, [n_1, n_2, 2]."""
+        return np.stack(np.meshgrid(self.theta_1, self.theta_2, indexing="ij"), axis=-1)
+
+    def spacing(self, axis: int) -> np.ndarray:
+        """Distances from samples to the next ones along a direction, m."""
+        return np.asarray(np.linalg.norm(_differences(self.position, axis, self.closed), axis=-1))
+
+    def turning(self, axis: int) -> np.ndarray:
+        """Angles between normals of samples and of the next ones along a direction, rad."""
+        chord = np.linalg.norm(_differences(self.normal, axis, self.closed), axis=-1)
+        return np.asarray(2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord)))
+
+
+def sample_grid(surface: Surface) -> SampleGrid:
+    """Sample a surface so that its normal turns little from one sample to the next.
+
+    Args:
+        surface: The surface.
+
+    Returns:
+        At least 32 samples in each direction and 4 in each cell; more where the normal turns by
+        more than 0.25 rad between two of them, as far as 256.
+
+    Raises:
+        InputError: The surface is not regular (4.4), or its normal flips; says where.
+    """
+    counts = [_FEWEST_SAMPLES, _FEWEST_SAMPLES]
+    while True:
+        grid = _sampled(surface, counts)
+        turning = [float(grid.turning(axis).max()) for axis in (0, 1)]
+        finer = [
+            min(_MOST_SAMPLES, math.ceil(count * min(4.0, 1.2 * turn / _FINE)))
+            if turn > _FINE and count < _MOST_SAMPLES
+            else count
+            for count, turn in zip(counts, turning, strict=True)
+        ]
+        if finer == counts:
+            _refuse_flips(grid)
+            return grid
+        counts = finer
+
+
+def check_regular(surface: Surface) -> None:
+    """Check that a surface is regular at its samples (4.4) and that its normal does not flip.
+
+    Raises:
+        InputError: It is not; says where.
+    """
+    sample_grid(surface)
+
+
+def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
+    theta_1, theta_2 = (
+        surface.grid(_SAMPLES_PER_CELL, count)[axis] for axis, count in enumerate(counts)
+    )
+    theta = np.stack(np.meshgrid(theta_1, theta_2, indexing="ij"), axis=-1)
+    position, first, second = np.moveaxis(surface.partials(theta, 1), -2, 0)
+    cross = np.cross(first, second)
+    area = np.linalg.norm(cross, axis=-1)
+    scale = np.linalg.norm(first, axis=-1).max() * np.linalg.norm(second, axis=-1).max()
+    if not np.all(area > _REGULAR * scale):
+        where = np.unravel_index(int(np.argmin(area)), area.shape)
+        raise InputError(
+            f"surface: not regular at theta = {_numbers(theta[where])},"
+            f" the point {_numbers(position[where])} m; its tangents must span a plane everywhere"
+            " (4.4), so leave out poles, apexes and folds"
+        )
+    return SampleGrid(theta_1, theta_2, position, cross / area[..., None], surface.closed)
+
+
+def _refuse_flips(grid: SampleGrid) -> None:
+    for axis in (0, 1):
+        turning = grid.turning(axis)
+        where = np.unravel_index(int(np.argmax(turning)), turning.shape)
+        if turning[where] > _FLIP:
+            raise InputError(
+                f"surface: its normal flips by {math.degrees(turning[where]):.0f} deg at"
+                f" theta = {_numbers(grid.theta[where])}, the point"
+                f" {_numbers(grid.position[where])} m; it must turn smoothly, without edges and"
+                " folds"
+            )
+
+
+def _differences(values: np.ndarray, axis: int, closed: tuple[bool, bool]) -> np.ndarray:
+    if closed[axis]:
+        return np.roll(values, -1, axis=axis) - values
+    return np.diff(values, axis=axis)
+
+
+def _numbers(values: np.ndarray) -> str:
+    return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
