@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, Diagram
 from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
+from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import Task
 from diagrams.workpiece import FurtherLength, Workpiece, upwards
 from pfsc_drake.control.law.fault import Fault
@@ -80,7 +81,8 @@ class Station:
 
     @property
     def path(self) -> Path:
-        """The path."""
+        """The path, of a station whose task is one."""
+        assert isinstance(self.task, PathTask)
         return self.task.path
 
     @property

@@ -143,8 +143,7 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        path = following.task.path
-        lap = path.length if path.closed else None
+        lap = following.task.lap
         made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     builder.Connect(made["reference"], controller.GetInputPort("reference"))

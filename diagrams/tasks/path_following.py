@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.tasks.path import make_path
+from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -42,6 +43,7 @@ class PathTask(Task):
     """
 
     _law_manifold: type[PathManifold] = PathManifold
+    place: PathManifold
 
     def __init__(
         self,
@@ -68,6 +70,24 @@ class PathTask(Task):
             acceleration=reference.acceleration,
             dwell=reference.dwell,
         )
+
+    @property
+    def lap(self) -> float | None:
+        """See :class:`Task`."""
+        return self.path.length if self.path.closed else None
+
+    def require_joints(self, num_joints: int) -> None:
+        """See :class:`Task`."""
+        require_orientation(self.path, self._scenario.path.orientation.task, num_joints)
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.path.evaluator(self.relative_degree)(y_t.tolist(), memory[0])
+
+    @property
+    def drawing(self) -> PathDrawing:
+        """See :class:`Task`."""
+        return PathDrawing(self.path, self.place.layout)
 
     def _check_points(self, points: list[float]) -> None:
         """Refuse arc lengths off the ends of an open path."""

@@ -184,8 +184,8 @@ def test_replay_draws_robot_and_path_upside_down():
         PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    layout = station.task.place.layout
-    diagram = build_delta_replay(station.robot, station.path, layout, motion, meshcat, PERIOD)
+    drawn = station.task.drawing
+    diagram = build_delta_replay(station.robot, drawn, motion, meshcat, PERIOD)
     page = record(diagram, meshcat, motion.times[-1], PERIOD)
     assert "</html>" in page
     for name in ("delta_robot/slide_1", "delta_robot/rod_6", "path_following/path"):
