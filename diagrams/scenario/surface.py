@@ -171,8 +171,8 @@ class SurfaceOrientationParameters:
     tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def __post_init__(self) -> None:
-        for key, allowed in (("kind", _KINDS), ("convention", _CONVENTIONS), ("task", _TASKS)):
-            require(getattr(self, key) in allowed, key, getattr(self, key), ", ".join(allowed))
+        for key, values in {"kind": _KINDS, "convention": _CONVENTIONS, "task": _TASKS}.items():
+            require(getattr(self, key) in values, key, getattr(self, key), ", ".join(values))
         require_numbers("angles_deg", self.angles_deg, 3)
         good = max(map(abs, self.angles_deg)) <= LARGEST_ANGLE
         allowed = f"3 numbers of at most {LARGEST_ANGLE:g} deg"

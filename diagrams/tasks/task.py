@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.drawing.manifold_drawing import ManifoldDrawing
-from pfsc_drake.control.manifolds.manifold import Manifold
+from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -52,7 +52,7 @@ class Task(ABC):
         warnings: What is out of proportion in it, one sentence each.
     """
 
-    place: Manifold
+    place: PlaceManifold
     manifold: Manifold
     motion: PiecewisePolynomialCurve
     shape: ShapeReport

@@ -63,6 +63,26 @@ class PointLayout(Protocol):
         """A :class:`~pfsc_drake.geometry.ProjectionStatus`, [1]."""
 
 
+class PlaceLayout(PointLayout, Protocol):
+    """Layout of the point of a manifold that the tool is projected onto."""
+
+    @property
+    def theta(self) -> slice:
+        """Parameters of the nearest point."""
+
+    @property
+    def eta(self) -> slice:
+        """Tangential coordinates [m]."""
+
+    @property
+    def position(self) -> slice:
+        """Position [m] and its derivatives, the position itself first."""
+
+    @property
+    def memory(self) -> slice:
+        """What tells the next projection where to begin."""
+
+
 class Manifold(Protocol):
     """A map from the tool's motion to coordinates that a law makes linear.
 
@@ -113,6 +133,29 @@ class Manifold(Protocol):
 
         Args:
             point: The manifold's point, shape (layout.size,).
+        """
+
+
+class PlaceManifold(Manifold, Protocol):
+    """A manifold that the tool is projected onto, in whose coordinates its place is told."""
+
+    @property
+    def tool_axis(self) -> np.ndarray | None:
+        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
+
+    @property
+    def layout(self) -> PlaceLayout:
+        """Layout of the manifold's point."""
+
+    @property
+    def is_oriented(self) -> bool:
+        """Whether there is an orientation to follow."""
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the orientation that belongs to places, shape (samples, 3, 3).
+
+        Args:
+            points: Shape (samples, layout.size), all finite.
         """
 
 

@@ -16,7 +16,7 @@ from pfsc_drake.control.manifolds.path_force import (
     turning_force,
 )
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathPointLayout, rotation_to_axis
+from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix, rotation_to_axis
 from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
 
@@ -149,6 +149,15 @@ class PathManifold:
     def tool_axis(self) -> np.ndarray | None:
         """The axis that alone follows the orientation, of length one, shape (3,), or None."""
         return None if self.alignment is None else self.alignment[:, 0]
+
+    @property
+    def is_oriented(self) -> bool:
+        """Whether the path has an orientation."""
+        return self.layout.oriented
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the path's orientation, shape (samples, 3, 3)."""
+        return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
 
     def geometry(self, point: ca.SX) -> PathGeometry:
         """Return the parts of a path point as the maps need them."""

@@ -1,22 +1,11 @@
 """Projection of the tool point onto a manifold, with everything that a law needs there."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
-
-class ProjectedLayout(Protocol):
-    """Layout of the point of a manifold that a tool is projected onto."""
-
-    @property
-    def size(self) -> int:
-        """Length of the array."""
-
-    @property
-    def memory(self) -> slice:
-        """What of it tells the next projection where to begin."""
+from pfsc_drake.control.manifolds.manifold import PlaceLayout
 
 
 class ManifoldProjector(LeafSystem):
@@ -42,7 +31,7 @@ class ManifoldProjector(LeafSystem):
 
     def __init__(
         self,
-        layout: ProjectedLayout,
+        layout: PlaceLayout,
         evaluate: Callable[[Sequence[float], np.ndarray], np.ndarray],
         find: Callable[[np.ndarray], np.ndarray],
         period: float,
