@@ -173,7 +173,10 @@ def _turned_line(start: Pair, slope: Pair, ends: Pair, turned: Turned | None) ->
 
 
 def _graph(
-    size: Pair | tuple[Pair, Pair], coefficient: float, origin: ArrayLike, rotation: ArrayLike | None
+    size: Pair | tuple[Pair, Pair],
+    coefficient: float,
+    origin: ArrayLike,
+    rotation: ArrayLike | None,
 ) -> ProductSurface:
     """o + theta_1 e_x + theta_2 e_y + c (theta_1^2 + theta_2^2) e_z."""
     o, R = checked_placement(origin, rotation)
@@ -192,7 +195,9 @@ def _graph(
 def _checked_ends(name: str, ends: Pair) -> Pair:
     begin, end = ends
     if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise InputError(f"{name}: from {begin} to {end}; finite numbers that increase are required")
+        raise InputError(
+            f"{name}: from {begin} to {end}; finite numbers that increase are required"
+        )
     return float(begin), float(end)
 
 
