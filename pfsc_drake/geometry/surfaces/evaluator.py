@@ -20,6 +20,8 @@ _NOT_CONVERGED = float(ProjectionStatus.NOT_CONVERGED)
 
 # All relative to the lengths of the domain: the longest step from one tick to the next, ...
 _NEAR = 1.0 / 32.0
+# ... one whose square counts, ...
+_SETTLED = 1e-6
 # ... a step that is not worth another evaluation, ...
 _TOLERANCE = 1e-12
 # ... and a way after which it is asked whether another place has become nearer.
@@ -110,25 +112,36 @@ class SurfaceEvaluator:
             E = ux * ux + uy * uy + uz * uz
             F = ux * vx + uy * vy + uz * vz
             G = vx * vx + vy * vy + vz * vz
-            l = px * ax + py * ay + pz * az
-            m = px * bx + py * by + pz * bz
-            n = px * cx + py * cy + pz * cz
+            L = px * ax + py * ay + pz * az
+            M = px * bx + py * by + pz * bz
+            N = px * cx + py * cy + pz * cz
             f1 = px * ux + py * uy + pz * uz
             f2 = px * vx + py * vy + pz * vz
-            h11, h12, h22 = E - l, F - m, G - n
+            h11, h12, h22 = E - L, F - M, G - N
             det = h11 * h22 - h12 * h12
             if not (det > 0.0 and h11 > 0.0):
                 break
             s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
             r1, r2 = s1 / len_1, s2 / len_2
             size = r1 * r1 + r2 * r2
+            if size > _SETTLED * _SETTLED:
+                # How the residual bends on the way, without the part that d . sigma_ijk has in it.
+                wx, wy, wz = ux * s1 + vx * s2, uy * s1 + vy * s2, uz * s1 + vz * s2
+                ax, ay, az = ax * s1 + bx * s2, ay * s1 + by * s2, az * s1 + bz * s2
+                bx, by, bz = bx * s1 + cx * s2, by * s1 + cy * s2, bz * s1 + cz * s2
+                qx = 0.5 * (ax * s1 + bx * s2)
+                qy = 0.5 * (ay * s1 + by * s2)
+                qz = 0.5 * (az * s1 + bz * s2)
+                f1 -= wx * ax + wy * ay + wz * az + qx * ux + qy * uy + qz * uz
+                f2 -= wx * bx + wy * by + wz * bz + qx * vx + qy * vy + qz * vz
+                s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
             t1 += s1
             t2 += s2
             if size < _TOLERANCE * _TOLERANCE:
                 determinant = E * G - F * F
-                along = l / E
-                mixed = m - F * along
-                across = (n * E - 2.0 * F * m + F * F * along) / determinant
+                along = L / E
+                mixed = M - F * along
+                across = (N * E - 2.0 * F * M + F * F * along) / determinant
                 half = 0.5 * (along - across)
                 root = math.sqrt(half * half + mixed * mixed / determinant)
                 alpha = 0.5 * (along + across) + root

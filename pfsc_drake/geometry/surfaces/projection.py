@@ -44,8 +44,8 @@ class SurfaceProjector:
     """Local minimum of f(theta) = |y - sigma(theta)|^2 / 2 near a guess, by Newton's method (4.48).
 
     The step is limited, halved while f grows, and taken with a definite matrix where H (4.12) is
-    not. At an end of an open direction that f falls beyond, that parameter is kept and the other one
-    alone goes on. Started from the last result it follows its sheet of the surface through
+    not. At an end of an open direction that f falls beyond, that parameter is kept and the other
+    goes on alone. Started from the last result it follows its sheet of the surface through
     self-intersections.
 
     Args:
@@ -78,16 +78,16 @@ class SurfaceProjector:
         p1 = p2 = 0.0
         least, alpha, at_border = math.inf, math.nan, False
         for iteration in range(1, _MAX_ITERATIONS + 1):
-            cost, g1, g2, E, F, G, l, m, n = self._terms(theta, point)
+            cost, g1, g2, E, F, G, L, M, N = self._terms(theta, point)
             size = max(abs(p1) / len_1, abs(p2) / len_2)
             if cost > least and size > _COARSE:
                 p1, p2 = 0.5 * p1, 0.5 * p2
                 theta = (origin[0] + p1, origin[1] + p2)
                 continue
-            alpha = _largest_eigenvalue(E, F, G, l, m, n)
+            alpha = _largest_eigenvalue(E, F, G, L, M, N)
             held_1, held_2 = self._held(0, theta[0], g1), self._held(1, theta[1], g2)
             at_border = held_1 or held_2
-            p1, p2, strict = _step(g1, g2, E, F, G, (l, m, n), alpha, (held_1, held_2))
+            p1, p2, strict = _step(g1, g2, E, F, G, (L, M, N), alpha, (held_1, held_2))
             scale = min(1.0, _MAX_STEP / max(abs(p1) / len_1, abs(p2) / len_2, 1e-300))
             target = self._inside(theta, scale * p1, scale * p2)
             p1, p2 = target[0] - theta[0], target[1] - theta[1]
@@ -163,25 +163,25 @@ def _step(
     held: tuple[bool, bool],
 ) -> tuple[float, float, bool]:
     """Newton's step of the parameters that are not held, and whether the minimum is strict."""
-    l, m, n = bend
+    L, M, N = bend
     if held[0] and held[1]:
         return 0.0, 0.0, True
     if held[0]:
-        return 0.0, g2 / (abs(G - n) or G), G > n
+        return 0.0, g2 / (abs(G - N) or G), G > N
     if held[1]:
-        return g1 / (abs(E - l) or E), 0.0, E > l
+        return g1 / (abs(E - L) or E), 0.0, E > L
     # alpha is the largest eigenvalue of the bend relative to the first form.
     shift = 0.0 if alpha < 1.0 - _DEFINITE else 2.0 * (alpha - 1.0) + 2.0 * _DEFINITE
-    h11, h12, h22 = (1.0 + shift) * E - l, (1.0 + shift) * F - m, (1.0 + shift) * G - n
+    h11, h12, h22 = (1.0 + shift) * E - L, (1.0 + shift) * F - M, (1.0 + shift) * G - N
     det = h11 * h22 - h12 * h12
     return (h22 * g1 - h12 * g2) / det, (h11 * g2 - h12 * g1) / det, alpha < 1.0
 
 
-def _largest_eigenvalue(E: float, F: float, G: float, l: float, m: float, n: float) -> float:
+def _largest_eigenvalue(E: float, F: float, G: float, L: float, M: float, N: float) -> float:
     """Largest eigenvalue of a form relative to the first one, see `curvature.mean_and_spread`."""
     determinant = E * G - F * F
-    along = l / E
-    mixed = m - F * along
-    across = (n * E - 2.0 * F * m + F * F * along) / determinant
+    along = L / E
+    mixed = M - F * along
+    across = (N * E - 2.0 * F * M + F * F * along) / determinant
     half = 0.5 * (along - across)
     return 0.5 * (along + across) + math.sqrt(half * half + mixed * mixed / determinant)
