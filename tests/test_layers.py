@@ -48,7 +48,9 @@ UNKNOWN = {
 LAW_KNOWS_NO = [
     "pfsc_drake.control.manifolds.path",
     "pfsc_drake.control.manifolds.moving_point",
+    "pfsc_drake.control.manifolds.surface",
     "pfsc_drake.geometry.paths",
+    "pfsc_drake.geometry.surfaces",
 ]
 
 

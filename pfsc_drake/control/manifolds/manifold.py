@@ -91,8 +91,8 @@ class Manifold(Protocol):
         coordinates: The m coordinates of the virtual output, in order.
         layout: Layout of the manifold's point.
         follows_time: Whether the point moves with time, so that the virtual output is the error
-            from it. The map then needs ``lead``, derivatives of the first coordinate's
-            reference.
+            from it. The map then needs ``lead``, derivatives of the tangential coordinates'
+            references.
     """
 
     name: str
@@ -103,14 +103,16 @@ class Manifold(Protocol):
     def layout(self) -> PointLayout:
         """Layout of the manifold's point."""
 
-    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+    def virtual_output(
+        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
+    ) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.
 
         Args:
             y: Tool point [m], vector jet of order 1 to r.
             R_e: Tool orientation, matrix jet of the same order.
             point: The manifold's point, laid out by ``layout``.
-            lead: First coordinate of the reference [m], scalar jet; only used by manifolds
+            lead: References of the tangential coordinates [m], scalar jets; only used by manifolds
                 that follow time.
         """
 

@@ -1,5 +1,7 @@
 """Trajectory tracking on jets: the tool against a point that moves along a path with time."""
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from pfsc_drake import jets
@@ -55,9 +57,11 @@ class MovingPoint(PathManifold):
     name = "trajectory"
     follows_time = True
 
-    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+    def virtual_output(
+        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
+    ) -> list[Jet]:
         """Return :func:`trajectory_errors`."""
-        return trajectory_errors(y, R_e, self.geometry(point), lead)
+        return trajectory_errors(y, R_e, self.geometry(point), lead[0])
 
     def force(
         self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
