@@ -25,7 +25,8 @@ from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
-from diagrams.tasks.path_following import PathTask, make_task
+from diagrams.tasks.make import make_task
+from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.law.loop_at_rest import RestPosture

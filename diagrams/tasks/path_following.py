@@ -190,20 +190,3 @@ class TrajectoryTask(PathTask):
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
         return self.path.evaluator(self.relative_degree).evaluate_at(start.place[0])
-
-
-TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}
-
-
-def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
-    """Return what a scenario's tool is to do.
-
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
-
-    Raises:
-        InputError: If the path or the motion along it cannot be made.
-    """
-    return TASKS[scenario.controller.manifold](scenario, folder, progress)

@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
+from pfsc_drake.geometry.surfaces.report import SurfaceReport
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
@@ -55,7 +56,7 @@ class Task(ABC):
     place: PlaceManifold
     manifold: Manifold
     motion: PiecewisePolynomialCurve
-    shape: ShapeReport
+    shape: ShapeReport | SurfaceReport
     warnings: list[str]
 
     @property

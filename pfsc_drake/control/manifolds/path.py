@@ -166,9 +166,7 @@ class PathManifold:
             alignment=self.alignment,
         )
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`path_coordinates`."""
         return path_coordinates(y, R_e, self.geometry(point))
 

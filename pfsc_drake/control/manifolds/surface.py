@@ -26,7 +26,7 @@ from pfsc_drake.control.manifolds.surface_force import (
     translational_force,
 )
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import check_rotation_matrix
+from pfsc_drake.geometry import check_rotation_matrix, quaternion_to_matrix
 from pfsc_drake.geometry.surfaces.frame import surface_axes
 from pfsc_drake.geometry.surfaces.partials import partial_index, partial_orders
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
@@ -120,9 +120,7 @@ def surface_parameters(y: Jet, position: Sequence[ca.SX]) -> tuple[Jet, Jet]:
     for k in range(1, y.order + 1):
         trial = theta[0].append(ca.SX(0)), theta[1].append(ca.SX(0))
         offset = y - jets.compose_pair(position, *trial)
-        f_1, f_2 = (
-            jets.dot(offset, slope).coefficients[k] for slope in slopes(position, k, trial)
-        )
+        f_1, f_2 = (jets.dot(offset, slope).coefficients[k] for slope in slopes(position, k, trial))
         theta = (
             theta[0].append((h_22 * f_1 - h_12 * f_2) / determinant),
             theta[1].append((h_11 * f_2 - h_12 * f_1) / determinant),
@@ -223,6 +221,17 @@ class SurfaceManifold:
         if orientation == "normal":
             self.offset = check_rotation_matrix(np.eye(3) if offset is None else offset, "offset")
 
+    @property
+    def is_oriented(self) -> bool:
+        """Whether there is an orientation to follow."""
+        return self.offset is not None or self.layout.oriented
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the reference orientation of places, shape (samples, 3, 3)."""
+        if self.offset is None:
+            return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
+        return np.array([self.axes(point) for point in points]) @ self.offset
+
     def geometry(self, point: ca.SX) -> SurfaceGeometry:
         """Return the parts of a surface point as the maps need them."""
         layout = self.layout
@@ -234,9 +243,7 @@ class SurfaceManifold:
             alignment=self.alignment,
         )
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`surface_coordinates`."""
         return surface_coordinates(y, R_e, self.geometry(point))
 

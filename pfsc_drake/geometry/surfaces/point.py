@@ -54,6 +54,11 @@ class SurfacePointLayout:
         return slice(2, 4)
 
     @property
+    def memory(self) -> slice:
+        """Slice of what the next projection begins with, theta and eta, [4]."""
+        return slice(0, 4)
+
+    @property
     def alpha(self) -> slice:
         """Slice of alpha, [1]."""
         return slice(4, 5)

@@ -12,7 +12,7 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
-from diagrams.tasks.path_following import make_task
+from diagrams.tasks.make import make_task
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
