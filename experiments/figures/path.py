@@ -63,6 +63,9 @@ def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> Drawing:
     axes.set_ylabel("y in m", labelpad=8)
     axes.set_zlabel("z in m", labelpad=4)
     canvas.legend(loc="outside upper left", ncols=4, handlelength=1.6, columnspacing=1.4)
+    if len(lines) > 1:
+        caption = "The surface, by lines of its parameters, and the tool point's way."
+        return Drawing("path", "Surface and driven output", caption, canvas)
     caption = "The path, its shadow on the floor, and the tool point's way."
     return Drawing("path", "Path and driven output", caption, canvas)
 
