@@ -70,7 +70,7 @@ def max_path_deviation_while_moving(log: RunLog, min_speed: float, t: float = -m
     Returns:
         m.
     """
-    moving = np.abs(log["eta_dot"].values[:, 0]) >= min_speed
+    moving = np.linalg.norm(log["eta_dot"].values, axis=1) >= min_speed
     return _max(path_distance(log)[moving & (log.time >= t)])
 
 
@@ -153,15 +153,16 @@ def max_manifold_force(log: RunLog) -> float:
 
 
 def max_tangential_force(log: RunLog) -> float:
-    """Largest magnitude of the force along the path.
+    """Largest magnitude of the force along the path, or along the surface.
 
     Args:
-        log: With ``manifold_force``; with ``tared`` only samples with a tared sensor count.
+        log: With ``manifold_force`` and ``eta``; with ``tared`` only samples with a tared sensor count.
 
     Returns:
         N.
     """
-    return _max(np.abs(_tared_forces(log)[:, 0]))
+    along = log["eta"].dim if "eta" in log else 1
+    return _max(np.linalg.norm(_tared_forces(log)[:, :along], axis=1))
 
 
 def max_external_force(log: RunLog) -> float:
