@@ -26,6 +26,8 @@ _SETTLED = 1e-6
 _TOLERANCE = 1e-12
 # ... and a way after which it is asked whether another place has become nearer.
 _FAR = 1.0 / 8.0
+# Relative difference of distances that is none.
+_NOT_NEARER = 1e-9
 _MAX_STEPS = 8
 # Squared ratio of successive steps that is quick.
 _QUICK = 1.0 / 16.0
@@ -204,7 +206,8 @@ class SurfaceEvaluator:
         )
         if way > _FAR or not foot.converged:
             best = self._global.feet(point)[0]
-            if best.distance < foot.distance * (1.0 - 1e-9) or not foot.converged:
+            nearer = best.distance < foot.distance * (1.0 - _NOT_NEARER)
+            if best.converged and (nearer or not foot.converged):
                 foot = best._replace(theta=self._nearest_lap(best.theta, theta_guess))
         status = _BEYOND_END if foot.at_border else 0.0
         eta = self._length.advance(eta_last, theta_guess, foot.theta)

@@ -12,6 +12,8 @@ _TOLERANCE = 1e-12
 _STALLED = 1e-8
 _COARSE = 1e-7
 _MAX_STEP = 1.0 / 16.0
+# What lies less far beyond a border is on it.
+_BEYOND = 1e-9
 # Smallest eigenvalue of H relative to the first form that Newton's step is taken with.
 _DEFINITE = 1e-6
 
@@ -86,7 +88,8 @@ class SurfaceProjector:
                 continue
             alpha = _largest_eigenvalue(E, F, G, L, M, N)
             held_1, held_2 = self._held(0, theta[0], g1), self._held(1, theta[1], g2)
-            at_border = held_1 or held_2
+            beyond = max(held_1 * abs(g1) / (E * len_1), held_2 * abs(g2) / (G * len_2))
+            at_border = beyond > _BEYOND
             p1, p2, strict = _step(g1, g2, E, F, G, (L, M, N), alpha, (held_1, held_2))
             scale = min(1.0, _MAX_STEP / max(abs(p1) / len_1, abs(p2) / len_2, 1e-300))
             target = self._inside(theta, scale * p1, scale * p2)

@@ -77,7 +77,7 @@ class GlobalProjector:
             raise InputError(f"point: {y.tolist()}; 3 finite numbers, in m, are required")
         where = f"point [{', '.join(f'{value:.6g}' for value in y)}] m"
         best, *others = self.feet(y)
-        if not ((best.converged and best.alpha < 1.0) or best.at_border):
+        if not (best.converged and (best.alpha < 1.0 or best.at_border)):
             raise InputError(
                 f"{where}: no closest point on the surface, it is {best.distance:.6g} m away, which"
                 " is as far as its centre of curvature; a point nearer to the surface is required"
