@@ -12,8 +12,11 @@ _SAMPLES_PER_CELL = 4
 _FEWEST_SAMPLES, _MOST_SAMPLES = 32, 256
 # rad, which the normal may turn by from one sample to the next before more are taken, ...
 _FINE = 0.25
-# ... and from which on it does not turn but flips.
+# ... and from which on it is looked at whether it flips: on ever shorter ways it then ...
 _FLIP = math.pi / 2.0
+# ... does not turn less than this.
+_STILL_TURNS = math.pi / 4.0
+_MOST_SUSPECTS, _HALVINGS = 64, 25
 # |sigma_1 x sigma_2| over the largest |sigma_1| times the largest |sigma_2|.
 _REGULAR = 1e-6
 
@@ -75,7 +78,7 @@ def sample_grid(surface: Surface) -> SampleGrid:
             for count, turn in zip(counts, turning, strict=True)
         ]
         if finer == counts:
-            _refuse_flips(grid)
+            _refuse_flips(surface, grid)
             return grid
         counts = finer
 
@@ -108,17 +111,45 @@ def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
     return SampleGrid(theta_1, theta_2, position, cross / area[..., None], surface.closed)
 
 
-def _refuse_flips(grid: SampleGrid) -> None:
+def _refuse_flips(surface: Surface, grid: SampleGrid) -> None:
+    """Halve the ways on which the normal turns most, until it is clear that it flips there."""
     for axis in (0, 1):
         turning = grid.turning(axis)
-        where = np.unravel_index(int(np.argmax(turning)), turning.shape)
-        if turning[where] > _FLIP:
+        suspects = np.argwhere(turning > _FLIP)[:_MOST_SUSPECTS]
+        if not len(suspects):
+            continue
+        begin = grid.theta[tuple(suspects.T)]
+        values = (grid.theta_1, grid.theta_2)[axis]
+        ends = np.append(values, surface.domain[axis].end)
+        width = np.diff(ends)[suspects[:, axis]]
+        for _ in range(_HALVINGS):
+            width = 0.5 * width
+            normals = _normals(surface, begin[:, None] + _steps(axis, width))
+            first, second = np.linalg.norm(np.diff(normals, axis=1), axis=-1).T
+            begin[:, axis] += np.where(second > first, width, 0.0)
+        chord = np.maximum(first, second)
+        worst = int(np.argmax(chord))
+        if chord[worst] > 2.0 * math.sin(0.5 * _STILL_TURNS):
+            position = surface.partials(begin[worst], 0)[0]
             raise InputError(
-                f"surface: its normal flips by {math.degrees(turning[where]):.0f} deg at"
-                f" theta = {_numbers(grid.theta[where])}, the point"
-                f" {_numbers(grid.position[where])} m; it must turn smoothly, without edges and"
-                " folds"
+                f"surface: its normal flips at theta = {_numbers(begin[worst])}, the point"
+                f" {_numbers(position)} m; it must turn smoothly, without edges and folds"
             )
+
+
+def _steps(axis: int, width: np.ndarray) -> np.ndarray:
+    """No, one and two steps along a direction, [n, 3, 2]."""
+    steps = np.zeros((len(width), 3, 2))
+    steps[..., axis] = width[:, None] * np.arange(3)
+    return steps
+
+
+def _normals(surface: Surface, theta: np.ndarray) -> np.ndarray:
+    _, first, second = np.moveaxis(surface.partials(theta, 1), -2, 0)
+    cross = np.cross(first, second)
+    # Where the surface is not regular by chance a normal is missing, which is no flip.
+    length = np.linalg.norm(cross, axis=-1, keepdims=True)
+    return np.asarray(cross / np.where(length > 0.0, length, 1.0))
 
 
 def _differences(values: np.ndarray, axis: int, closed: tuple[bool, bool]) -> np.ndarray:
