@@ -81,15 +81,15 @@ class ProductSurface(Surface):
         first, second = (basis.sampler() for basis in self._bases)
         rows = partial_orders(check_partial_order(order))
         powers = [basis.derivations(order) for basis in self._bases]
-        left = np.array([powers[0][i] for i, _ in rows])
-        right = np.array([powers[1][j] for _, j in rows])
+        left = np.array([powers[0][i].T for i, _ in rows])[:, None]
+        right = np.array([powers[1][j] for _, j in rows])[:, None]
         matrices: dict[tuple[int, int], np.ndarray] = {}
         size_1, size_2 = self.coefficients.shape[2:4]
         few = size_1 * size_2 <= _FEW_PRODUCTS
         shape = (3 * len(rows), -1) if few else (3 * len(rows) * size_1, size_2)
 
         def make(cell: tuple[int, int]) -> np.ndarray:
-            table = np.einsum("rkp,klx,rlq->rxpq", left, self.coefficients[cell], right)
+            table = left @ self.coefficients[cell].transpose(2, 0, 1) @ right
             matrices[cell] = table.reshape(shape)
             return matrices[cell]
 
