@@ -8,9 +8,13 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
-from pfsc_drake.geometry.surfaces.length import TangentialLength, length_rates
+from pfsc_drake.geometry.surfaces.length import TangentialLength, panel
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
-from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
+from pfsc_drake.geometry.surfaces.projection import (
+    SurfaceProjection,
+    SurfaceProjector,
+    largest_eigenvalue,
+)
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface
@@ -140,21 +144,14 @@ class SurfaceEvaluator:
             t1 += s1
             t2 += s2
             if size < _TOLERANCE * _TOLERANCE:
-                determinant = E * G - F * F
-                along = L / E
-                mixed = M - F * along
-                across = (N * E - 2.0 * F * M + F * F * along) / determinant
-                half = 0.5 * (along - across)
-                root = math.sqrt(half * half + mixed * mixed / determinant)
-                alpha = 0.5 * (along + across) + root
                 e1, e2 = eta_last
-                d1, d2 = t1 - g1, t2 - g2
-                a1, a2, a1_rate, a2_rate = length_rates(start, d1, d2)
-                b1, b2, b1_rate, b2_rate = length_rates(terms, d1, d2)
-                e1 += 0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0
-                e2 += 0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0
-                if not (begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2):
+                more_1, more_2 = panel(start, terms, t1 - g1, t2 - g2)
+                e1 += more_1
+                e2 += more_2
+                inside = begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2
+                if not (inside and abs(e1 + e2) < math.inf):
                     break
+                alpha = largest_eigenvalue(E, F, G, L, M, N)
                 out = self._blank.copy()
                 out[:6] = (t1, t2, e1, e2, alpha, 0.0)
                 out[6 : self._rest] = rows

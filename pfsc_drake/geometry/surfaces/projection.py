@@ -86,7 +86,7 @@ class SurfaceProjector:
                 p1, p2 = 0.5 * p1, 0.5 * p2
                 theta = (origin[0] + p1, origin[1] + p2)
                 continue
-            alpha = _largest_eigenvalue(E, F, G, L, M, N)
+            alpha = largest_eigenvalue(E, F, G, L, M, N)
             held_1, held_2 = self._held(0, theta[0], g1), self._held(1, theta[1], g2)
             beyond = max(held_1 * abs(g1) / (E * len_1), held_2 * abs(g2) / (G * len_2))
             at_border = beyond > _BEYOND
@@ -183,8 +183,8 @@ def _step(
     return (h22 * g1 - h12 * g2) / det, (h11 * g2 - h12 * g1) / det, alpha < 1.0
 
 
-def _largest_eigenvalue(E: float, F: float, G: float, L: float, M: float, N: float) -> float:
-    """Largest eigenvalue of a form relative to the first one, see `curvature.mean_and_spread`."""
+def largest_eigenvalue(E: float, F: float, G: float, L: float, M: float, N: float) -> float:
+    """Return that of a form L, M, N relative to the first one, as `curvature.mean_and_spread`."""
     determinant = E * G - F * F
     along = L / E
     mixed = M - F * along

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _SAMPLES_PER_CELL = 4
@@ -19,6 +20,8 @@ _STILL_TURNS = math.pi / 4.0
 _MOST_SUSPECTS, _HALVINGS = 64, 25
 # |sigma_1 x sigma_2| over the largest |sigma_1| times the largest |sigma_2|.
 _REGULAR = 1e-6
+# Relative gap between both ends of a closed direction.
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class SampleGrid:
 
 
 def sample_grid(surface: Surface) -> SampleGrid:
-    """Sample a surface so that its normal turns little from one sample to the next.
+    """Sample a surface so that its normal turns little from one sample to the next, and check it.
 
     Args:
         surface: The surface.
@@ -65,8 +68,10 @@ def sample_grid(surface: Surface) -> SampleGrid:
         more than 0.25 rad between two of them, as far as 256.
 
     Raises:
-        InputError: The surface is not regular (4.4), or its normal flips; says where.
+        InputError: The surface is not regular (4.4), its normal flips, it does not close where it
+            should, or its size is not that of a surface for robots; says where.
     """
+    _refuse_open_seams(surface)
     counts = [_FEWEST_SAMPLES, _FEWEST_SAMPLES]
     while True:
         grid = _sampled(surface, counts)
@@ -78,6 +83,7 @@ def sample_grid(surface: Surface) -> SampleGrid:
             for count, turn in zip(counts, turning, strict=True)
         ]
         if finer == counts:
+            _refuse_sizes(grid)
             _refuse_flips(surface, grid)
             return grid
         counts = finer
@@ -109,6 +115,38 @@ def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
             " (4.4), so leave out poles, apexes and folds"
         )
     return SampleGrid(theta_1, theta_2, position, cross / area[..., None], surface.closed)
+
+
+def _refuse_open_seams(surface: Surface) -> None:
+    """Position and tangents must be the same at both ends of a closed direction."""
+    for axis in (0, 1):
+        if not surface.closed[axis]:
+            continue
+        across = surface.grid(_SAMPLES_PER_CELL, _FEWEST_SAMPLES)[1 - axis]
+        ends = []
+        for end in surface.domain[axis]:
+            theta = np.empty((len(across), 2))
+            theta[:, axis], theta[:, 1 - axis] = end, across
+            ends.append(surface.partials(theta, 1))
+        gap = np.abs(ends[1] - ends[0]).max(axis=2) / np.abs(ends[0]).max(axis=(0, 2))
+        if gap.max() > _CLOSED:
+            where = across[int(np.argmax(gap.max(axis=1)))]
+            raise InputError(
+                f"surface: does not close smoothly in theta_{axis + 1} at"
+                f" theta_{2 - axis} = {where:.6g}; both ends must have one position and one"
+                " tangent plane, or the direction must be open"
+            )
+
+
+def _refuse_sizes(grid: SampleGrid) -> None:
+    lengths = [float(grid.spacing(axis).sum(axis=axis).max()) for axis in (0, 1)]
+    farthest = float(np.abs(grid.position).max())
+    if min(lengths) < SHORTEST or farthest > FARTHEST:
+        raise InputError(
+            f"surface: {lengths[0]:.3g} m by {lengths[1]:.3g} m, as far as {farthest:.3g} m from"
+            f" the origin; at least {SHORTEST:g} m each way, and at most {FARTHEST:g} m away, is"
+            " required"
+        )
 
 
 def _refuse_flips(surface: Surface, grid: SampleGrid) -> None:
