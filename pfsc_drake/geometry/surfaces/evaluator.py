@@ -15,7 +15,6 @@ from pfsc_drake.geometry.surfaces.projection import (
     SurfaceProjector,
     largest_eigenvalue,
 )
-from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface
 
@@ -69,7 +68,7 @@ class SurfaceEvaluator:
                 f" for a law of order {order}"
             )
         self.surface = surface
-        self._global = GlobalProjector(surface, sample_grid(surface))
+        self._global = GlobalProjector(surface)
         self._project = SurfaceProjector(surface).project
         self._sample = surface.flat_sampler(order + 1)
         self._length = TangentialLength(surface)
