@@ -8,10 +8,13 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
-from pfsc_drake.geometry.surfaces.length import TangentialLength, length_rates
+from pfsc_drake.geometry.surfaces.length import TangentialLength, panel
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
-from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
-from pfsc_drake.geometry.surfaces.regularity import sample_grid
+from pfsc_drake.geometry.surfaces.projection import (
+    SurfaceProjection,
+    SurfaceProjector,
+    largest_eigenvalue,
+)
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface
 
@@ -26,6 +29,8 @@ _SETTLED = 1e-6
 _TOLERANCE = 1e-12
 # ... and a way after which it is asked whether another place has become nearer.
 _FAR = 1.0 / 8.0
+# Relative difference of distances that is none.
+_NOT_NEARER = 1e-9
 _MAX_STEPS = 8
 # Squared ratio of successive steps that is quick.
 _QUICK = 1.0 / 16.0
@@ -63,7 +68,7 @@ class SurfaceEvaluator:
                 f" for a law of order {order}"
             )
         self.surface = surface
-        self._global = GlobalProjector(surface, sample_grid(surface))
+        self._global = GlobalProjector(surface)
         self._project = SurfaceProjector(surface).project
         self._sample = surface.flat_sampler(order + 1)
         self._length = TangentialLength(surface)
@@ -138,20 +143,13 @@ class SurfaceEvaluator:
             t1 += s1
             t2 += s2
             if size < _TOLERANCE * _TOLERANCE:
-                determinant = E * G - F * F
-                along = L / E
-                mixed = M - F * along
-                across = (N * E - 2.0 * F * M + F * F * along) / determinant
-                half = 0.5 * (along - across)
-                root = math.sqrt(half * half + mixed * mixed / determinant)
-                alpha = 0.5 * (along + across) + root
                 e1, e2 = eta_last
-                d1, d2 = t1 - g1, t2 - g2
-                a1, a2, a1_rate, a2_rate = length_rates(start, d1, d2)
-                b1, b2, b1_rate, b2_rate = length_rates(terms, d1, d2)
-                e1 += 0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0
-                e2 += 0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0
-                if not (begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2):
+                more_1, more_2 = panel(start, terms, t1 - g1, t2 - g2)
+                e1 += more_1
+                e2 += more_2
+                inside = begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2
+                alpha = largest_eigenvalue(E, F, G, L, M, N)
+                if not (inside and abs(e1 + e2 + alpha) < math.inf):
                     break
                 out = self._blank.copy()
                 out[:6] = (t1, t2, e1, e2, alpha, 0.0)
@@ -195,7 +193,7 @@ class SurfaceEvaluator:
     ) -> np.ndarray:
         """The same as a call, by the projector or a search of the whole surface."""
         foot = self._project(point, theta_guess)
-        if not math.isfinite(foot.distance + eta_last[0] + eta_last[1]):
+        if not math.isfinite(foot.distance + foot.alpha + eta_last[0] + eta_last[1]):
             out = np.full(self.layout.size, math.nan)
             out[self.layout.status] = _NOT_CONVERGED
             return out
@@ -204,7 +202,8 @@ class SurfaceEvaluator:
         )
         if way > _FAR or not foot.converged:
             best = self._global.feet(point)[0]
-            if best.distance < foot.distance * (1.0 - 1e-9) or not foot.converged:
+            nearer = best.distance < foot.distance * (1.0 - _NOT_NEARER)
+            if best.converged and (nearer or not foot.converged):
                 foot = best._replace(theta=self._nearest_lap(best.theta, theta_guess))
         status = _BEYOND_END if foot.at_border else 0.0
         eta = self._length.advance(eta_last, theta_guess, foot.theta)
