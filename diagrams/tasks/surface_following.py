@@ -19,6 +19,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
 from pfsc_drake.geometry.paths.smoothing import Progress
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 from pfsc_drake.geometry.surfaces.target import SurfaceTarget
 from pfsc_drake.geometry.surfaces.way import way_on_surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -57,6 +58,7 @@ class SurfaceTask(Task):
             )
         try:
             self.surface = make_surface(parameters.shape)
+            check_single_sheet(self.surface)
         except InputError as error:
             raise InputError(f"surface.shape: {error}") from None
         self.relative_degree = RELATIVE_DEGREE[law]
@@ -124,7 +126,10 @@ class SurfaceTask(Task):
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""
         y_t, max_alpha = self._start + shift, self._scenario.controller.max_alpha
-        foot = self._evaluator.project_globally(y_t)
+        try:
+            foot = self._evaluator.project_globally(y_t)
+        except InputError as error:
+            raise InputError(f"start: {error}") from None
         said = f"start: tool point {np.round(y_t, 6).tolist()} m"
         if not (foot.converged and foot.alpha < max_alpha):
             raise InputError(

@@ -156,7 +156,8 @@ def max_tangential_force(log: RunLog) -> float:
     """Largest magnitude of the force along the path, or along the surface.
 
     Args:
-        log: With ``manifold_force`` and ``eta``; with ``tared`` only samples with a tared sensor count.
+        log: With ``manifold_force`` and ``eta``; with ``tared`` only samples with a tared sensor
+            count.
 
     Returns:
         N.
