@@ -17,7 +17,7 @@ from diagrams.robots.encoders import add_joint_state, states_to_log
 from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require_whole_fraction
+from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
@@ -25,8 +25,8 @@ from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
-from diagrams.tasks.path import require_orientation
-from diagrams.tasks.path_following import make_task
+from diagrams.tasks.make import make_task
+from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -56,7 +56,7 @@ def build_station(
     builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
     workpiece = _workpiece(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
-    require_orientation(task.path, scenario.path.orientation.task, part.robot.dimension)
+    task.require_joints(part.robot.dimension)
     believed = part.belief.robot
     begin = cache(lambda: _start(scenario, task, part, workpiece))
     rest = cache(lambda: _rest(task, part, *begin()))
@@ -97,7 +97,7 @@ def build_station(
         controller,
         log,
         initial_state,
-        start.theta,
+        start.place,
         on_motors,
         task.warnings
         + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
@@ -112,6 +112,9 @@ def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
         return None
     step = scenario.notch.time_step
     require_whole_fraction("notch.time_step", step, scenario.controller.sampling_time)
+    allowed = "null where the task is no path"
+    require(isinstance(task, PathTask), "notch", "given", allowed)
+    assert isinstance(task, PathTask)
     return NotchedWorkpiece(task.path, scenario.notch)
 
 
@@ -179,12 +182,12 @@ def build_station_replay(
         motion: What to draw.
         meshcat: Where to draw.
     """
-    period, layout = settings.simulation.frame_period, station.task.place.layout
+    period, drawn = settings.simulation.frame_period, station.task.drawing
     look = None
     if station.workpiece is not None:
         look = station.workpiece.look(upwards(station.part.gravity, "notch"))
     if isinstance(station.part, DeltaPart):
         robot = station.part.robot
-        return build_delta_replay(robot, station.path, layout, motion, meshcat, period, look)
+        return build_delta_replay(robot, drawn, motion, meshcat, period, look)
     assert drawing is not None  # draw_station knows every other robot
-    return build_replay(drawing, station.path, layout, motion, meshcat, period, look)
+    return build_replay(drawing, drawn, motion, meshcat, period, look)

@@ -9,8 +9,7 @@ from diagrams.signal_log import SignalLog
 from diagrams.wording import coordinate_text, listed, posture_text
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.manifolds.manifold import Kind, indices
-from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.manifold import Kind, PlaceManifold, indices
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.singularity_name import singularity_name
@@ -56,7 +55,7 @@ class FaultScene:
 
     law: FollowingLaw
     robot: RobotModel
-    place: PathManifold
+    place: PlaceManifold
     on_motors: bool
     now: Instant
     before: Instant | None
@@ -184,7 +183,7 @@ def _singular(scene: FaultScene) -> str:
     q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
     place = scene.place
     posture = singular_posture(
-        scene.robot, q, oriented=place.layout.oriented, tool_axis=place.tool_axis
+        scene.robot, q, oriented=place.is_oriented, tool_axis=place.tool_axis
     )
     A = _decoupling_matrix(scene)
     distance = float(np.linalg.norm(_beside(scene)))
@@ -244,17 +243,19 @@ def _map_state(scene: FaultScene) -> str:
 
 
 def _beside(scene: FaultScene) -> np.ndarray:
-    """Return the transversal coordinates of the tool [m], shape (2,)."""
+    """Return the transversal coordinates of the tool [m]."""
     point, layout = scene.now.signals["manifold_point"], scene.place.layout
     offset = scene.now.signals["tool_pose"][:3] - point[layout.position][:3]
-    return scene.place.axes(point)[:, 1:].T @ offset
+    across = indices(scene.place.coordinates, Kind.TRANSVERSAL)
+    return scene.place.axes(point)[:, across].T @ offset
 
 
 def _place(scene: FaultScene) -> str:
     """Return ``at eta = 0.43 m, t = 0.93 s``, with the last eta that is known."""
     layout, known = scene.place.layout, None
     for instant in (scene.before, scene.now):
-        eta = np.nan if instant is None else instant.signals["manifold_point"][layout.eta].item()
-        known = eta if np.isfinite(eta) else known
-    where = "" if known is None else f"eta = {known:.4g} m, "
+        if instant is not None:
+            eta = instant.signals["manifold_point"][layout.eta]
+            known = eta if np.isfinite(eta).all() else known
+    where = "" if known is None else f"eta = {', '.join(f'{x:.4g}' for x in known)} m, "
     return f"at {where}t = {scene.now.time:.3f} s"

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, Diagram
 from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
+from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import Task
 from diagrams.workpiece import FurtherLength, Workpiece, upwards
 from pfsc_drake.control.law.fault import Fault
@@ -17,7 +18,7 @@ from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 _SERVO = "velocity_servo"
 # logged signals of faults, by system
@@ -54,7 +55,7 @@ class Station:
             ``drive_torque``, with friction ``friction_torque``. With imperfect encoders
             ``joint_state`` is the truth, and the law was given ``joint_state_measured``.
         initial_state: State of the robot's model at the start.
-        initial_theta: Path parameter at the start.
+        initial_place: Place on the manifold at the start, as the projector remembers it.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         warnings: What may not go as well as hoped, one sentence each.
         workpiece: What the tool may touch, if anything.
@@ -64,11 +65,11 @@ class Station:
     part: RobotPart
     task: Task
     law: FollowingLaw
-    projector: PathProjector
+    projector: ManifoldProjector
     controller: FollowingController
     log: SignalLog
     initial_state: np.ndarray
-    initial_theta: float
+    initial_place: np.ndarray
     on_motors: bool
     warnings: list[str]
     workpiece: Workpiece | None = None
@@ -80,7 +81,8 @@ class Station:
 
     @property
     def path(self) -> Path:
-        """The path."""
+        """The path, of a station whose task is one."""
+        assert isinstance(self.task, PathTask)
         return self.task.path
 
     @property
@@ -100,9 +102,8 @@ class Station:
             root: Context of the diagram.
         """
         self.place_robot(root, self.initial_state)
-        self.projector.set_parameter(
-            self.projector.GetMyMutableContextFromRoot(root), self.initial_theta
-        )
+        projector = self.projector.GetMyMutableContextFromRoot(root)
+        self.projector.set_place(projector, self.initial_place)
 
     def place_robot(self, root: Context, state: np.ndarray) -> None:
         """Put the robot into a state.
@@ -171,4 +172,4 @@ class Station:
         if self.workpiece is None:
             return {}
         up = upwards(self.part.gravity, "notch")
-        return self.workpiece.lengths(self.path, y_t, self.initial_theta, up)
+        return self.workpiece.lengths(self.path, y_t, self.initial_place[0], up)

@@ -36,7 +36,6 @@ from experiments.studies.margins.analysis import MarginAnalysis, analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.words import metrics_of, one_line
 
-_PATH_POINTS = 600
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
 
 
@@ -238,7 +237,9 @@ def _report(
     interrupted: bool,
 ) -> Report:
     """Draw figures if wanted, and write the page that a person opens."""
-    pictures = render_figures(measured.log, _path_points(prepared)) if drawn else []
+    pictures = (
+        render_figures(measured.log, prepared.station.task.drawing.outline()) if drawn else []
+    )
     page = report_page(
         title=name,
         description=prepared.settings.description,
@@ -253,12 +254,6 @@ def _report(
         diagram_svg=block_diagram_svg(prepared.station.diagram) if pictures else None,
     )
     return write_report(results, pictures, page)
-
-
-def _path_points(prepared: PreparedRun) -> np.ndarray:
-    """Points of the path to draw [m], shape (k, 3)."""
-    curve = prepared.station.path.position
-    return curve.derivatives(np.linspace(*curve.domain, _PATH_POINTS), 0)[:, 0, :]
 
 
 def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:

@@ -280,6 +280,41 @@ def compose(derivatives: Sequence[Coefficient], inner: Jet) -> Jet:
     return Jet(result)
 
 
+def compose_pair(partials: Sequence[Coefficient], first: Jet, second: Jet) -> Jet:
+    """Return the jet of ``f(g(t), h(t))``.
+
+    Args:
+        partials: Partial derivatives of f at ``(g(0), h(0))`` by total order, and inside one from
+            the first variable to the second: ``f, f_g, f_h, f_gg, f_gh, f_hh, ...``.
+        first: Jet of the scalar signal ``g``.
+        second: Jet of the scalar signal ``h``.
+
+    Returns:
+        Jet of the lowest of the orders of both jets and of the partial derivatives.
+    """
+    order = min((math.isqrt(8 * len(partials) + 1) - 3) // 2, first.order, second.order)
+    powers = [_scaled_powers(inner.truncate(order)) for inner in (first, second)]
+    # highest total order first: what the linear terms add to is the same whatever they are
+    terms = [(n - j, j) for n in range(order, 0, -1) for j in range(n + 1)]
+    products = [powers[0][i] * powers[1][j] for i, j in terms]
+    factors = [partials[(i + j) * (i + j + 1) // 2 + j] for i, j in terms]
+    result = [partials[0]]
+    for k in range(1, order + 1):
+        start = (order - k) * (order + k + 3) // 2
+        pairs = zip(factors[start:], products[start:], strict=True)
+        result.append(sum(factor * product.coefficients[k] for factor, product in pairs))
+    return Jet(result)
+
+
+def _scaled_powers(x: Jet) -> list[Jet]:
+    """Return ``(x - x(0))^n / n!`` of a scalar signal for n up to its order."""
+    increment = Jet([x.coefficients[0] * 0.0, *x.coefficients[1:]])
+    powers = [constant(x.coefficients[0] * 0.0 + 1.0, x.order), increment, increment**2 * 0.5]
+    for n in range(3, x.order + 1):
+        powers.append(powers[-1] * increment * (1.0 / n))
+    return powers
+
+
 def vector(components: Sequence[Jet]) -> Jet:
     """Return the vector signal made of scalar signals."""
     order = min(c.order for c in components)

@@ -139,6 +139,29 @@ def test_composition_from_derivatives(inner):
     assert_agrees(jets.compose(derivatives, Jet(list(inner))), composed, t)
 
 
+@given(inner=two_scalars)
+@settings(max_examples=15, deadline=None)
+def test_composition_from_partial_derivatives(inner):
+    t = ca.SX.sym("t")
+    a, b = (float(x) for x in inner[:, 0])
+    g, h = (polynomial(x, t) for x in inner)
+    # closed forms: f = exp(-a) sin(2 b) and f = (a + 2 b)^7
+    orders = [(n - j, j) for n in range(ORDER + 1) for j in range(n + 1)]
+    waves = [np.sin(2 * b + j * np.pi / 2) * 2**j * (-1) ** i * np.exp(-a) for i, j in orders]
+    powers = [math.perm(7, i + j) * (a + 2 * b) ** (7 - i - j) * 2**j for i, j in orders]
+    composed = ca.vertcat(ca.exp(-g) * ca.sin(2 * h), (g + 2 * h) ** 7)
+    partials, pair = list(np.array([waves, powers]).T), [Jet(list(x)) for x in inner]
+    jet = jets.compose_pair(partials, *pair)
+    assert_agrees(jet, composed, t)
+    # the order is the lowest of all
+    for order in range(ORDER + 1):
+        known = partials[: (order + 1) * (order + 2) // 2]
+        assert jets.compose_pair(known, *pair).order == order
+        assert jets.compose_pair(partials, pair[0], pair[1].truncate(order)).order == order
+    part = jets.compose_pair(partials, pair[0].truncate(2), pair[1])
+    assert np.allclose(part.coefficients, jet.coefficients[:3], rtol=1e-15)
+
+
 @given(c=scalar)
 @settings(max_examples=20, deadline=None)
 def test_differentiation_inverts_integration(c):

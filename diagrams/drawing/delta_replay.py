@@ -4,13 +4,12 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from diagrams.drawing.replay import RecordedMotion, add_motion
 from diagrams.drawing.workpiece_drawing import look_down_at
 from diagrams.workpiece import WorkpieceLook
-from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer, turn_scene_over
-from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15
@@ -18,8 +17,7 @@ _CLEARANCE = 0.15
 
 def build_delta_replay(
     robot: DeltaRobot,
-    path: Path,
-    layout: PathPointLayout,
+    manifold: ManifoldDrawing,
     motion: RecordedMotion,
     meshcat: Meshcat,
     period: float,
@@ -29,28 +27,24 @@ def build_delta_replay(
 
     Args:
         robot: The robot.
-        path: The path, axes of the inertial frame (z_0 down).
-        layout: Layout of the path points.
+        manifold: How the manifold is drawn, axes of the inertial frame (z_0 down).
         motion: What to draw; its positions are those of the slides.
         meshcat: Where to draw.
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
     """
-    _arrange_scene(path, meshcat)
+    _arrange_scene(np.concatenate(manifold.outline())[:, 2], meshcat)
     if workpiece is not None:
         look_down_at(meshcat, np.array([0.0, 0.0, _CLEARANCE]))
     builder = DiagramBuilder()
-    slides = add_motion(
-        builder, PathVisualizer(path, layout, meshcat, period), motion, workpiece, meshcat, period
-    )
+    slides = add_motion(builder, manifold, motion, workpiece, meshcat, period)
     body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
     builder.Connect(slides, body.GetInputPort("slide_positions"))
     return builder.Build()
 
 
-def _arrange_scene(path: Path, meshcat: Meshcat) -> None:
+def _arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
     """Hang the robot above the grid, and look at it from the side, level with the rods."""
-    depth = path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, 2]
     height = float(depth.max()) + _CLEARANCE
     turn_scene_over(meshcat, height)
     target = np.array([0.0, 0.0, height - 0.55 * depth.max()])

@@ -13,12 +13,11 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
 from diagrams.workpiece import WorkpieceLook
-from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
-from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
 
@@ -49,7 +48,7 @@ class RecordedMotion:
         times: Times of the frames [s], shape (frames,), increasing from 0.
         positions: The plant's positions, shape (frames, nq).
         tool_pose: ``[y_t, R_e]``, shape (frames, 12).
-        path_point: The path next to the tool, shape (frames, layout.size).
+        manifold_point: The manifold next to the tool, shape (frames, layout.size).
         elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
         pushes: What pushes its links.
     """
@@ -57,15 +56,14 @@ class RecordedMotion:
     times: np.ndarray
     positions: np.ndarray
     tool_pose: np.ndarray
-    path_point: np.ndarray
+    manifold_point: np.ndarray
     elbow: np.ndarray | None = None
     pushes: RecordedPushes | None = None
 
 
 def build_replay(
     robot: RobotDrawing,
-    path: Path,
-    layout: PathPointLayout,
+    manifold: ManifoldDrawing,
     motion: RecordedMotion,
     meshcat: Meshcat,
     period: float,
@@ -75,21 +73,19 @@ def build_replay(
 
     Args:
         robot: How the robot is drawn.
-        path: The path.
-        layout: Layout of the path points.
+        manifold: How the manifold is drawn.
         motion: What to draw.
         meshcat: Where to draw.
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
     """
     bodies = _body_origins(robot.plant, motion.positions[0])
-    meshcat.SetCameraPose(*camera_and_target(_path_points(path), bodies))
+    points = np.concatenate(manifold.outline())
+    meshcat.SetCameraPose(*camera_and_target(points, bodies))
     if workpiece is not None:
-        look_down_at(meshcat, _path_points(path).mean(axis=0))
+        look_down_at(meshcat, points.mean(axis=0))
     builder = DiagramBuilder()
-    positions = add_motion(
-        builder, PathVisualizer(path, layout, meshcat, period), motion, workpiece, meshcat, period
-    )
+    positions = add_motion(builder, manifold, motion, workpiece, meshcat, period)
     body = builder.AddNamedSystem(
         "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     )
@@ -99,7 +95,7 @@ def build_replay(
 
 def add_motion(
     builder: DiagramBuilder,
-    drawing: PathVisualizer,
+    manifold: ManifoldDrawing,
     motion: RecordedMotion,
     workpiece: WorkpieceLook | None,
     meshcat: Meshcat,
@@ -109,7 +105,7 @@ def add_motion(
 
     Args:
         builder: Builder of the diagram.
-        drawing: Draws the path.
+        manifold: How the manifold is drawn.
         motion: What to draw.
         workpiece: What the tool touches, if anything.
         meshcat: Where to draw.
@@ -121,11 +117,10 @@ def add_motion(
     signals: Mapping[str, np.ndarray] = {
         "positions": motion.positions,
         "tool_pose": motion.tool_pose,
-        "path_point": motion.path_point,
+        "manifold_point": motion.manifold_point,
     }
     sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
-    builder.AddNamedSystem("path_visualizer", drawing)
-    builder.Connect(sources["path_point"], drawing.GetInputPort("path_point"))
+    builder.Connect(sources["manifold_point"], manifold.add(builder, meshcat, period))
     if workpiece is not None:
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
     _add_trail(builder, "path_following", _TOOL, motion, motion.tool_pose[:, :3], meshcat, period)
@@ -189,11 +184,6 @@ def _body_origins(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
     plant.SetPositions(context, q)
     bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
     return np.array([body.EvalPoseInWorld(context).translation() for body in bodies])
-
-
-def _path_points(path: Path) -> np.ndarray:
-    """Points of the path [m], shape (k, 3)."""
-    return path.position.derivatives(np.linspace(*path.position.domain, 100), 0)[:, 0, :]
 
 
 def add_source(

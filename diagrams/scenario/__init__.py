@@ -20,6 +20,7 @@ from diagrams.scenario.posture import PostureParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
+from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.link_hand import LinkHandParameters
@@ -56,6 +57,7 @@ __all__ = [
     "ServoParameters",
     "SimulationParameters",
     "StartParameters",
+    "SurfaceParameters",
     "Target",
     "Waypoints",
 ]

@@ -21,11 +21,32 @@ _TRANSITIONS = (1e-3, 1e3)  # s
 
 
 @dc.dataclass
+class SecondReference:
+    """Motion along the second tangential coordinate of a surface, at its own pace.
+
+    Attributes:
+        points: Coordinates to visit [m], at most 1e6; the first is the start.
+        velocity: Largest velocity [m/s].
+        acceleration: Largest acceleration [m/s^2].
+    """
+
+    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
+    velocity: float = 0.1
+    acceleration: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_motion(self)
+
+
+@dc.dataclass
 class ReferenceParameters:
-    """Motion along the path, resting at every point.
+    """Motion along the path, or along a surface, resting at every point.
 
     Attributes:
         points: Arc lengths to visit [m], at most 1e6; the first is the start.
+        places: Of a surface, instead: pairs of tangential coordinates to visit [m], along straight
+            lines of these coordinates.
+        second: Of a surface, with points for its first coordinate: the motion of the second.
         velocity: Largest velocity, 1e-6 to 1e3 [m/s].
         acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
@@ -35,19 +56,32 @@ class ReferenceParameters:
     velocity: float = 0.1
     acceleration: float = 1.0
     dwell: float = 0.3
+    places: list[list[float]] = dc.field(default_factory=list)
+    second: SecondReference | None = None
 
     def __post_init__(self) -> None:
-        enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
-        require(enough, "points", self.points, "two or more finite numbers")
-        near = max(map(abs, self.points)) <= _FARTHEST
-        require(near, "points", self.points, f"numbers of at most {_FARTHEST:g} m")
-        require_between("velocity", self.velocity, *_VELOCITIES, "m/s, a positive number")
-        require_between(
-            "acceleration", self.acceleration, *_ACCELERATIONS, "m/s^2, a positive number"
-        )
+        _check_motion(self)
+        for i, place in enumerate(self.places):
+            require_numbers(f"places[{i}]", place, 2)
+            near = max(map(abs, place)) <= _FARTHEST
+            require(near, f"places[{i}]", place, f"numbers of at most {_FARTHEST:g} m")
+        require(len(self.places) != 1, "places", self.places, "two or more pairs, or none")
+        one = not (self.places and self.second)
+        require(one, "second", "given", "null where places are given")
         good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
         allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
         require(good, "dwell", self.dwell, allowed)
+
+
+def _check_motion(motion: SecondReference | ReferenceParameters) -> None:
+    enough = len(motion.points) >= 2 and bool(np.isfinite(motion.points).all())
+    require(enough, "points", motion.points, "two or more finite numbers")
+    near = max(map(abs, motion.points)) <= _FARTHEST
+    require(near, "points", motion.points, f"numbers of at most {_FARTHEST:g} m")
+    require_between("velocity", motion.velocity, *_VELOCITIES, "m/s, a positive number")
+    require_between(
+        "acceleration", motion.acceleration, *_ACCELERATIONS, "m/s^2, a positive number"
+    )
 
 
 @dc.dataclass
@@ -55,7 +89,10 @@ class StartParameters:
     """Where the tool is at the start, at rest.
 
     Attributes:
-        offset: Transversal coordinates [m] beside the first point of the reference.
+        offset: Transversal coordinates [m] beside the first point of the reference; of a surface
+            the first is the distance along its normal.
+        theta: Of a surface: its parameters where the tool starts; empty for its middle.
+        position: Of a surface, instead: the tool point [m].
         rotation_deg: ZYX angles [deg] away from the path's orientation.
         posture_deg: Joint angles [deg] near the start pose (m for prismatic joints); they
             choose the branch of the inverse kinematics.
@@ -65,12 +102,18 @@ class StartParameters:
     """
 
     offset: list[float] = dc.field(default_factory=lambda: [0.0, 0.0])
+    theta: list[float] = dc.field(default_factory=list)
+    position: list[float] = dc.field(default_factory=list)
     rotation_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     posture_deg: list[float] = dc.field(default_factory=list)
     transition: float = 0.0
 
     def __post_init__(self) -> None:
         require_numbers("offset", self.offset, 2)
+        if self.theta:
+            require_numbers("theta", self.theta, 2)
+        if self.position:
+            require_numbers("position", self.position, 3)
         good = self.transition == 0.0 or _TRANSITIONS[0] <= self.transition <= _TRANSITIONS[1]
         allowed = f"zero or a positive number, {_TRANSITIONS[0]:g} to {_TRANSITIONS[1]:g} s"
         require(good, "transition", self.transition, allowed)

@@ -21,6 +21,7 @@ from diagrams.scenario.notch import NotchParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.simulation import SimulationParameters
+from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
@@ -51,6 +52,7 @@ class Scenario:
         description: One line.
         robot: Which robot.
         path: Which path.
+        surface: Which surface, for ``controller.manifold: surface``.
         controller: The controller.
         model_error: What the controller believes wrongly of the robot.
         reference: Motion along the path.
@@ -81,6 +83,7 @@ class Scenario:
     description: str = ""
     robot: RobotParameters = dc.field(default_factory=RobotParameters)
     path: PathParameters = dc.field(default_factory=PathParameters)
+    surface: SurfaceParameters | None = None
     controller: ControllerParameters = dc.field(default_factory=ControllerParameters)
     model_error: ModelErrorParameters = dc.field(default_factory=ModelErrorParameters)
     reference: ReferenceParameters = dc.field(default_factory=ReferenceParameters)

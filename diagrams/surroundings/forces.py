@@ -10,6 +10,7 @@ from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import Task
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
@@ -88,7 +89,9 @@ def _scripted(
         manifold = task.place
         allowed = "0 unless six axes follow a path with all of its orientation"
         square = len(manifold.coordinates) == part.robot.dimension == 6
-        require(square, "hold_back.force", pulse.force, allowed)
+        along_path = isinstance(manifold, PathManifold)
+        require(square and along_path, "hold_back.force", pulse.force, allowed)
+        assert isinstance(manifold, PathManifold)
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
         brake = builder.AddNamedSystem(
             "hold_back", DecoupledForce(part.robot, manifold, shape, period)

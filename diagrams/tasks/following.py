@@ -17,7 +17,7 @@ from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -57,7 +57,7 @@ class PlaceOnManifold:
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
     """
 
-    projector: PathProjector
+    projector: ManifoldProjector
     desired_reference: OutputPort
     signals: dict[str, OutputPort]
 
@@ -143,8 +143,7 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        path = following.task.path
-        lap = path.length if path.closed else None
+        lap = following.task.lap
         made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     builder.Connect(made["reference"], controller.GetInputPort("reference"))

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.tasks.path import make_path
+from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -42,6 +43,7 @@ class PathTask(Task):
     """
 
     _law_manifold: type[PathManifold] = PathManifold
+    place: PathManifold
 
     def __init__(
         self,
@@ -68,6 +70,24 @@ class PathTask(Task):
             acceleration=reference.acceleration,
             dwell=reference.dwell,
         )
+
+    @property
+    def lap(self) -> float | None:
+        """See :class:`Task`."""
+        return self.path.length if self.path.closed else None
+
+    def require_joints(self, num_joints: int) -> None:
+        """See :class:`Task`."""
+        require_orientation(self.path, self._scenario.path.orientation.task, num_joints)
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.path.evaluator(self.relative_degree)(y_t.tolist(), memory[0])
+
+    @property
+    def drawing(self) -> PathDrawing:
+        """See :class:`Task`."""
+        return PathDrawing(self.path, self.place.layout)
 
     def _check_points(self, points: list[float]) -> None:
         """Refuse arc lengths off the ends of an open path."""
@@ -120,11 +140,11 @@ class PathTask(Task):
             deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
         target = ToolTarget(y_t, R_e, self.place.tool_axis)
-        return StartPoint(target, projection.theta)
+        return StartPoint(target, np.array([projection.theta]))
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
-        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.theta)
+        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.place[0])
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """See :class:`Task`."""
@@ -169,21 +189,4 @@ class TrajectoryTask(PathTask):
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""
-        return self.path.evaluator(self.relative_degree).evaluate_at(start.theta)
-
-
-TASKS: dict[str, type[PathTask]] = {"path": PathTask, "trajectory": TrajectoryTask}
-
-
-def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
-    """Return what a scenario's tool is to do.
-
-    Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
-        progress: Told the fraction done and what is done, where that takes its time.
-
-    Raises:
-        InputError: If the path or the motion along it cannot be made.
-    """
-    return TASKS[scenario.controller.manifold](scenario, folder, progress)
+        return self.path.evaluator(self.relative_degree).evaluate_at(start.place[0])

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.manifolds.manifold import Manifold
-from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, ShapeReport
+from diagrams.drawing.manifold_drawing import ManifoldDrawing
+from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
+from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
+from pfsc_drake.geometry.surfaces.report import SurfaceReport
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,11 @@ class StartPoint:
 
     Attributes:
         target: Tool point and what of its orientation matters.
-        theta: Parameter of the nearest point of the manifold.
+        place: Nearest place on the manifold, as its projector remembers it.
     """
 
     target: ToolTarget
-    theta: float
+    place: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class PlaceFinder:
         manifold_point: The point that the law acts on, laid out by the task's manifold.
     """
 
-    projector: PathProjector
+    projector: ManifoldProjector
     manifold_point: OutputPort
 
 
@@ -45,20 +46,48 @@ class Task(ABC):
     """What a tool is to follow, and how it moves along.
 
     Attributes:
-        path: The path.
         place: Manifold in whose coordinates the tool's true place is told.
         manifold: Manifold that the law makes linear.
-        motion: First coordinate of the reference over time, of dimension 1.
-        shape: Numbers of the path that decide whether it can be followed.
+        motion: Tangential coordinates of the reference over time, of as many dimensions.
+        shape: Numbers of the manifold that decide whether it can be followed.
         warnings: What is out of proportion in it, one sentence each.
     """
 
-    path: Path
-    place: PathManifold
+    place: PlaceManifold
     manifold: Manifold
     motion: PiecewisePolynomialCurve
-    shape: ShapeReport
+    shape: ShapeReport | SurfaceReport
     warnings: list[str]
+
+    @property
+    def lap(self) -> float | None:
+        """Length of the manifold [m] if it is closed in its only direction."""
+        return None
+
+    @abstractmethod
+    def require_joints(self, num_joints: int) -> None:
+        """Refuse a robot that cannot follow, or would lose its orientation by oversight.
+
+        Args:
+            num_joints: Of the robot.
+
+        Raises:
+            InputError: If so.
+        """
+
+    @abstractmethod
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """Return the point of the true place's manifold next to a tool, shape (size,).
+
+        Args:
+            y_t: Tool point [m], shape (3,).
+            memory: Place from which it is looked for, as the projector remembers it.
+        """
+
+    @property
+    @abstractmethod
+    def drawing(self) -> ManifoldDrawing:
+        """How the manifold is drawn."""
 
     @abstractmethod
     def add_place(

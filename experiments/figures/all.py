@@ -1,6 +1,6 @@
 """The figures of a path following run, chosen by the signals that its log has."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import matplotlib
 
@@ -33,28 +33,28 @@ from experiments.figures.style import STYLE, Drawing, Figure, render
 from experiments.results.run_log import FloatArray, RunLog
 
 
-def render_figures(log: RunLog, path_points: FloatArray) -> list[Figure]:
+def render_figures(log: RunLog, outline: Sequence[FloatArray]) -> list[Figure]:
     """Returns all figures that the log has signals for, in the order of the report.
 
     Args:
         log: Of a path following run.
-        path_points: [k, 3] m, points of the path in order, in the frame of ``y_t``.
+        outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
     """
     with matplotlib.rc_context(STYLE):
-        return [render(drawing) for drawing in draw_figures(log, path_points)]
+        return [render(drawing) for drawing in draw_figures(log, outline)]
 
 
-def draw_figures(log: RunLog, path_points: FloatArray) -> Iterator[Drawing]:
+def draw_figures(log: RunLog, outline: Sequence[FloatArray]) -> Iterator[Drawing]:
     """Draws all figures that the log has signals for, one after the other.
 
     Args:
         log: Of a path following run.
-        path_points: [k, 3] m, points of the path in order, in the frame of ``y_t``.
+        outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
     """
     if log.time.size == 0:
         return
     if "y_t" in log:
-        yield draw_path(log, path_points)
+        yield draw_path(log, outline)
     for can_draw, draw in _FIGURES:
         if can_draw(log):
             yield draw(log)

@@ -30,44 +30,56 @@ MIN_SPAN = 2.0  # degrees, that an axis of angles shows at least
 
 
 def draw_progress(log: RunLog) -> Drawing:
-    """Tangential coordinate with its references, its error, how far it yields, and the speed."""
-    eta = log["eta"].values[:, 0]
-    reference = log["eta_p"].values[:, 0] if "eta_p" in log else None
+    """Tangential coordinates with references, errors, how far they yield, and the speed."""
+    eta = log["eta"].values
+    on_surface = eta.shape[1] == 2
+    where = "on the surface" if on_surface else "along the path"
+    names = ["_1", "_2"] if on_surface else [""]
+    reference = log["eta_p"].values if "eta_p" in log else None
     desired = None
     if reference is not None and "eta_d" in log:
-        desired = log["eta_d"].values[:, 0]
+        desired = log["eta_d"].values
         desired = desired if largest(reference - desired) > SAME else None
     rows = 1 + (reference is not None) + (desired is not None) + ("eta_dot" in log)
     canvas, panels = make_panels(rows)
     position, *further = panels
     if reference is not None:
-        position.plot(log.time, reference, label=r"$\eta^p$ (reference)", **BROAD)
+        for k, column in enumerate(reference.T):
+            label = r"$\eta^p$ (reference)" if k == 0 else None
+            position.plot(log.time, column, label=label, **BROAD)
         error = further.pop(0)
         scale, unit = fitting_unit(eta - reference, "m")
-        error.plot(log.time, scale * (eta - reference), color=COLOURS[1])
+        for k, column in enumerate((eta - reference).T):
+            error.plot(log.time, scale * column, color=COLOURS[k if on_surface else 1])
         error.set(ylabel=f"error in {unit}", title=r"Tangential error $\eta - \eta^p$")
     if reference is not None and desired is not None:
-        position.plot(log.time, desired, "--", color=INK, label=r"$\eta^d$ (desired)")
         yielding = further.pop(0)
-        yielding.plot(log.time, MILLI * (reference - desired), color=COLOURS[2])
+        for k, column in enumerate(desired.T):
+            label = r"$\eta^d$ (desired)" if k == 0 else None
+            position.plot(log.time, column, "--", color=INK, label=label)
+            colour = COLOURS[k if on_surface else 2]
+            yielding.plot(log.time, MILLI * (reference[:, k] - column), color=colour)
         yielding.set(ylabel="way in mm", title=r"How far the reference yields $\eta^p - \eta^d$")
-    position.plot(log.time, eta, color=COLOURS[0], label=r"$\eta$")
-    position.set(ylabel="arc length in m", title="Position along the path")
+    for k, (column, name) in enumerate(zip(eta.T, names, strict=True)):
+        position.plot(log.time, column, color=COLOURS[k], label=rf"$\eta{name}$")
+    position.set(ylabel="arc length in m", title=f"Position {where}")
     if further:
         speed = further.pop(0)
-        speed.plot(log.time, log["eta_dot"].values[:, 0], color=COLOURS[0])
-        speed.set(ylabel="speed in m/s", title=r"Speed along the path $\dot\eta$")
+        for k, column in enumerate(log["eta_dot"].values.T):
+            speed.plot(log.time, column, color=COLOURS[k])
+        speed.set(ylabel="speed in m/s", title=rf"Speed {where} $\dot\eta$")
     shade_pushes(panels, log)
     place_legend(position)
     shown = [
-        *(["its reference", "the error between them"] if reference is not None else []),
+        *(["their references"] * on_surface or ["its reference"] if reference is not None else []),
+        *(["the error between them"] if reference is not None else []),
         *(["how far the reference yields to forces"] if desired is not None else []),
         *(["the speed"] if "eta_dot" in log else []),
     ]
-    *first, last = ["Tangential coordinate", *shown]
+    *first, last = ["Tangential coordinates" if on_surface else "Tangential coordinate", *shown]
     separator = ", and " if len(first) > 1 else " and "
     caption = f"{', '.join(first)}{separator}{last}." if first else f"{last}."
-    return Drawing("progress", "Progress along the path", caption, canvas)
+    return Drawing("progress", f"Progress {where}", caption, canvas)
 
 
 def draw_transversal(log: RunLog) -> Drawing:
@@ -75,9 +87,12 @@ def draw_transversal(log: RunLog) -> Drawing:
     xi = log["xi"].values
     compliant = _is_used(log, "xi_p")
     canvas, panels = make_panels(3 if compliant or is_dwarfed(log.time, xi) else 2)
-    labels = [r"$\xi_1$", r"$\xi_2$"][: xi.shape[1]]
+    on_surface = xi.shape[1] == 1
+    where = "surface" if on_surface else "path"
+    labels = [r"$\xi$"] if on_surface else [r"$\xi_1$", r"$\xi_2$"]
     error = _draw_with_references(panels[0], log, "xi", r"\xi", labels)
-    panels[0].set(ylabel="deviation in mm", title="Transversal coordinates")
+    subject = "Transversal coordinate" if on_surface else "Transversal coordinates"
+    panels[0].set(ylabel="deviation in mm", title=subject)
     if error is not None:
         title = r"Error from the reference $\xi - \xi^p$"
         _draw_enlarged(panels[1], log.time, error, "m", labels, title)
@@ -90,17 +105,17 @@ def draw_transversal(log: RunLog) -> Drawing:
     if error is not None:
         distances[r"from the reference $\|\xi - \xi^p\|$"] = error
     panels[-1].set(ylabel="distance in mm")
-    _draw_sizes(panels[-1], log.time, distances, "Distance from the path")
+    _draw_sizes(panels[-1], log.time, distances, f"Distance from the {where}")
     shade_pushes(panels, log)
     place_legend(panels[0])
     caption = (
-        "Transversal coordinates, enlarged where the start dwarfs the rest, and the distance from"
-        " the path on a logarithmic scale."
+        f"{subject}, enlarged where the start dwarfs the rest, and the distance from"
+        f" the {where} on a logarithmic scale."
         if error is None
-        else "Transversal coordinates over the reference that yields to forces (broad), what lies"
+        else f"{subject} over the reference that yields to forces (broad), what lies"
         " between the two, and the distances on a logarithmic scale."
     )
-    return Drawing("transversal", "Deviation from the path", caption, canvas)
+    return Drawing("transversal", f"Deviation from the {where}", caption, canvas)
 
 
 def draw_orientation(log: RunLog) -> Drawing:

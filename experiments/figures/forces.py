@@ -24,6 +24,8 @@ LEVER = 1e-3  # m; moments below the largest force times this lever are noise an
 PAUSE = 0.02  # share of a run, up to which a break counts as part of a push
 _SYMBOLS = {
     "tau_par": r"$\tau_\parallel$",
+    "tau_par_1": r"$\tau_{\parallel,1}$",
+    "tau_par_2": r"$\tau_{\parallel,2}$",
     "tau_perp": r"$\tau_\perp$",
     "tau_cross": r"$\tau_\times$",
     **{f"tau_{axis}": rf"$\tau_{axis}$" for axis in "zyx"},

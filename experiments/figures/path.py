@@ -1,5 +1,7 @@
 """The three-dimensional view of a path and of the way the tool point took."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import MaxNLocator
@@ -12,22 +14,26 @@ ARROW_COUNT = 5
 ELEVATION = 28.0  # degrees, of the viewer
 
 
-def draw_path(log: RunLog, path_points: FloatArray) -> Drawing:
+def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> Drawing:
     """Path and driven output with start, end and direction of travel; equal scales on all axes.
 
     Args:
         log: With ``y_t`` [samples, 3] m.
-        path_points: [k, 3] m.
+        outline: Lines that show what is followed, each [k, 3] m; one of a path.
     """
     canvas = Canvas(figsize=(WIDTH, 5.6))
     axes = canvas.add_subplot(projection="3d", computed_zorder=False)
     assert isinstance(axes, Axes3D)
     output = log["y_t"].values
     output = output[np.all(np.isfinite(output), axis=1)]
-    path_points = np.asarray(path_points, dtype=float).reshape(-1, 3)
-    floor = _set_equal_scales(axes, np.vstack([path_points, output]))
-    axes.plot(*path_points[:, :2].T, floor, color="#D1D5DB", linewidth=1.0, zorder=1)
-    axes.plot(*path_points.T, label="path $\\gamma$", zorder=2, **BROAD)
+    lines = [np.asarray(line, dtype=float).reshape(-1, 3) for line in outline]
+    floor = _set_equal_scales(axes, np.vstack([*lines, output]))
+    if len(lines) == 1:
+        axes.plot(*lines[0][:, :2].T, floor, color="#D1D5DB", linewidth=1.0, zorder=1)
+        axes.plot(*lines[0].T, label="path $\\gamma$", zorder=2, **BROAD)
+    for i, line in enumerate(lines[1:] and lines):
+        label = None if i else r"surface $\mathcal{S}$"
+        axes.plot(*line.T, color=REFERENCE, linewidth=0.7, label=label, zorder=2)
     axes.plot(*output.T, color=COLOURS[0], linewidth=1.6, label="tool point $y_t$", zorder=3)
     _draw_direction(axes, output)
     ends = (
@@ -57,6 +63,9 @@ def draw_path(log: RunLog, path_points: FloatArray) -> Drawing:
     axes.set_ylabel("y in m", labelpad=8)
     axes.set_zlabel("z in m", labelpad=4)
     canvas.legend(loc="outside upper left", ncols=4, handlelength=1.6, columnspacing=1.4)
+    if len(lines) > 1:
+        caption = "The surface, by lines of its parameters, and the tool point's way."
+        return Drawing("path", "Surface and driven output", caption, canvas)
     caption = "The path, its shadow on the floor, and the tool point's way."
     return Drawing("path", "Path and driven output", caption, canvas)
 

@@ -29,7 +29,7 @@ def lap_length(station: Station) -> float | None:
     Args:
         station: The station.
     """
-    return station.path.length if station.path.closed else None
+    return station.task.lap
 
 
 def has_elbow(station: Station) -> bool:
@@ -94,9 +94,9 @@ def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) 
     elbow = elbow_motion(station, raw["joint_state"])
     log.add("elbow", elbow, "m", labels[:3])
     undisturbed = None
-    if _PUSHES in raw and station.path.closed:
+    if _PUSHES in raw and station.task.lap is not None:
         force, eta = log["push_force"].values, log["eta"].values[:, 0]
-        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.path.length)
+        undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.task.lap)
     if undisturbed is not None:
         log.add("elbow_undisturbed", undisturbed, "m", labels[:3])
 

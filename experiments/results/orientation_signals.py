@@ -5,12 +5,8 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.station import Station
 from experiments.results.run_log import RunLog
-from pfsc_drake.geometry import (
-    PathPointLayout,
-    angle_between,
-    matrix_to_zyx,
-    quaternion_to_matrix,
-)
+from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.geometry import angle_between, matrix_to_zyx
 
 
 def add_orientation(
@@ -25,15 +21,15 @@ def add_orientation(
         log: To add to; nothing without an orientation to follow.
         station: The station that was simulated.
         followed: Points of the manifold that the law acted on, shape (samples, size).
-        place: Points of the path next to the tool, shape (samples, size).
+        place: Points of the manifold next to the tool, shape (samples, size).
         pose: ``[y_t, R_e by rows]`` of the tool, shape (samples, 12).
     """
     linearization = station.law.linearization
-    if not station.task.place.layout.oriented:
+    if not station.task.place.is_oriented:
         return
     point = followed if linearization.manifold.follows_time else place
-    R_e, R_d = _rotations(station.task.place.layout, pose, point)
-    _, R_place = _rotations(station.task.place.layout, pose, place)
+    R_e, R_d = _rotations(station.task.place, pose, point)
+    _, R_place = _rotations(station.task.place, pose, place)
     unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
     axis = station.task.place.tool_axis
     for name, R in {"e": R_e, "d": R_d}.items():
@@ -54,10 +50,11 @@ def add_orientation(
 
 
 def _rotations(
-    layout: PathPointLayout, pose: np.ndarray, point: np.ndarray
+    manifold: PlaceManifold, pose: np.ndarray, point: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tool's and the path's orientation, each (samples, 3, 3); I where not finite."""
-    finite = (np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))[:, None]
-    quaternion = np.where(finite, point[:, layout.quaternion][:, :4], [1.0, 0.0, 0.0, 0.0])
-    R_e = np.where(finite, pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
-    return R_e, quaternion_to_matrix(quaternion)
+    """Return the tool's and the place's orientation, each (samples, 3, 3); I where not finite."""
+    finite = np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1)
+    R_e = np.where(finite[:, None], pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
+    R_d = np.tile(np.eye(3), (len(point), 1, 1))
+    R_d[finite] = manifold.orientation(point[finite])
+    return R_e, R_d

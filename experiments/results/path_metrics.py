@@ -1,11 +1,12 @@
 """Metrics of a path following run, each a pure function of its log.
 
-Signals used, as in the log: ``xi`` [samples, 2] m, ``eta``, ``eta_p`` [samples, 1] m, ``eta_dot``
-m/s, ``phi`` [samples, 3] rad, or [samples, 2] of an axis, ``tau_d`` [samples, axes] with attribute
-``limits``, ``saturated_drives`` and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or
-more], the first three in N along (eta, xi_1, xi_2), ``tared`` [samples, 1] 0 or 1, ``wrench_ext``
-[samples, 6] N and Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A
-metric over an interval that holds no sample is NaN.
+Signals used, as in the log: ``xi`` [samples, 2] m, of a surface [samples, 1], ``eta``, ``eta_p``
+[samples, 1] m, of a surface [samples, 2], ``eta_dot`` m/s, ``phi`` [samples, 3] rad, or
+[samples, 2] of an axis, ``tau_d`` [samples, axes] with attribute ``limits``, ``saturated_drives``
+and ``fault`` [samples, 1], ``manifold_force`` [samples, 3 or more], the first three in N along
+the translational coordinates, ``tared`` [samples, 1] 0 or 1, ``wrench_ext`` [samples, 6] N and
+Nm, ``notch_position`` [samples, 2] m. Times are those of the log's time axis. A metric over an
+interval that holds no sample is NaN.
 """
 
 import math
@@ -69,7 +70,7 @@ def max_path_deviation_while_moving(log: RunLog, min_speed: float, t: float = -m
     Returns:
         m.
     """
-    moving = np.abs(log["eta_dot"].values[:, 0]) >= min_speed
+    moving = np.linalg.norm(log["eta_dot"].values, axis=1) >= min_speed
     return _max(path_distance(log)[moving & (log.time >= t)])
 
 
@@ -114,7 +115,7 @@ def max_orientation_error_after(log: RunLog, t: float) -> float:
 
 
 def peak_speed(log: RunLog) -> float:
-    """Largest speed along the path, max abs(eta').
+    """Largest speed along the path, max abs(eta'), or on the surface, max |eta'|.
 
     Args:
         log: With ``eta_dot``.
@@ -122,11 +123,11 @@ def peak_speed(log: RunLog) -> float:
     Returns:
         m/s.
     """
-    return _max(np.abs(log["eta_dot"].values[:, 0]))
+    return _max(np.linalg.norm(log["eta_dot"].values, axis=1))
 
 
 def tangential_error(log: RunLog, t: float = -math.inf) -> float:
-    """Largest tangential error, max abs(eta - eta_p) at times >= t.
+    """Largest tangential error, max |eta - eta_p| at times >= t.
 
     Args:
         log: With ``eta`` and ``eta_p``.
@@ -135,7 +136,7 @@ def tangential_error(log: RunLog, t: float = -math.inf) -> float:
     Returns:
         m.
     """
-    error = np.abs(log["eta"].values[:, 0] - log["eta_p"].values[:, 0])
+    error = np.linalg.norm(log["eta"].values - log["eta_p"].values, axis=1)
     return _max(error[log.time >= t])
 
 
@@ -152,15 +153,17 @@ def max_manifold_force(log: RunLog) -> float:
 
 
 def max_tangential_force(log: RunLog) -> float:
-    """Largest magnitude of the force along the path.
+    """Largest magnitude of the force along the path, or along the surface.
 
     Args:
-        log: With ``manifold_force``; with ``tared`` only samples with a tared sensor count.
+        log: With ``manifold_force`` and ``eta``; with ``tared`` only samples with a tared sensor
+            count.
 
     Returns:
         N.
     """
-    return _max(np.abs(_tared_forces(log)[:, 0]))
+    along = log["eta"].dim if "eta" in log else 1
+    return _max(np.linalg.norm(_tared_forces(log)[:, :along], axis=1))
 
 
 def max_external_force(log: RunLog) -> float:

@@ -52,7 +52,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
             log.add("tracking_error", Y[:, 0, :3], "m", ["along", "normal_1", "normal_2"])
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
-        points = _project(station, pose, linearization.relative_degree)
+        points = _project(station, pose)
         seen = _path_output(station, raw["joint_state"], points)
         # the orientation errors of trajectory tracking stay those from the moving reference
         rotational = indices(station.task.place.coordinates, Kind.ROTATIONAL)
@@ -211,16 +211,14 @@ def _kinds(station: Station) -> list[tuple[Kind, slice, list[str]]]:
     return [(kind, parts[kind], names[kind]) for kind in Kind if names[kind]]
 
 
-def _project(station: Station, pose: np.ndarray, relative_degree: int) -> np.ndarray:
-    """Project a motion of the tool on the path, sample by sample; shape (samples, size)."""
-    path = station.path
-    evaluator = path.evaluator(relative_degree)
-    points = np.full((len(pose), evaluator.layout.size), np.nan)
-    theta = station.initial_theta
+def _project(station: Station, pose: np.ndarray) -> np.ndarray:
+    """Project a motion of the tool on the manifold, sample by sample; shape (samples, size)."""
+    task, memory = station.task, station.initial_place
+    points = np.full((len(pose), task.place.layout.size), np.nan)
     for k, y_t in enumerate(pose[:, :3]):
         if np.isfinite(y_t).all():
-            points[k] = evaluator(y_t.tolist(), theta)
-            theta = points[k, 0]
+            points[k] = task.evaluate(y_t, memory)
+            memory = points[k, task.place.layout.memory]
     return points
 
 

@@ -1,18 +1,26 @@
-"""Metrics of a path's shape."""
+"""Metrics of the shape of a path or a surface."""
 
 import math
 
 from experiments.results.metrics import Metrics
 from pfsc_drake.geometry import ShapeReport
+from pfsc_drake.geometry.surfaces.report import SurfaceReport
 
 
-def shape_metrics(shape: ShapeReport) -> Metrics:
-    """Return the numbers of a path's shape that exist, in SI units.
+def shape_metrics(shape: ShapeReport | SurfaceReport) -> Metrics:
+    """Return the numbers of a path's or a surface's shape that exist, in SI units.
 
     Args:
-        shape: From :func:`shape_report`.
+        shape: From :func:`shape_report` or :func:`surface_report`.
     """
     metrics = Metrics()
+    if isinstance(shape, SurfaceReport):
+        metrics.add("surface_area", shape.area, "m^2")
+        for side in ("outside", "inside"):
+            radius = getattr(shape, f"radius_{side}")
+            if math.isfinite(radius):
+                metrics.add(f"surface_smallest_radius_{side}", radius, "m")
+        return metrics
     metrics.add("path_length", shape.length, "m")
     if math.isfinite(shape.smallest_radius):
         metrics.add("path_smallest_radius", shape.smallest_radius, "m")

@@ -39,7 +39,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape),
             *JointLimits.of(station.robot).metric_names(),
-            *posture_metric_names(signals, is_redundant(station), station.path.closed),
+            *posture_metric_names(signals, is_redundant(station), station.task.lap is not None),
             "real_time_factor",
             "controller_tick_us",
             "controller_tick_us_p99",

@@ -34,10 +34,13 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     usable = np.flatnonzero(finite[1:] & finite[:-1]) + 1
     chosen = usable[:: max(1, len(usable) // _SAMPLES)]
     plant_states = [station.part.coordinates.plant_state(x) for x in states[chosen]]
+    # a place is told by parameters and, where it is integrated, by arc lengths
+    memory = station.task.place.layout.memory
+    places = np.hstack([log["theta"].values, log["eta"].values])[:, : memory.stop - memory.start]
     elapsed = []
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
-        station.projector.set_parameter(projector, log["theta"].values[k - 1, 0])
+        station.projector.set_place(projector, places[k - 1])
         station.place_robot(root, x)
         # the controller compares what it measures with what it measured before
         station.controller.set_last_state(controller, states[k - 1])

@@ -178,9 +178,8 @@ def make_law():
         integral = changes.pop("integral", 0.0)
         weight, coordinate = changes.pop("weight", None), changes.pop("coordinate", None)
         options = ActuationOptions(sampling_time, damping)
-        linearization = linearize(
-            chain, law, PathManifold(RELATIVE_DEGREE[law], oriented=oriented), options
-        )
+        path = PathManifold(RELATIVE_DEGREE[law], oriented=oriented)
+        linearization = linearize(chain, law, changes.pop("manifold", path), options)
         r, m, n = RELATIVE_DEGREE[law], linearization.num_outputs, chain.dimension
         poles = [[-20.0 - 3.0 * i - 2.0 * k for k in range(r)] for i in range(m)]
         gains = [CoordinateGains(gains_from_poles(p).proportional, integral) for p in poles]

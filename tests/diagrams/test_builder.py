@@ -137,7 +137,7 @@ def test_start(station):
         station.projector.GetMyContextFromRoot(root)
     )
     layout = station.task.place.layout
-    assert point[layout.theta][0] == pytest.approx(station.initial_theta, abs=1e-12)
+    assert point[layout.theta][0] == pytest.approx(station.initial_place[0], abs=1e-12)
     assert point[layout.eta][0] == pytest.approx(0.96, abs=1e-9)
 
 

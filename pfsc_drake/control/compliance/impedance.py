@@ -246,7 +246,8 @@ class ImpedanceLaw:
             c.name: lap for c in coordinates if c.kind is Kind.TANGENTIAL and lap is not None
         }
         self._profiles = [
-            [(p.over, p.interpolant(round_trip.get(p.over))) for p in row] for row in table
+            [(p.over if p.at else _ACROSS, p.interpolant(round_trip.get(p.over))) for p in row]
+            for row in table
         ]
         self._row = [list(used).index(coordinate.kind) for coordinate in coordinates]
         self.is_constant = not any(p.at for row in table for p in row)
@@ -260,8 +261,9 @@ class ImpedanceLaw:
         allowed = list(dict.fromkeys([*self._names, _ACROSS]))
         for kind, impedance in used.items():
             for name in ("mass", "damping", "stiffness"):
-                over = getattr(impedance, name).over
-                if over not in allowed:
+                profile = getattr(impedance, name)
+                over = profile.over
+                if profile.at and over not in allowed:
                     raise InputError(
                         f"compliance.{kind.name.lower()}.{name}.over: {over!r}; must be one of "
                         f"{', '.join(allowed)}"

@@ -40,7 +40,8 @@ def law_function(
     progress = []
     if linearization.manifold.follows_time:
         # the reference point moves with time, and the errors from it shall vanish
-        progress = [ca.vertcat(*[y[0] for y in y_p])]
+        along = indices(linearization.manifold.coordinates, Kind.TANGENTIAL)
+        progress = [ca.vertcat(*[y[along] for y in y_p])]
         y_p = [ca.SX(m, 1)] * (r + 1)
     Y, A, b, gain, drift, offset, motion = linearization.function(state, tau_ext, point, *progress)
     last_output, angle = ca.SX.sym("last_output", m), ca.SX(0.0)

@@ -7,7 +7,7 @@ import numpy as np
 
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
-from pfsc_drake.control.manifolds.manifold import Manifold
+from pfsc_drake.control.manifolds.manifold import Kind, Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
@@ -47,7 +47,8 @@ class Linearization:
     Attributes:
         function: CasADi function ``(state, tau_ext, manifold_point) -> (Y, A, b, gain,
             drift, offset, motion)``; for manifolds that follow time with a fourth argument,
-            the derivatives 0..r of the reference's first coordinate, shape (r + 1,).
+            the derivatives 0..r of the references of the k tangential coordinates by rows, shape
+            ((r + 1) k,).
             ``state`` is ``[q_J, v_J, q_M, v_M]``, shape (4N,); ``tau_ext`` holds the
             external torques and their derivatives up to order r - 2, shape
             (N max(r - 1, 0),). ``Y`` holds the derivatives 0..r-1 of the virtual output in
@@ -115,11 +116,12 @@ def linearize(
         )
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("manifold_point", manifold.layout.size)
-    progress = ca.SX.sym("progress", r + 1)
+    progress = ca.SX.sym("progress", (r + 1) * tangential_count(manifold))
     external = ca.vertsplit(tau_ext, n) if r > 1 else []
     q_J, v_J, q_M, v_M = ca.vertsplit(state, n)
     motion = _driven_motion(robot, law, DriveState(q_J, v_J, q_M, v_M, external), options)
-    lead = Jet.from_derivatives(ca.vertsplit(progress))
+    rows = [ca.vertsplit(row) for row in ca.vertsplit(progress, tangential_count(manifold))]
+    lead = [Jet.from_derivatives(column) for column in zip(*rows, strict=True)]
 
     def virtual_output(derivatives: list[ca.SX]) -> list[Jet]:
         y, R_e = robot.tool_pose(joint_jets(derivatives))
@@ -159,7 +161,7 @@ def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     q, rate = ca.SX.sym("q", robot.dimension), ca.SX.sym("rate", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, rate]))
-    output = manifold.virtual_output(y, R_e, point, Jet([ca.SX(0)] * (manifold.layout.order + 1)))
+    output = manifold.virtual_output(y, R_e, point, _standing(manifold))
     slopes = ca.jacobian(ca.vertcat(*[x.coefficients[1] for x in output]), rate)
     return ca.Function(
         "decoupling", [q, point], ca.cse([ca.densify(slopes)]), ["q", "manifold_point"], ["A"]
@@ -179,9 +181,19 @@ def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Functio
     q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     y, R_e = robot.tool_pose(joint_jets([q, v]))
-    output = manifold.virtual_output(y, R_e, point, Jet([ca.SX(0), ca.SX(0)]))
+    output = manifold.virtual_output(y, R_e, point, _standing(manifold))
     Y = ca.horzcat(*[ca.vertcat(*[x.derivative(k) for x in output]) for k in range(2)])
     return ca.Function("virtual_output", [q, v, point], [ca.densify(Y)])
+
+
+def tangential_count(manifold: Manifold) -> int:
+    """Return how many tangential coordinates a manifold has."""
+    return sum(coordinate.kind is Kind.TANGENTIAL for coordinate in manifold.coordinates)
+
+
+def _standing(manifold: Manifold) -> list[Jet]:
+    """Return references of tangential coordinates that stand at zero."""
+    return [Jet([ca.SX(0)] * (manifold.layout.order + 1))] * tangential_count(manifold)
 
 
 def _driven_motion(

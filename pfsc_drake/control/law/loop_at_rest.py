@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
-from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.linearization import Linearization, tangential_count
 from pfsc_drake.control.law.posture import Posture, posture_expressions
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
@@ -90,7 +90,8 @@ class LoopAtRest:
             Decoupling matrix and gain at rest.
         """
         n, m, r = self._n, law.num_outputs, law.relative_degree
-        further = [np.zeros(r + 1)] if law.manifold.follows_time else []
+        standing = np.zeros((r + 1) * tangential_count(law.manifold))
+        further = [standing] if law.manifold.follows_time else []
         no_torque = np.zeros(n * (r - 1))
 
         def results(x: np.ndarray) -> list[np.ndarray]:

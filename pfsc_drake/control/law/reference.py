@@ -1,6 +1,7 @@
 """Reference motions along a path."""
 
 from collections.abc import Sequence
+from math import comb
 
 import numpy as np
 
@@ -86,3 +87,87 @@ def _move(
     rise = (_RAMP(identity) * speed).integ()
     cruise = np.polynomial.Polynomial([0.0, speed])
     return [(ramp_time, rise), (cruise_time, cruise), (ramp_time, cruise - rise)]
+
+
+def straight_lines(
+    places: Sequence[Sequence[float]], velocity: float, acceleration: float, dwell: float = 0.0
+) -> PiecewisePolynomialCurve:
+    """Return a C^4 motion of several coordinates along straight lines, resting at every place.
+
+    Args:
+        places: Coordinates to visit, each of the same number [m]; the first is the start.
+        velocity: Largest velocity of a coordinate [m/s].
+        acceleration: Largest acceleration of a coordinate [m/s^2].
+        dwell: Rest before the first and after every move [s].
+
+    Returns:
+        A curve of as many dimensions over time [s], starting at t = 0.
+
+    Raises:
+        InputError: See :func:`rest_to_rest`, or if places have different numbers of coordinates.
+    """
+    table = _checked_places(places)
+    # the coordinate that moves most keeps the limits, the others move in proportion
+    largest = np.abs(np.diff(table, axis=0)).max(axis=1)
+    way = np.concatenate([[0.0], np.cumsum(largest)])
+    along = rest_to_rest(way.tolist(), velocity=velocity, acceleration=acceleration, dwell=dwell)
+    middles = (along.breakpoints[:-1] + along.breakpoints[1:]) / 2.0
+    progress = along.derivatives(middles, 0)[:, 0, 0]
+    leg = np.clip(np.searchsorted(way, progress) - 1, 0, len(largest) - 1)
+    direction = np.diff(table, axis=0) / np.where(largest > 0.0, largest, 1.0)[:, None]
+    coefficients = along.coefficients * direction[leg][:, None, :]
+    coefficients[:, 0] += table[leg] - way[leg][:, None] * direction[leg]
+    return PiecewisePolynomialCurve(along.breakpoints, coefficients, closed=False)
+
+
+def together(
+    *motions: tuple[Sequence[float], float, float, float],
+) -> PiecewisePolynomialCurve:
+    """Return motions of several coordinates that start at the same time, each at its own pace.
+
+    Args:
+        motions: Of each coordinate points, velocity, acceleration and dwell as for
+            :func:`rest_to_rest`; what ends earlier rests.
+
+    Returns:
+        A curve of as many dimensions over time [s], starting at t = 0.
+
+    Raises:
+        InputError: See :func:`rest_to_rest`.
+    """
+    single = [
+        rest_to_rest(points, velocity=velocity, acceleration=acceleration, dwell=dwell)
+        for points, velocity, acceleration, dwell in motions
+    ]
+    breakpoints = np.unique(np.concatenate([motion.breakpoints for motion in single]))
+    # times that are one but for rounding
+    apart = np.diff(breakpoints, append=np.inf) > 1e-9 * breakpoints[-1]
+    breakpoints = breakpoints[apart]
+    breakpoints[0] = 0.0
+    table = np.zeros((len(breakpoints) - 1, single[0].coefficients.shape[1], len(single)))
+    for k, motion in enumerate(single):
+        for i, begin in enumerate(breakpoints[:-1]):
+            piece = int(np.searchsorted(motion.breakpoints, begin + 1e-9, side="right")) - 1
+            if piece < len(motion.coefficients):
+                own = motion.coefficients[piece, :, 0]
+                table[i, :, k] = _shifted(own, begin - motion.breakpoints[piece])
+            else:
+                table[i, 0, k] = motion.derivatives(motion.breakpoints[-1:], 0)[0, 0, 0]
+    return PiecewisePolynomialCurve(breakpoints, table, closed=False)
+
+
+def _shifted(coefficients: np.ndarray, step: float) -> np.ndarray:
+    """Return the coefficients of a polynomial about a point a step further."""
+    orders = range(len(coefficients))
+    moved = [[comb(k, j) * step ** (k - j) if k >= j else 0.0 for k in orders] for j in orders]
+    return np.array(moved) @ coefficients
+
+
+def _checked_places(places: Sequence[Sequence[float]]) -> np.ndarray:
+    sizes = {len(place) for place in places}
+    if len(places) < 2 or len(sizes) != 1 or not np.all(np.isfinite(np.concatenate(places))):
+        raise InputError(
+            f"reference places: {[list(place) for place in places]}; two or more of as many "
+            "finite numbers each are needed"
+        )
+    return np.array(places, dtype=float)

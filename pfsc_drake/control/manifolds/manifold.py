@@ -63,6 +63,26 @@ class PointLayout(Protocol):
         """A :class:`~pfsc_drake.geometry.ProjectionStatus`, [1]."""
 
 
+class PlaceLayout(PointLayout, Protocol):
+    """Layout of the point of a manifold that the tool is projected onto."""
+
+    @property
+    def theta(self) -> slice:
+        """Parameters of the nearest point."""
+
+    @property
+    def eta(self) -> slice:
+        """Tangential coordinates [m]."""
+
+    @property
+    def position(self) -> slice:
+        """Position [m] and its derivatives, the position itself first."""
+
+    @property
+    def memory(self) -> slice:
+        """What tells the next projection where to begin."""
+
+
 class Manifold(Protocol):
     """A map from the tool's motion to coordinates that a law makes linear.
 
@@ -71,8 +91,8 @@ class Manifold(Protocol):
         coordinates: The m coordinates of the virtual output, in order.
         layout: Layout of the manifold's point.
         follows_time: Whether the point moves with time, so that the virtual output is the error
-            from it. The map then needs ``lead``, derivatives of the first coordinate's
-            reference.
+            from it. The map then needs ``lead``, derivatives of the tangential coordinates'
+            references.
     """
 
     name: str
@@ -83,14 +103,14 @@ class Manifold(Protocol):
     def layout(self) -> PointLayout:
         """Layout of the manifold's point."""
 
-    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.
 
         Args:
             y: Tool point [m], vector jet of order 1 to r.
             R_e: Tool orientation, matrix jet of the same order.
             point: The manifold's point, laid out by ``layout``.
-            lead: First coordinate of the reference [m], scalar jet; only used by manifolds
+            lead: References of the tangential coordinates [m], scalar jets; only used by manifolds
                 that follow time.
         """
 
@@ -113,6 +133,29 @@ class Manifold(Protocol):
 
         Args:
             point: The manifold's point, shape (layout.size,).
+        """
+
+
+class PlaceManifold(Manifold, Protocol):
+    """A manifold that the tool is projected onto, in whose coordinates its place is told."""
+
+    @property
+    def tool_axis(self) -> np.ndarray | None:
+        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
+
+    @property
+    def layout(self) -> PlaceLayout:
+        """Layout of the manifold's point."""
+
+    @property
+    def is_oriented(self) -> bool:
+        """Whether there is an orientation to follow."""
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the orientation that belongs to places, shape (samples, 3, 3).
+
+        Args:
+            points: Shape (samples, layout.size), all finite.
         """
 
 

@@ -1,15 +1,13 @@
 """Trajectory tracking on jets: the tool against a point that moves along a path with time."""
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.orientation import orientation_error
+from pfsc_drake.control.manifolds.orientation import orientation_error, quaternion_rotation
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported
-from pfsc_drake.control.manifolds.path_force import (
-    force_components,
-    rotational_force,
-    torque_across_axis,
-)
+from pfsc_drake.control.manifolds.path_force import force_components
 from pfsc_drake.jets import Jet
 
 
@@ -45,8 +43,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     position = [jets.dot(axis, error) for axis in axes]
     if not path.quaternion:
         return position
-    q_d = jets.compose(path.quaternion, theta_d)
-    return [*position, *orientation_error(R_e, q_d, path.alignment)]
+    R_d = quaternion_rotation(jets.compose(path.quaternion, theta_d))
+    return [*position, *orientation_error(R_e, R_d, path.alignment)]
 
 
 class MovingPoint(PathManifold):
@@ -59,9 +57,9 @@ class MovingPoint(PathManifold):
     name = "trajectory"
     follows_time = True
 
-    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`trajectory_errors`."""
-        return trajectory_errors(y, R_e, self.geometry(point), lead)
+        return trajectory_errors(y, R_e, self.geometry(point), lead[0])
 
     def force(
         self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
@@ -70,8 +68,5 @@ class MovingPoint(PathManifold):
         translational = force_components(wrench[:3], point, self.layout)
         if not self.layout.oriented:
             return translational
-        torque, phi = wrench[3:], reference[3:]
-        if self.alignment is not None:
-            torque = torque_across_axis(torque, point, self.layout, phi, self.alignment)
-        rotational = rotational_force(torque, point, self.layout, phi, self.alignment)
+        _, rotational = self.rotational_force(wrench[3:], point, reference[3:])
         return ca.vertcat(translational, rotational)

@@ -1,16 +1,56 @@
-"""Orientation of a tool against that of a path on jets: three angles, or two of its axis."""
+"""Orientation of a tool against a reference on jets: three angles, or two of its axis."""
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import rotation_to_axis
 from pfsc_drake.jets import Jet
 
+_ANGLES = tuple(
+    Coordinate(f"phi_{axis}", Kind.ROTATIONAL, f"tau_{axis}") for axis in ("z", "y", "x")
+)
 
-def orientation_error(R_e: Jet, q_d: Jet, alignment: np.ndarray | None = None) -> list[Jet]:
+
+class ToolOrientation:
+    """What of a tool's orientation a manifold has coordinates for.
+
+    Args:
+        oriented: Whether the manifold has an orientation.
+        tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
+            shape (3,); None if the whole tool does.
+        manifold: What to call the manifold in errors.
+
+    Attributes:
+        alignment: Rotation whose first column is the axis, shape (3, 3), or None, see
+            :func:`orientation_error`.
+        coordinates: None, the three ZYX angles of the tool, or the two of its axis.
+
+    Raises:
+        InputError: If the axis has no direction, or no orientation to follow.
+    """
+
+    def __init__(self, oriented: bool, tool_axis: np.ndarray | None, manifold: str) -> None:
+        if tool_axis is not None and not oriented:
+            raise InputError(
+                f"tool axis {list(tool_axis)}: the {manifold} has no orientation to follow"
+            )
+        self.alignment = None if tool_axis is None else rotation_to_axis(tool_axis)
+        angles = _ANGLES if tool_axis is None else _ANGLES[:2]
+        self.coordinates = angles if oriented else ()
+
+    @property
+    def tool_axis(self) -> np.ndarray | None:
+        """The axis that alone follows the orientation, of length one, shape (3,), or None."""
+        return None if self.alignment is None else self.alignment[:, 0]
+
+
+def orientation_error(R_e: Jet, R_d: Jet, alignment: np.ndarray | None = None) -> list[Jet]:
     """Return the ZYX angles (2.7) of ``R_d' R_e``, each from the ratio of two entries.
 
-    The norm of the quaternion scales all entries alike and cancels.
+    A factor that scales all entries of ``R_d`` alike cancels.
 
     Where only an axis of the tool matters, ``R_d C`` and ``R_e C`` take the place of ``R_d`` and
     ``R_e``, with the constant rotation C whose first column is the axis in the tool frame. The
@@ -20,13 +60,12 @@ def orientation_error(R_e: Jet, q_d: Jet, alignment: np.ndarray | None = None) -
 
     Args:
         R_e: Tool orientation, matrix jet.
-        q_d: Quaternion (w, x, y, z) of the reference orientation, of any positive norm.
+        R_d: Reference orientation, matrix jet, times any positive scalar signal.
         alignment: The rotation C, shape (3, 3), or None if all of the orientation matters.
 
     Returns:
         3 scalar jets [rad], 2 of an axis.
     """
-    R_d = quaternion_rotation(q_d)
     if alignment is not None:
         R_d, R_e = R_d @ alignment, R_e @ alignment
     x = R_d.T @ R_e[:, 0]

@@ -8,15 +8,19 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import orientation_error
-from pfsc_drake.control.manifolds.path_force import (
+from pfsc_drake.control.manifolds.orientation import (
+    ToolOrientation,
+    orientation_error,
+    quaternion_rotation,
+)
+from pfsc_drake.control.manifolds.orientation_force import (
+    in_axes_of,
+    quaternion_matrix,
     rotational_force,
     torque_across_axis,
-    translational_force,
-    turning_force,
 )
-from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PathPointLayout, rotation_to_axis
+from pfsc_drake.control.manifolds.path_force import translational_force, turning_force
+from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix
 from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
 
@@ -24,9 +28,6 @@ _TRANSLATIONAL = (
     Coordinate("eta", Kind.TANGENTIAL, "tau_par"),
     Coordinate("xi_1", Kind.TRANSVERSAL, "tau_perp"),
     Coordinate("xi_2", Kind.TRANSVERSAL, "tau_cross"),
-)
-_ROTATIONAL = tuple(
-    Coordinate(f"phi_{axis}", Kind.ROTATIONAL, f"tau_{axis}") for axis in ("z", "y", "x")
 )
 
 
@@ -102,8 +103,8 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ]
     if not path.quaternion:
         return [eta, *xi]
-    q_d = jets.compose(path.quaternion, theta)
-    return [eta, *xi, *orientation_error(R_e, q_d, path.alignment)]
+    R_d = quaternion_rotation(jets.compose(path.quaternion, theta))
+    return [eta, *xi, *orientation_error(R_e, R_d, path.alignment)]
 
 
 def transported(normal: ca.SX, e_par: Jet) -> Jet:
@@ -128,6 +129,7 @@ class PathManifold:
 
     Attributes:
         alignment: Rotation whose first column is the axis, shape (3, 3), or None.
+        tool_axis: The axis, of length one, shape (3,), or None.
 
     Raises:
         InputError: If the order is out of range, or the axis has no direction, or no orientation
@@ -138,17 +140,19 @@ class PathManifold:
     follows_time = False
 
     def __init__(self, order: int, *, oriented: bool, tool_axis: np.ndarray | None = None) -> None:
-        if tool_axis is not None and not oriented:
-            raise InputError(f"tool axis {list(tool_axis)}: the path has no orientation to follow")
+        orientation = ToolOrientation(oriented, tool_axis, self.name)
         self.layout = PathPointLayout(order, oriented)
-        self.alignment = None if tool_axis is None else rotation_to_axis(tool_axis)
-        angles = _ROTATIONAL if tool_axis is None else _ROTATIONAL[:2]
-        self.coordinates = (*_TRANSLATIONAL, *(angles if oriented else ()))
+        self.alignment, self.tool_axis = orientation.alignment, orientation.tool_axis
+        self.coordinates = (*_TRANSLATIONAL, *orientation.coordinates)
 
     @property
-    def tool_axis(self) -> np.ndarray | None:
-        """The axis that alone follows the orientation, of length one, shape (3,), or None."""
-        return None if self.alignment is None else self.alignment[:, 0]
+    def is_oriented(self) -> bool:
+        """Whether the path has an orientation."""
+        return self.layout.oriented
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the path's orientation, shape (samples, 3, 3)."""
+        return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
 
     def geometry(self, point: ca.SX) -> PathGeometry:
         """Return the parts of a path point as the maps need them."""
@@ -162,7 +166,7 @@ class PathManifold:
             alignment=self.alignment,
         )
 
-    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Jet) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`path_coordinates`."""
         return path_coordinates(y, R_e, self.geometry(point))
 
@@ -182,12 +186,24 @@ class PathManifold:
         translational = translational_force(force, point, layout)
         if not layout.oriented:
             return translational
-        if self.alignment is not None:
-            torque = torque_across_axis(torque, point, layout, reference[3:], self.alignment)
+        torque, rotational = self.rotational_force(torque, point, reference[3:])
         if with_turning:
             translational[0] += turning_force(torque, point, layout)
-        rotational = rotational_force(torque, point, layout, reference[3:], self.alignment)
         return ca.vertcat(translational, rotational)
+
+    def rotational_force(self, torque: ca.SX, point: ca.SX, phi: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Return the torque that acts on the angles, shape (3,), and the forces along them [Nm].
+
+        Args:
+            torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
+            point: Path point.
+            phi: Angles that the tool is to have [rad], shape (3,), or (2,) of an axis.
+        """
+        quaternion = point[self.layout.quaternion][:4]
+        if self.alignment is not None:
+            R_d = quaternion_matrix(quaternion)
+            torque = torque_across_axis(torque, R_d, phi, self.alignment)
+        return torque, rotational_force(in_axes_of(quaternion, torque), phi, self.alignment)
 
     def axes(self, point: np.ndarray) -> np.ndarray:
         """Return ``[e_par, e_perp, e_cross]`` as columns, shape (3, 3)."""

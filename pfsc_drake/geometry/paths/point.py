@@ -50,6 +50,11 @@ class PathPointLayout:
         return slice(0, 1)
 
     @property
+    def memory(self) -> slice:
+        """Slice of what the next projection begins with, theta*, [1]."""
+        return self.theta
+
+    @property
     def eta(self) -> slice:
         """Slice of the arc length, [1], m."""
         return slice(1, 2)

@@ -10,15 +10,15 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 
 
 class ReferenceGenerator(Diagram):
-    """Motion along the path over time; transversal and rotational references are zero.
+    """Motion along a manifold over time; transversal and rotational references are zero.
 
     Ports:
         reference (output): Derivatives 0..r of ``yhat_p = (eta_p, 0, ..)`` by rows,
             shape ((r + 1) m,) [m, m/s, ...].
 
     Args:
-        eta_p: Tangential reference [m] over time [s], a curve of dimension 1; before
-            its domain and after it the reference rests.
+        eta_p: Tangential reference [m] over time [s], a curve of as many dimensions as there are
+            tangential coordinates; before its domain and after it the reference rests.
         relative_degree: ``r``.
         num_outputs: ``m``.
     """
@@ -41,9 +41,9 @@ class ReferenceGenerator(Diagram):
 
 def _trajectory(eta_p: PiecewisePolynomialCurve, num_outputs: int) -> PiecewisePolynomial:
     """(eta_p, 0, ..) over time, (num_outputs, 1)."""
-    rest = [[Polynomial(0.0)]] * (num_outputs - 1)
+    rest = [[Polynomial(0.0)]] * (num_outputs - eta_p.coefficients.shape[2])
     pieces = [
-        np.array([[Polynomial(coefficients)], *rest])
-        for coefficients in eta_p.coefficients[:, :, 0]
+        np.array([*([Polynomial(coordinate)] for coordinate in coefficients.T), *rest])
+        for coefficients in eta_p.coefficients
     ]
     return PiecewisePolynomial(pieces, eta_p.breakpoints)

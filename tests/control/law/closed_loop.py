@@ -17,9 +17,8 @@ class ClosedLoop:
     """A robot under a law: right-hand side, outputs and references."""
 
     def __init__(self, robot, path, law, theta):
-        self.robot, self.path, self.law = robot, path, law
-        self.r = law.linearization.relative_degree
-        self.m, self.n = law.linearization.num_outputs, robot.n
+        self.prepare(robot, law)
+        self.path = path
         self._project = path.evaluator(self.r)
         # the whole comparison lies on one ramp, where the reference is a polynomial
         start = path.arc_length.at(theta) - 0.005
@@ -27,6 +26,12 @@ class ClosedLoop:
         assert ramp.breakpoints[1] > STEP * STEPS
         self._eta_p = ramp.flat_sampler(self.r)
         self._theta = theta
+
+    def prepare(self, robot, law):
+        """Keep a robot and its law, whatever they follow."""
+        self.robot, self.law = robot, law
+        self.r = law.linearization.relative_degree
+        self.m, self.n = law.linearization.num_outputs, robot.n
         self.middle = np.zeros(self.n)
         # so many state variables are independent
         self.size = {1: self.n, 2: 2 * self.n}.get(self.r, 4 * self.n)
@@ -60,11 +65,14 @@ class ClosedLoop:
 
     def evaluate(self, t, x):
         """Return the law's result."""
-        state = self.state(x)
-        point = self._project(self.robot.tool_pose(state)[0].tolist(), self._theta)
+        point = self._project(self.robot.tool_pose(self.state(x))[0].tolist(), self._theta)
         self._theta = point[0]
+        return self.result(t, x, point)
+
+    def result(self, t, x, point):
+        """Return the law's result at a point of the manifold."""
         return self.law.evaluate(
-            state,
+            self.state(x),
             point,
             self.reference(t).ravel(),
             np.zeros(self.m),
@@ -74,7 +82,10 @@ class ClosedLoop:
 
     def rates(self, t, x):
         """Return the right-hand side of the closed loop."""
-        drive = self.evaluate(t, x)[self.law.layout.drive]
+        return self.plant_rates(t, x, self.evaluate(t, x)[self.law.layout.drive])
+
+    def plant_rates(self, t, x, drive):
+        """Return the rates of the robot's state."""
         if self.r == 1:
             return drive
         return self.robot.rates(self.state(x), drive, self.tau_ext(t)[0])[: self.size]
@@ -82,7 +93,6 @@ class ClosedLoop:
 
 def start(robot, path, rigid, theta, size, seed=1):
     """Return a state beside the path, with an error in every output and velocity."""
-    rng = np.random.default_rng(seed)
     n = robot.n
     sigma = path.position.derivatives(theta, 0)[0]
     R_e = None
@@ -92,6 +102,12 @@ def start(robot, path, rigid, theta, size, seed=1):
         angles = (0.4 if n == 7 else 1.0) * np.array([0.05, -0.04, 0.06])
         R_e = R_d @ Rotation.from_euler("ZYX", angles).as_matrix()
     q = robot.reach(sigma + np.array([0.006, -0.005, 0.008]), R_e)
+    return rest_of_state(robot, rigid, q, size, seed)
+
+
+def rest_of_state(robot, rigid, q, size, seed=1):
+    """Return a state of given joint coordinates, with random velocities, accelerations, jerks."""
+    rng, n = np.random.default_rng(seed), robot.n
     v, a, jerk = (scale * rng.uniform(-1.0, 1.0, n) for scale in (0.05, 1.0, 20.0))
     if size <= 2 * n:
         return np.concatenate([q, v])[:size]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.reference import rest_to_rest, straight_lines, together
 from pfsc_drake.errors import InputError
 
 VELOCITY, ACCELERATION = 0.8, 3.0
@@ -133,3 +133,63 @@ def test_points_must_be_two_different_numbers(points):
 def test_no_part_is_too_short_for_its_time_to_be_told():
     with pytest.raises(InputError, match=r"reference: .* takes 2.19e-12 s from t = 1e\+06 s on"):
         rest_to_rest([0.0, 1.0], velocity=1e-6, acceleration=1e6, dwell=1e6)
+
+
+PLACES = [[0.0, 0.0], [0.25, 0.0], [0.25, 0.15], [0.05, 0.05], [0.05, 0.05], [0.0, 0.0]]
+
+
+@pytest.fixture(name="lines")
+def fixture_lines():
+    return straight_lines(PLACES, VELOCITY, ACCELERATION, 0.1)
+
+
+def test_straight_lines_visit_all_places_at_rest(lines):
+    times = np.linspace(*lines.domain, 20001)
+    position, speed = np.moveaxis(lines.derivatives(times, 1), 1, 0)
+    resting = np.abs(speed).max(axis=1) < 1e-9
+    visited = position[resting]
+    for place in PLACES:
+        assert np.linalg.norm(visited - place, axis=1).min() < 1e-9
+    assert np.array_equal(position[0], PLACES[0])
+    assert np.allclose(position[-1], PLACES[-1], atol=1e-12)
+
+
+def test_straight_lines_keep_the_limits_in_every_coordinate_and_are_straight(lines):
+    times = np.linspace(*lines.domain, 20001)
+    _, speed, acceleration = np.moveaxis(lines.derivatives(times, 2), 1, 0)
+    assert np.abs(speed).max() == pytest.approx(VELOCITY, rel=1e-3) or (
+        np.abs(speed).max() < VELOCITY
+    )
+    assert np.abs(acceleration).max() <= ACCELERATION * (1.0 + 1e-9)
+    # on the way to the fourth place both move, in proportion
+    both = (np.abs(speed) > 1e-6).all(axis=1)
+    slope = speed[both][:, 1] / speed[both][:, 0]
+    expected = {round(0.1 / 0.2, 6), 1.0}
+    assert {round(float(s), 6) for s in slope} == expected
+    assert lines.smoothness >= 4
+
+
+def test_motions_together_are_each_its_own():
+    first = ([0.0, 0.3, -0.25], 1.5, 6.0, 0.5)
+    second = ([0.0, 0.2, -0.2], 1.0, 6.0, 0.5)
+    both = together(first, second)
+    alone = [
+        rest_to_rest(points, velocity=v, acceleration=a, dwell=dwell)
+        for points, v, a, dwell in (first, second)
+    ]
+    assert both.domain[1] == pytest.approx(max(motion.domain[1] for motion in alone), rel=1e-12)
+    times = np.linspace(*both.domain, 3001)
+    for k, motion in enumerate(alone):
+        inside = times <= motion.domain[1]
+        expected = motion.derivatives(times[inside], 4)[:, :, 0]
+        actual = both.derivatives(times, 4)[:, :, k]
+        scale = np.abs(expected).max(axis=0)
+        assert np.all(np.abs(actual[inside] - expected) <= 1e-9 * scale)
+        assert np.allclose(actual[~inside][:, 0], motion.derivatives([motion.domain[1]], 0)[0, 0])
+        assert not actual[~inside][:, 1:].any()
+
+
+@pytest.mark.parametrize("places", [[[0.0, 0.0]], [[0.0, 0.0], [1.0]], [[0.0, 0.0], [np.nan, 1.0]]])
+def test_places_that_are_none_are_refused(places):
+    with pytest.raises(InputError, match="reference places"):
+        straight_lines(places, VELOCITY, ACCELERATION)

@@ -40,7 +40,7 @@ def test_force_of_a_moving_point_is_its_power(oriented, axis):
     spin = np.cross(np.eye(3), twist[3:])
     y = Jet([ca.SX(y_t), ca.SX(twist[:3])])
     errors = manifold.virtual_output(
-        y, Jet([ca.SX(R_e), ca.SX(spin @ R_e)]), ca.SX(point), Jet([ca.SX(0.1), ca.SX(0.0)])
+        y, Jet([ca.SX(R_e), ca.SX(spin @ R_e)]), ca.SX(point), [Jet([ca.SX(0.1), ca.SX(0.0)])]
     )
     values = np.array(
         [[float(ca.evalf(e.coefficients[k])) for k in (0, 1)] for e in errors], dtype=float
@@ -58,7 +58,7 @@ def test_angles_and_torques_are_called_by_the_axis_they_turn_about(oriented_path
     R_d = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
     R_e = Jet([ca.SX(R_d @ Rotation.from_rotvec(0.1 * unit).as_matrix()), ca.SX(3, 3)])
     y_t = Jet([ca.SX(point[manifold.layout.position][:3]), ca.SX(3, 1)])
-    output = manifold.virtual_output(y_t, R_e, ca.SX(point), Jet([ca.SX(0), ca.SX(0)]))
+    output = manifold.virtual_output(y_t, R_e, ca.SX(point), [])
     angles = [float(ca.DM(x.coefficients[0])) for x in output]
     wrench = np.concatenate([np.zeros(3), R_d @ unit])
     forces = np.array(manifold_force_function(manifold)(wrench, point, np.zeros(6))).ravel()

@@ -3,7 +3,6 @@
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.polynomial import Chebyshev
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -18,11 +17,7 @@ from pfsc_drake.geometry import (
     rotation_to_axis,
 )
 from pfsc_drake.jets import Jet
-
-ORDER = 4
-HALF_WINDOW = 0.06
-# absolute, per order of the derivative; the outputs' derivatives are of the order of one
-TOLERANCES = [1e-12, 1e-10, 1e-8, 1e-7, 1e-5]
+from tests.control.manifolds.tool_motion import NODES, ORDER, ToolMotion, assert_derivatives
 
 
 def straight_piece():
@@ -48,36 +43,16 @@ def fixture_situation(request, oriented_path):
     }[request.param]
 
 
-class ToolMotion:
-    """A smooth motion of the tool, as a function of time and as jets."""
-
-    def __init__(self, path, theta, offset, rng):
-        sigma, slope = path.position.derivatives(theta, 1)
-        tangent = slope / np.linalg.norm(slope)
-        drift = rng.uniform(-0.02, 0.02, (ORDER + 1, 3)) + np.outer([0, 0.15, 0, 0, 0], tangent)
-        drift[0] = sigma + offset - (tangent @ offset) * tangent
-        angles = rng.uniform(-0.15, 0.15, (ORDER + 1, 3))
-        if path.orientation is not None:
-            R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])
-            angles[0] = Rotation.from_matrix(R_d).as_euler("ZYX") + 0.1
-        t = ca.SX.sym("t")
-        powers = ca.vertcat(*[t**k for k in range(ORDER + 1)])
-        a, b, c = ca.vertsplit(ca.DM(angles.T) @ powers)
-        R_z = ca.blockcat([[ca.cos(a), -ca.sin(a), 0], [ca.sin(a), ca.cos(a), 0], [0, 0, 1]])
-        R_y = ca.blockcat([[ca.cos(b), 0, ca.sin(b)], [0, 1, 0], [-ca.sin(b), 0, ca.cos(b)]])
-        R_x = ca.blockcat([[1, 0, 0], [0, ca.cos(c), -ca.sin(c)], [0, ca.sin(c), ca.cos(c)]])
-        stacked = ca.vertcat(ca.DM(drift.T) @ powers, ca.vec(R_z @ R_y @ R_x))
-        self._pose = ca.Function("pose", [t], [stacked])
-        derivatives = []
-        for _ in range(ORDER + 1):
-            derivatives.append(ca.SX(ca.Function("d", [t], [stacked])(0.0)))
-            stacked = ca.jacobian(stacked, t)
-        self.y = Jet.from_derivatives([d[:3] for d in derivatives])
-        self.R = Jet.from_derivatives([ca.reshape(d[3:], 3, 3) for d in derivatives])
-
-    def at(self, t):
-        pose = np.array(self._pose(t)).ravel()
-        return pose[:3], pose[3:].reshape(3, 3, order="F")
+def tool_motion(path, theta, offset, rng):
+    """Return a motion that begins at an offset from a place of the path."""
+    sigma, slope = path.position.derivatives(theta, 1)
+    tangent = slope / np.linalg.norm(slope)
+    angles = np.zeros(3)
+    if path.orientation is not None:
+        R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])
+        angles = Rotation.from_matrix(R_d).as_euler("ZYX") + 0.1
+    start = sigma + offset - (tangent @ offset) * tangent
+    return ToolMotion(start, 0.15 * tangent, angles, rng)
 
 
 def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
@@ -135,13 +110,13 @@ def outputs_over_time(path, point, motion, times, alignment=None):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_jets_are_derivatives_of_the_outputs(situation, seed):
     path, theta, offset = situation
-    motion = ToolMotion(path, theta, np.asarray(offset), np.random.default_rng(seed))
+    motion = tool_motion(path, theta, np.asarray(offset), np.random.default_rng(seed))
     check_jets(path, theta, motion)
 
 
 @pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [0.2, -0.4, 0.3]])
 def test_jets_of_an_axis_are_derivatives_of_the_outputs(oriented_path, axis):
-    motion = ToolMotion(
+    motion = tool_motion(
         oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
     )
     check_jets(oriented_path, 2.45, motion, rotation_to_axis(axis))
@@ -149,21 +124,12 @@ def test_jets_of_an_axis_are_derivatives_of_the_outputs(oriented_path, axis):
 
 def check_jets(path, theta, motion, alignment=None):
     jets, point = jets_of_outputs(path, theta, motion, alignment=alignment)
-    degree = 14
-    times = HALF_WINDOW * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    outputs = outputs_over_time(path, point, motion, times, alignment)
-    assert outputs.shape[1] == jets.shape[1]
-    for i, samples in enumerate(outputs.T):
-        fit = Chebyshev.fit(times, samples, degree, domain=[-HALF_WINDOW, HALF_WINDOW])
-        for k, tolerance in enumerate(TOLERANCES):
-            expected = fit.deriv(k)(0.0) if k else fit(0.0)
-            scale = 1.0 + abs(expected)
-            assert abs(jets[k, i] - expected) < tolerance * scale, (i, k)
+    assert_derivatives(jets, outputs_over_time(path, point, motion, NODES, alignment))
 
 
 def test_the_situations_are_what_their_names_say(situation, request):
     path, theta, offset = situation
-    motion = ToolMotion(path, theta, np.asarray(offset), np.random.default_rng(1))
+    motion = tool_motion(path, theta, np.asarray(offset), np.random.default_rng(1))
     rows, point = jets_of_outputs(path, theta, motion)
     alpha = point[2]
     name = request.node.callspec.params["situation"]
@@ -175,7 +141,7 @@ def test_the_situations_are_what_their_names_say(situation, request):
 
 def test_lower_orders_are_the_beginning_of_higher_ones(situation):
     path, theta, offset = situation
-    motion = ToolMotion(path, theta, np.asarray(offset), np.random.default_rng(3))
+    motion = tool_motion(path, theta, np.asarray(offset), np.random.default_rng(3))
     full, _ = jets_of_outputs(path, theta, motion)
     for order in range(1, ORDER):
         rows, _ = jets_of_outputs(path, theta, motion, order)

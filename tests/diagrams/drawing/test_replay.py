@@ -9,6 +9,7 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
+from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.drawing.replay import (
     RecordedMotion,
     RecordedPushes,
@@ -59,7 +60,7 @@ def build(path, motion, meshcat, load_arm):
         meshcat.Delete()
         arm = load_arm(MODEL)
         drawing = draw_robot(arm.plant, arm.tool, RobotParameters(MODEL), Path())
-        return build_replay(drawing, path, LAYOUT, motion, meshcat, PERIOD)
+        return build_replay(drawing, PathDrawing(path, LAYOUT), motion, meshcat, PERIOD)
 
     return built
 

@@ -38,7 +38,7 @@ def resting(station, y_t, R_e):
     pose = np.concatenate([y_t, np.ravel(R_e)])
     # six axes, or three slides
     q = station.initial_state[: station.robot.dimension]
-    point = station.path.evaluator(2)(y_t.tolist(), station.initial_theta)
+    point = station.path.evaluator(2)(y_t.tolist(), station.initial_place[0])
     times = PERIOD * np.arange(3)
     return RecordedMotion(times, *(np.tile(x, (3, 1)) for x in (q, pose, point)))
 

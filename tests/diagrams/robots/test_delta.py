@@ -84,7 +84,7 @@ def test_a_push_deflects_as_the_gains_say():
     J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
     acceleration = J @ np.linalg.solve(D, J.T @ force)
-    theta = np.array([station.initial_theta])
+    theta = np.array([station.initial_place[0]])
     tangent = station.path.position.derivatives(theta, 1)[0, 1]
     tangent /= np.linalg.norm(tangent)
     along = tangent * (tangent @ acceleration)
@@ -110,7 +110,7 @@ def test_starts_at_rest_beside_the_path():
     distance = np.linalg.norm(station.path.position.derivatives(theta, 0)[:, 0] - y_t, axis=1)
     nearest = int(np.argmin(distance))
     assert distance[nearest] == pytest.approx(0.010, abs=1e-7)
-    assert station.initial_theta == pytest.approx(theta[nearest], abs=theta[1] - theta[0])
+    assert station.initial_place[0] == pytest.approx(theta[nearest], abs=theta[1] - theta[0])
 
 
 def test_the_first_force_is_weight_and_proportional_part():
@@ -124,7 +124,7 @@ def test_the_first_force_is_weight_and_proportional_part():
     tau = controller.GetOutputPort("drive_torque").Eval(controller.GetMyContextFromRoot(root))
     q = station.initial_state[:3]
     y_t = station.robot.tool_position(q)
-    theta = np.array([station.initial_theta])
+    theta = np.array([station.initial_place[0]])
     offset = y_t - station.path.position.derivatives(theta, 0)[0, 0]
     J, masses = station.robot.jacobian_at(q), station.robot.parameters.masses
     D = masses.effective_slide * np.eye(3) + masses.effective_plate * J.T @ J
@@ -179,13 +179,13 @@ def test_replay_draws_robot_and_path_upside_down():
     evaluator, q = station.path.evaluator(2), station.initial_state[:3]
     y_t = station.robot.tool_position(q)
     pose = np.concatenate([y_t, np.eye(3).ravel()])
-    point = evaluator(y_t.tolist(), station.initial_theta)
+    point = evaluator(y_t.tolist(), station.initial_place[0])
     motion = RecordedMotion(
         PERIOD * np.arange(3), np.tile(q, (3, 1)), np.tile(pose, (3, 1)), np.tile(point, (3, 1))
     )
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    layout = station.task.place.layout
-    diagram = build_delta_replay(station.robot, station.path, layout, motion, meshcat, PERIOD)
+    drawn = station.task.drawing
+    diagram = build_delta_replay(station.robot, drawn, motion, meshcat, PERIOD)
     page = record(diagram, meshcat, motion.times[-1], PERIOD)
     assert "</html>" in page
     for name in ("delta_robot/slide_1", "delta_robot/rod_6", "path_following/path"):

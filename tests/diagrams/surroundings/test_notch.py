@@ -89,7 +89,7 @@ def test_places_in_the_notch(settings, station):
     below = notch.clearance * above @ UP  # the axis is above, not normal to the path
     np.testing.assert_allclose(places, [[0.0, -below], [1e-3, -below]], atol=1e-5)
     # from the start on, whose parameter the station knows
-    taught, slope = path.position.derivatives(np.array([station.initial_theta]), 1)[0]
+    taught, slope = path.position.derivatives(np.array([station.initial_place[0]]), 1)[0]
     left = np.cross(UP, slope) / np.linalg.norm(np.cross(UP, slope))
     here = taught + notch.displacement + notch.clearance * UP + 1e-3 * left
     further = station.further_lengths(here[None])["notch_position"]
@@ -102,7 +102,7 @@ def test_starts_in_the_middle_of_the_notch_and_touches_nothing(settings, station
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     y_t = station.robot.tool_position(station.initial_state[:3])
-    place = place_in_notch(station.path, settings.notch, y_t[None], station.initial_theta, UP)
+    place = place_in_notch(station.path, settings.notch, y_t[None], station.initial_place[0], UP)
     np.testing.assert_allclose(place, 0.0, atol=1e-9)
     contact = station.diagram.GetSubsystemByName("contact_wrench")
     wrench = contact.GetOutputPort("wrench").Eval(contact.GetMyContextFromRoot(root))

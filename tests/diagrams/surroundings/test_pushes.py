@@ -127,7 +127,7 @@ def test_forces_on_links_are_in_manifold_axes_if_wanted(three_axes):
     pulse = ForcePulse(0.0, 0.1, [0.0, 50.0, 0.0], ramp=0.02, frame="manifold", link="link_2")
     three_axes.forces = [pulse]
     station, log = run(three_axes, 0.06)
-    y_t, theta = log["y_t"].values[0].tolist(), station.initial_theta
+    y_t, theta = log["y_t"].values[0].tolist(), station.initial_place[0]
     axes = station.task.manifold.axes(np.array(station.path.evaluator(2)(y_t, theta)))
     assert log["push_force"].values[-1] == pytest.approx(axes @ [0.0, 50.0, 0.0], abs=0.1)
 

@@ -12,7 +12,7 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
-from diagrams.tasks.path_following import make_task
+from diagrams.tasks.make import make_task
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -46,7 +46,7 @@ def start(load_arm):
         part = _part(arm)
         x = part.state_at_rest(part.posture(begin.target, settings.start))
         arm.set_state(x)
-        return task.path, begin.theta, arm, x
+        return task.path, begin.place[0], arm, x
 
     return put
 

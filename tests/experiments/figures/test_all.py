@@ -27,7 +27,7 @@ NAMES = [
 
 
 def names(log):
-    return [drawing.name for drawing in draw_figures(log, PATH)]
+    return [drawing.name for drawing in draw_figures(log, [PATH])]
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def coarse(monkeypatch):
 
 
 def test_all_figures_are_drawn(drawn_log):
-    figures = render_figures(drawn_log, PATH)
+    figures = render_figures(drawn_log, [PATH])
     assert [figure.name for figure in figures] == NAMES
     for figure in figures:
         assert figure.title
@@ -88,7 +88,7 @@ def test_a_run_stopped_by_nan_can_still_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():
         if signal.values.dtype.kind == "f":
             signal.values[150:] = np.nan
-    assert len(render_figures(drawn_log, PATH)) == len(NAMES)
+    assert len(render_figures(drawn_log, [PATH])) == len(NAMES)
 
 
 @pytest.mark.usefixtures("coarse")
@@ -96,7 +96,7 @@ def test_a_log_of_one_sample_can_be_drawn(drawn_log):
     for signal in drawn_log.signals.values():
         signal.values = signal.values[100:101]
     drawn_log.time = drawn_log.time[100:101]
-    assert len(render_figures(drawn_log, PATH)) == len(NAMES)
+    assert len(render_figures(drawn_log, [PATH])) == len(NAMES)
 
 
 def test_a_log_without_samples_has_no_figures():

@@ -39,4 +39,4 @@ def test_free_circle_and_all_of_the_way_are_in_the_picture(log):
 
 def test_is_drawn_when_logged(log):
     log.add("y_t", np.zeros((5, 3)), "m")
-    assert "notch" in [drawing.name for drawing in draw_figures(log, np.zeros((2, 3)))]
+    assert "notch" in [drawing.name for drawing in draw_figures(log, [np.zeros((2, 3))])]

@@ -8,7 +8,7 @@ PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axi
 
 
 def test_path_has_equal_scales_and_both_ends(drawn_log):
-    axes = draw_path(drawn_log, PATH).canvas.axes[0]
+    axes = draw_path(drawn_log, [PATH]).canvas.axes[0]
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     aspect = np.asarray(axes.get_box_aspect())
     scale = aspect / (limits[:, 1] - limits[:, 0])
@@ -19,10 +19,10 @@ def test_path_has_equal_scales_and_both_ends(drawn_log):
 
 
 def test_the_longer_side_runs_across_the_picture(drawn_log):
-    along_x = draw_path(drawn_log, PATH).canvas.axes[0]
+    along_x = draw_path(drawn_log, [PATH]).canvas.axes[0]
     swap = [1, 0, 2]
     drawn_log["y_t"].values = drawn_log["y_t"].values[:, swap]
-    along_y = draw_path(drawn_log, PATH[:, swap]).canvas.axes[0]
+    along_y = draw_path(drawn_log, [PATH[:, swap]]).canvas.axes[0]
     assert not any(line.get_clip_on() for line in along_y.lines)
     # seen from an azimuth a, x runs across by |sin a| of its length and y by |cos a|
     assert abs(np.sin(np.deg2rad(along_x.azim))) > 0.8

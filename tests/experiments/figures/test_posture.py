@@ -82,5 +82,5 @@ def test_conditioning_over_time_and_path(drawn_log):
     drawn_log["rcond"].values[:] = 0.05
     del drawn_log.signals["phi"]
     assert has_conditioning(drawn_log)  # spare joints
-    names = [drawing.name for drawing in draw_figures(drawn_log, np.zeros((2, 3)))]
+    names = [drawing.name for drawing in draw_figures(drawn_log, [np.zeros((2, 3))])]
     assert "conditioning" in names

@@ -93,7 +93,7 @@ def test_a_given_parameter_chooses_the_branch_at_the_crossing(path, theta):
     crossing = path.position.derivatives(0.5 * np.pi, 0)[0]
     assert np.allclose(crossing, path.position.derivatives(1.5 * np.pi, 0)[0], atol=1e-12)
     bench.move_to(crossing)
-    bench.system.set_parameter(bench.context, theta + 0.02)
+    bench.system.set_place(bench.context, np.array([theta + 0.02]))
     bench.start()
     assert bench.point("theta") == pytest.approx([theta], abs=1e-9)
     tangent = bench.point("position")[3:6]

@@ -1,0 +1,101 @@
+"""How a manifold is drawn."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import DiagramBuilder, InputPort
+
+from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
+from pfsc_drake.systems.drawing.surface_visualizer import SurfaceVisualizer
+
+_POINTS = 600
+# of a surface, in each direction, and of the points of each line
+_LINES, _LINE_POINTS = 11, 61
+
+
+class ManifoldDrawing(Protocol):
+    """What draws a manifold, and its frame next to the tool."""
+
+    def outline(self) -> list[np.ndarray]:
+        """Return lines that show the manifold [m], each (points, 3)."""
+
+    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
+        """Add what draws it.
+
+        Args:
+            builder: Builder of the diagram.
+            meshcat: Where to draw.
+            period: Time between frames [s].
+
+        Returns:
+            Port for the point of the manifold next to the tool.
+        """
+
+
+@dataclass(frozen=True)
+class PathDrawing:
+    """A path, drawn.
+
+    Attributes:
+        path: The path.
+        layout: Layout of its points.
+    """
+
+    path: Path
+    layout: PathPointLayout
+
+    def outline(self) -> list[np.ndarray]:
+        """See :class:`ManifoldDrawing`."""
+        curve = self.path.position
+        return [curve.derivatives(np.linspace(*curve.domain, _POINTS), 0)[:, 0]]
+
+    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
+        """See :class:`ManifoldDrawing`."""
+        visualizer = PathVisualizer(self.path, self.layout, meshcat, period)
+        drawing = builder.AddNamedSystem("path_visualizer", visualizer)
+        return drawing.GetInputPort("path_point")
+
+
+@dataclass(frozen=True)
+class SurfaceDrawing:
+    """A surface, drawn.
+
+    Attributes:
+        surface: The surface.
+        manifold: As the law sees it.
+    """
+
+    surface: Surface
+    manifold: PlaceManifold
+
+    def outline(self) -> list[np.ndarray]:
+        """See :class:`ManifoldDrawing`."""
+        grid = self._grid(_LINE_POINTS)
+        stride = (_LINE_POINTS - 1) // (_LINES - 1)
+        return [*grid[::stride], *np.swapaxes(grid, 0, 1)[::stride]]
+
+    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
+        """See :class:`ManifoldDrawing`."""
+        layout = self.manifold.layout
+
+        def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return point[layout.position][:3], self.manifold.axes(point)
+
+        drawing = builder.AddNamedSystem(
+            "surface_visualizer",
+            SurfaceVisualizer(
+                self._grid(_LINE_POINTS), self.outline(), layout.size, place, meshcat, period
+            ),
+        )
+        return drawing.GetInputPort("manifold_point")
+
+    def _grid(self, points: int) -> np.ndarray:
+        """Return points of the surface on a grid [m], shape (points, points, 3)."""
+        first, second = (np.linspace(*ends, points) for ends in self.surface.domain)
+        theta = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
+        return self.surface.partials(theta, 0)[..., 0, :]

@@ -1,0 +1,29 @@
+"""What a scenario's tool is to do."""
+
+from pathlib import Path as FilePath
+
+from diagrams.scenario import Scenario
+from diagrams.tasks.path_following import PathTask, TrajectoryTask
+from diagrams.tasks.surface_following import SurfaceTask
+from diagrams.tasks.task import Task
+from pfsc_drake.geometry.paths.smoothing import Progress
+
+TASKS: dict[str, type[PathTask | SurfaceTask]] = {
+    "path": PathTask,
+    "trajectory": TrajectoryTask,
+    "surface": SurfaceTask,
+}
+
+
+def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
+    """Return what a scenario's tool is to do.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If the path or the motion along it cannot be made.
+    """
+    return TASKS[scenario.controller.manifold](scenario, folder, progress)

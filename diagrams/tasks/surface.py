@@ -1,0 +1,97 @@
+"""The surface of a scenario."""
+
+from typing import Literal, cast
+
+import numpy as np
+
+from diagrams.scenario import SurfaceParameters
+from diagrams.scenario.surface import (
+    Cone,
+    Cylinder,
+    Paraboloid,
+    Plane,
+    Sphere,
+    SurfaceOrientationParameters,
+    SurfaceShape,
+    Torus,
+)
+from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.geometry import (
+    quaternion_to_matrix,
+    rotation_to_axis,
+    zyx_to_quaternion,
+    zyz_to_quaternion,
+)
+from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+from pfsc_drake.geometry.surfaces.shapes import (
+    Pair,
+    Turned,
+    cone,
+    cylinder,
+    paraboloid,
+    plane,
+    sphere,
+    torus,
+)
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+_EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
+
+
+def make_surface(shape: SurfaceShape) -> Surface:
+    """Return a surface.
+
+    Args:
+        shape: What the scenario says.
+
+    Raises:
+        InputError: If the surface cannot be made.
+    """
+    rotation = rotation_from_axes(shape.axis, shape.start)
+    if isinstance(shape, Plane):
+        size = (_pair(shape.first), _pair(shape.second))
+        if isinstance(shape, Paraboloid):
+            return paraboloid(size, shape.coefficient, shape.origin, rotation)
+        return plane(size, shape.origin, rotation)
+    angles = _pair(np.deg2rad(shape.angles_deg)) if shape.angles_deg else None
+    turned = Turned(shape.origin, rotation, angles, shape.inward)
+    if isinstance(shape, Cylinder):
+        return cylinder(shape.radius, _pair(shape.heights), turned)
+    if isinstance(shape, Cone):
+        return cone(float(np.deg2rad(shape.opening_deg)), _pair(shape.distances), turned)
+    if isinstance(shape, Sphere):
+        return sphere(shape.radius, _pair(np.deg2rad(shape.latitudes_deg)), turned)
+    assert isinstance(shape, Torus)
+    return torus(shape.ring_radius, shape.tube_radius, turned)
+
+
+def given_quaternion(orientation: SurfaceOrientationParameters) -> np.ndarray | None:
+    """Return the quaternion of an orientation that is the same everywhere, or None."""
+    if orientation.kind != "given":
+        return None
+    return _EULER[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
+
+
+def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceManifold:
+    """Return the manifold of a surface with its orientation.
+
+    Args:
+        order: Relative degree of the law.
+        parameters: What the scenario says.
+
+    Raises:
+        InputError: If the law has no such order.
+    """
+    said = parameters.orientation
+    kind = None if said.kind == "none" else cast(Literal["given", "normal"], said.kind)
+    offset = None
+    if kind == "normal":
+        turn = _EULER[said.convention](np.deg2rad([said.angles_deg]))[0]
+        offset = quaternion_to_matrix(turn)
+    axis = rotation_to_axis(said.tool_axis)[:, 0] if said.task == "tool_axis" and kind else None
+    return SurfaceManifold(order, orientation=kind, offset=offset, tool_axis=axis)
+
+
+def _pair(values: object) -> Pair:
+    first, last = np.asarray(values, dtype=float)
+    return float(first), float(last)

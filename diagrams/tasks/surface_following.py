@@ -1,0 +1,209 @@
+"""Following a surface: the tool converges to it, and moves along it as two coordinates say."""
+
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.drawing.manifold_drawing import SurfaceDrawing
+from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require, require_numbers
+from diagrams.tasks.surface import given_quaternion, make_surface, make_surface_manifold
+from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.reference import straight_lines, together
+from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
+from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+from pfsc_drake.geometry.surfaces.target import SurfaceTarget
+from pfsc_drake.geometry.surfaces.way import way_on_surface
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+
+# s, between the places of the way along the surface
+_SPACING = 0.02
+
+
+class SurfaceTask(Task):
+    """Surface following (chapter 4).
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If the surface or the motion along it cannot be made.
+    """
+
+    place: SurfaceManifold
+    manifold: SurfaceManifold
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        folder: FilePath,
+        progress: Progress | None = None,
+    ) -> None:
+        self._scenario, law = scenario, scenario.controller.law
+        parameters = scenario.surface
+        if parameters is None:
+            raise InputError(
+                "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
+            )
+        try:
+            self.surface = make_surface(parameters.shape)
+            check_single_sheet(self.surface)
+        except InputError as error:
+            raise InputError(f"surface.shape: {error}") from None
+        self.relative_degree = RELATIVE_DEGREE[law]
+        self.place = make_surface_manifold(self.relative_degree, parameters)
+        self.manifold = self.place
+        self._evaluator = SurfaceEvaluator(
+            self.surface, self.relative_degree, given_quaternion(parameters.orientation)
+        )
+        self.shape: SurfaceReport = surface_report(self.surface)
+        self.warnings: list[str] = []
+        self.motion = _motion(scenario)
+        self._start = self._find_start()
+
+    def require_joints(self, num_joints: int) -> None:
+        """See :class:`Task`."""
+        names = [coordinate.name for coordinate in self.manifold.coordinates]
+        if num_joints < len(names):
+            raise InputError(
+                f"surface: {num_joints} joints for {len(names)} outputs ({', '.join(names)}); "
+                "surface.orientation.task: tool_axis needs 5, kind: none 3"
+            )
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """See :class:`Task`."""
+        return self._evaluator(y_t.tolist(), memory[:2].tolist(), memory[2:].tolist())
+
+    @property
+    def drawing(self) -> SurfaceDrawing:
+        """See :class:`Task`."""
+        return SurfaceDrawing(self.surface, self.place)
+
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort,
+        period: float,
+    ) -> PlaceFinder:
+        """See :class:`Task`."""
+        projector = builder.AddNamedSystem(
+            "surface_projector",
+            ManifoldProjector(
+                self.place.layout,
+                lambda y_t, place: self._evaluator(y_t, place[:2].tolist(), place[2:].tolist()),
+                lambda y_t: np.append(self._evaluator.project_globally(y_t).theta, np.zeros(2)),
+                period,
+            ),
+        )
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+
+    def _find_start(self) -> np.ndarray:
+        """Return the tool point at the start [m], shape (3,)."""
+        start = self._scenario.start
+        if start.position:
+            return np.array(start.position, dtype=float)
+        theta = [sum(ends) / 2.0 for ends in self.surface.domain]
+        if start.theta:
+            require_numbers("start.theta", start.theta, 2)
+            theta = start.theta
+        point = self._evaluator.evaluate_at(theta)
+        position = point[self.place.layout.position][:3]
+        return position + start.offset[0] * self.place.axes(point)[:, 2]
+
+    def start(self, shift: np.ndarray) -> StartPoint:
+        """See :class:`Task`."""
+        y_t, max_alpha = self._start + shift, self._scenario.controller.max_alpha
+        try:
+            foot = self._evaluator.project_globally(y_t)
+        except InputError as error:
+            raise InputError(f"start: {error}") from None
+        said = f"start: tool point {np.round(y_t, 6).tolist()} m"
+        if not (foot.converged and foot.alpha < max_alpha):
+            raise InputError(
+                f"{said} is outside the feasible neighbourhood of the surface, "
+                f"alpha = {foot.alpha:.3g}; alpha must be below {max_alpha:g}"
+            )
+        if foot.at_border:
+            raise InputError(
+                f"{said} is beside the patch, {1e3 * foot.distance:.3g} mm from its border at "
+                f"theta = {np.round(foot.theta, 6).tolist()}; it must be above or below it"
+            )
+        eta = self.motion.derivatives(np.zeros(1), 0)[0, 0]
+        place = np.append(foot.theta, eta)
+        target = ToolTarget(y_t)
+        if self.place.is_oriented:
+            point = self.evaluate(y_t, place)
+            deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
+            R_d = self.place.orientation(point[None])[0]
+            target = ToolTarget(y_t, R_d @ deviation, self.place.tool_axis)
+        return StartPoint(target, place)
+
+    def point(self, start: StartPoint) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.evaluate(start.target.y_t, start.place)
+
+    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+        """See :class:`Task`; the way of the reference over the surface must stay on it."""
+        begin, end = self.motion.domain
+        times = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
+        first = self.start(np.zeros(3)).place[:2]
+        way = way_on_surface(self.surface, self.motion, first, times)
+        for t, theta in zip(times, way, strict=True):
+            eta = self.motion.derivatives(np.array([t]), 0)[0, 0]
+            where = f"eta = {np.round(eta, 4).tolist()} m"
+            for k, ends in enumerate(self.surface.domain):
+                closed = self.surface.closed[k]
+                if not (closed or ends.begin <= theta[k] <= ends.end):
+                    raise InputError(
+                        f"reference: leaves the surface at {where}, theta_{k + 1} = "
+                        f"{theta[k]:.6g}; the patch is from {ends.begin:.6g} to {ends.end:.6g}"
+                    )
+            yield self.surface.partials(theta, 0)[0], f"surface at {where}"
+
+    def target(self) -> SurfaceTarget:
+        """See :class:`Task`; coordinates are ``(theta_1, theta_2, xi)``."""
+        return SurfaceTarget(self.surface)
+
+    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+        """See :class:`Task`."""
+        for value, ends, closed in zip(
+            coordinates[:2], self.surface.domain, self.surface.closed, strict=True
+        ):
+            inside = closed or ends.begin <= value <= ends.end
+            allowed = f"theta within {[list(ends) for ends in self.surface.domain]}"
+            require(inside, key, coordinates.tolist(), allowed)
+
+
+def _motion(scenario: Scenario) -> PiecewisePolynomialCurve:
+    """Return the tangential references over time, of dimension 2."""
+    reference = scenario.reference
+    limits = (reference.velocity, reference.acceleration, reference.dwell)
+    if reference.places:
+        return straight_lines(reference.places, *limits)
+    if reference.second is None:
+        raise InputError(
+            "reference: a surface has two coordinates; write reference.places: "
+            "[[eta_1, eta_2], ..] (m), or reference.second: {points, velocity, acceleration}"
+        )
+    return together(
+        (reference.points, *limits),
+        (
+            reference.second.points,
+            reference.second.velocity,
+            reference.second.acceleration,
+            reference.dwell,
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Surfaces in space: partial derivatives, curvature, checks and projections."""

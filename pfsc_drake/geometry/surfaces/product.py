@@ -1,0 +1,112 @@
+"""Surfaces that are sums of products of functions of one parameter each."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.basis import Basis
+from pfsc_drake.geometry.surfaces.partials import partial_orders
+from pfsc_drake.geometry.surfaces.surface import Sampler, Surface, check_partial_order
+
+# Samples that are evaluated at once.
+_CHUNK = 20_000
+# Up to so many products of functions it is faster to multiply all of them first.
+_FEW_PRODUCTS = 24
+
+
+class ProductSurface(Surface):
+    """sigma_t(theta) = sum_kl c_kl a_k(theta_1) b_l(theta_2), with other c_kl in each cell.
+
+    Planes, surfaces of revolution, translated curves and tensor-product splines are of this
+    kind. All partial derivatives at one place are one product of a matrix, which each cell
+    has, with the products of the functions.
+
+    Args:
+        first: Functions a_k of theta_1.
+        second: Functions b_l of theta_2.
+        coefficients: c_kl of each cell, [pieces_1, pieces_2, size_1, size_2, 3], m.
+        smoothness: k of the class C^k.
+
+    Raises:
+        InputError: Wrong shape, or a coefficient that is not finite.
+    """
+
+    def __init__(
+        self, first: Basis, second: Basis, coefficients: ArrayLike, *, smoothness: float
+    ) -> None:
+        super().__init__(
+            (first.breakpoints, second.breakpoints),
+            closed=(first.closed, second.closed),
+            smoothness=smoothness,
+        )
+        table = np.array(coefficients, dtype=float)
+        shape = (first.pieces, second.pieces, first.size, second.size, 3)
+        if table.shape != shape:
+            raise InputError(f"surface coefficients: shape {table.shape}; {shape} is required")
+        if not np.all(np.isfinite(table)):
+            raise InputError("surface coefficients: not finite; finite values are required")
+        table.setflags(write=False)
+        self.coefficients = table
+        self._bases = (first, second)
+
+    def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """See the base class."""
+        rows = np.array(partial_orders(check_partial_order(order)))
+        values = self.checked(theta)
+        flat = values.reshape(-1, 2)
+        out = np.empty((len(flat), len(rows), 3))
+        for begin in range(0, len(flat), _CHUNK):
+            part = slice(begin, begin + _CHUNK)
+            out[part] = self._partials(flat[part], order)[:, rows[:, 0], rows[:, 1]]
+        return out.reshape(*values.shape[:-1], len(rows), 3)
+
+    def _partials(self, theta: np.ndarray, order: int) -> np.ndarray:
+        """Derivatives up to an order in each direction, [n, order + 1, order + 1, 3]."""
+        pieces, functions = [], []
+        for k, basis in enumerate(self._bases):
+            piece, values = basis.values(theta[:, k])
+            pieces.append(piece)
+            functions.append(np.einsum("ikl,nl->nik", basis.derivations(order), values))
+        first, second = functions
+        table = self.coefficients
+        own = table[0] if table.shape[:2] == (1, 1) else table[pieces[0], pieces[1]]
+        n, size_1, size_2 = len(theta), *table.shape[2:4]
+        along = first @ own.reshape(-1, size_1, size_2 * 3)
+        along = along.reshape(n, order + 1, size_2, 3).transpose(0, 2, 1, 3)
+        both = second @ along.reshape(n, size_2, -1)
+        return both.reshape(n, order + 1, order + 1, 3).transpose(0, 2, 1, 3)
+
+    def flat_sampler(self, order: int) -> Sampler:
+        """See the base class; the matrix of a cell is made when it is first entered."""
+        first, second = (basis.sampler() for basis in self._bases)
+        rows = partial_orders(check_partial_order(order))
+        powers = [basis.derivations(order) for basis in self._bases]
+        left = np.array([powers[0][i].T for i, _ in rows])[:, None]
+        right = np.array([powers[1][j] for _, j in rows])[:, None]
+        matrices: dict[tuple[int, int], np.ndarray] = {}
+        size_1, size_2 = self.coefficients.shape[2:4]
+        few = size_1 * size_2 <= _FEW_PRODUCTS
+        shape = (3 * len(rows), -1) if few else (3 * len(rows) * size_1, size_2)
+
+        def make(cell: tuple[int, int]) -> np.ndarray:
+            table = left @ self.coefficients[cell].transpose(2, 0, 1) @ right
+            matrices[cell] = table.reshape(shape)
+            return matrices[cell]
+
+        def sample_at_once(theta_1: float, theta_2: float) -> np.ndarray:
+            p, a = first(theta_1)
+            q, b = second(theta_2)
+            matrix = matrices.get((p, q))
+            if matrix is None:
+                matrix = make((p, q))
+            return matrix.dot([x * y for x in a for y in b])
+
+        def sample_one_by_one(theta_1: float, theta_2: float) -> np.ndarray:
+            p, a = first(theta_1)
+            q, b = second(theta_2)
+            matrix = matrices.get((p, q))
+            if matrix is None:
+                matrix = make((p, q))
+            return matrix.dot(b).reshape(-1, size_1).dot(a)
+
+        return sample_at_once if few else sample_one_by_one

@@ -1,0 +1,184 @@
+"""Parametrized surfaces: what every surface offers."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.partials import MAX_PARTIAL_ORDER
+
+Sampler = Callable[[float, float], np.ndarray]
+
+
+class Interval(NamedTuple):
+    """First and last value of a parameter."""
+
+    begin: float
+    end: float
+
+    @property
+    def length(self) -> float:
+        """Distance from begin to end."""
+        return self.end - self.begin
+
+
+class Surface(ABC):
+    """A parametrized surface sigma_t: [begin_1, end_1] x [begin_2, end_2] -> R^3 (section 4.1).
+
+    Attributes:
+        domain: First and last value of theta_1 and of theta_2.
+        closed: For each direction whether sigma_t is periodic in it; parameters outside the
+            domain are then wrapped.
+        smoothness: k of the class C^k, `math.inf` if all derivatives are continuous (across
+            seams too).
+        breakpoints: For each direction the lines between which the surface is analytic, with
+            both ends, each [cells + 1].
+
+    Args:
+        breakpoints: See above; finite and strictly increasing.
+        closed: See above.
+        smoothness: See above.
+
+    Raises:
+        InputError: Breakpoints that do not increase, or are not finite.
+    """
+
+    def __init__(
+        self,
+        breakpoints: tuple[ArrayLike, ArrayLike],
+        *,
+        closed: tuple[bool, bool],
+        smoothness: float,
+    ) -> None:
+        first, second = (
+            _checked_breakpoints(values, name)
+            for values, name in zip(breakpoints, ("theta_1", "theta_2"), strict=True)
+        )
+        self.breakpoints = (first, second)
+        self.domain = (
+            Interval(float(first[0]), float(first[-1])),
+            Interval(float(second[0]), float(second[-1])),
+        )
+        self.closed = closed
+        self.smoothness = smoothness
+
+    @abstractmethod
+    def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """All partial derivatives up to a total order, for set-up and figures.
+
+        Args:
+            theta: Parameters, shape [..., 2]. Closed directions wrap.
+            order: Highest total order, 0 to 6.
+
+        Returns:
+            Array of shape [..., partial_count(order), 3], m, rows as in `partials`.
+
+        Raises:
+            InputError: theta lies outside the domain in an open direction, or the order is
+                out of range.
+        """
+
+    @abstractmethod
+    def flat_sampler(self, order: int) -> Sampler:
+        """Fast scalar form of `partials`, result flattened.
+
+        Args:
+            order: Highest total order, 0 to 6.
+
+        Returns:
+            Function of two finite floats theta_1, theta_2 that returns a new array
+            [3 partial_count(order)]. Closed directions wrap; beyond the ends of open ones the
+            last cell is continued analytically.
+        """
+
+    def wrap(self, theta: ArrayLike) -> np.ndarray:
+        """Parameters moved into the domain by whole periods in closed directions.
+
+        Args:
+            theta: Parameters, shape [..., 2].
+
+        Returns:
+            Array of the same shape.
+        """
+        values = np.array(theta, dtype=float)
+        for k, (begin, end) in enumerate(self.domain):
+            own = values[..., k]
+            if self.closed[k]:
+                wrapped = begin + np.mod(own - begin, end - begin)
+                values[..., k] = np.where((own >= begin) & (own <= end), own, wrapped)
+        return values
+
+    def checked(self, theta: ArrayLike) -> np.ndarray:
+        """Wrapped parameters, shape [..., 2].
+
+        Raises:
+            InputError: theta is not a pair, or lies outside the domain in an open direction.
+        """
+        values = np.asarray(theta, dtype=float)
+        if values.shape[-1:] != (2,):
+            raise InputError(f"theta: shape {values.shape}; [..., 2] is required")
+        values = self.wrap(values)
+        for k, (begin, end) in enumerate(self.domain):
+            # Parameters come out of sums and projections, so the ends carry rounding errors.
+            slack = 1e-9 * (end - begin)
+            own = values[..., k]
+            outside = ~((own >= begin - slack) & (own <= end + slack))
+            if np.any(outside):
+                raise InputError(
+                    f"theta_{k + 1}: {float(own[outside].flat[0]):.9g};"
+                    f" the surface is defined on [{begin:.9g}, {end:.9g}]"
+                )
+        return values
+
+    def grid(self, cells: int, fewest: int) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters of samples in both directions, between any two breakpoints alike.
+
+        Args:
+            cells: Number of samples in each cell.
+            fewest: Least number of samples in each direction.
+
+        Returns:
+            theta_1 [n_1] and theta_2 [n_2], increasing, with both ends; without the last in
+            closed directions.
+        """
+        first, second = (
+            _spread(breaks, max(cells, -(-fewest // (len(breaks) - 1))), closed)
+            for breaks, closed in zip(self.breakpoints, self.closed, strict=True)
+        )
+        return first, second
+
+
+def check_partial_order(order: int) -> int:
+    """The total order of derivatives, if it is an integer from 0 to 6.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not isinstance(order, int) or not 0 <= order <= MAX_PARTIAL_ORDER:
+        raise InputError(
+            f"order of partial derivatives: {order};"
+            f" an integer from 0 to {MAX_PARTIAL_ORDER} is required"
+        )
+    return order
+
+
+def _checked_breakpoints(values: ArrayLike, name: str) -> np.ndarray:
+    breaks = np.array(values, dtype=float)
+    increasing = breaks.ndim == 1 and len(breaks) > 1 and np.all(np.diff(breaks) > 0.0)
+    if not increasing or not np.all(np.isfinite(breaks)):
+        raise InputError(
+            f"breakpoints of {name}: {breaks.tolist()};"
+            " two or more finite numbers are required, each larger than the one before"
+        )
+    breaks.setflags(write=False)
+    return breaks
+
+
+def _spread(breaks: np.ndarray, count: int, closed: bool) -> np.ndarray:
+    """Return ``count`` samples from each breakpoint to the next, and the end if it is open."""
+    parts = np.arange(count) / count
+    inner = (breaks[:-1, None] + np.diff(breaks)[:, None] * parts).ravel()
+    return inner if closed else np.append(inner, breaks[-1])
