@@ -83,9 +83,7 @@ class Manifold(Protocol):
     def layout(self) -> PointLayout:
         """Layout of the manifold's point."""
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.
 
         Args:

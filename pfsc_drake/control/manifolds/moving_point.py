@@ -59,9 +59,7 @@ class MovingPoint(PathManifold):
     name = "trajectory"
     follows_time = True
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`trajectory_errors`."""
         return trajectory_errors(y, R_e, self.geometry(point), lead[0])
 

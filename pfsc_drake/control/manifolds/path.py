@@ -183,9 +183,7 @@ class PathManifold:
             turn=ca.vertsplit(point[layout.turn]) if layout.turning else (),
         )
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`path_coordinates`."""
         return path_coordinates(y, R_e, self.geometry(point))
 

@@ -56,9 +56,7 @@ def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX
     return turning_torque(torque, quaternion[:4], quaternion[4:8]) / ca.norm_2(slope)
 
 
-def frame_turning_force(
-    force: ca.SX, point: ca.SX, layout: PathPointLayout, xi: ca.SX
-) -> ca.SX:
+def frame_turning_force(force: ca.SX, point: ca.SX, layout: PathPointLayout, xi: ca.SX) -> ca.SX:
     """Return the force along eta of a tool beside a path whose frame turns about it [N].
 
     With ``w = psi' / |sigma'|`` [rad/m], the frame's turn per length of the path, a tool that keeps

@@ -120,9 +120,7 @@ def surface_parameters(y: Jet, position: Sequence[ca.SX]) -> tuple[Jet, Jet]:
     for k in range(1, y.order + 1):
         trial = theta[0].append(ca.SX(0)), theta[1].append(ca.SX(0))
         offset = y - jets.compose_pair(position, *trial)
-        f_1, f_2 = (
-            jets.dot(offset, slope).coefficients[k] for slope in slopes(position, k, trial)
-        )
+        f_1, f_2 = (jets.dot(offset, slope).coefficients[k] for slope in slopes(position, k, trial))
         theta = (
             theta[0].append((h_22 * f_1 - h_12 * f_2) / determinant),
             theta[1].append((h_11 * f_2 - h_12 * f_1) / determinant),
@@ -234,9 +232,7 @@ class SurfaceManifold:
             alignment=self.alignment,
         )
 
-    def virtual_output(
-        self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]
-    ) -> list[Jet]:
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return :func:`surface_coordinates`."""
         return surface_coordinates(y, R_e, self.geometry(point))
 
@@ -257,10 +253,8 @@ class SurfaceManifold:
         if len(self.coordinates) == 3:
             return translational
         phi, quaternion = reference[3:], point[self.layout.quaternion]
-        if self.offset is None:
-            R_d = quaternion_matrix(quaternion[:4])
-        else:
-            R_d = plane.axes @ self.offset
+        frame = None if self.offset is None else plane.axes @ self.offset
+        R_d = quaternion_matrix(quaternion[:4]) if frame is None else frame
         if self.alignment is not None:
             torque = torque_across_axis(torque, R_d, phi, self.alignment)
         if with_turning:

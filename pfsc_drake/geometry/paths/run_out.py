@@ -180,9 +180,7 @@ def continuations(
     return made[0], made[1]
 
 
-def _run_out_length(
-    p: np.ndarray, q: np.ndarray | None, psi: np.ndarray, longest: float
-) -> float:
+def _run_out_length(p: np.ndarray, q: np.ndarray | None, psi: np.ndarray, longest: float) -> float:
     """Length in which no term of the Taylor series takes the curve far from its tangent."""
     lengths, speed = [longest], float(np.linalg.norm(p[1]))
     for j in range(2, len(p)):

@@ -75,9 +75,7 @@ class CurveOnSurface(Curve):
         cross = jets.cross(first, second)
         return tuple(x / jets.sqrt(_dot(x, x)) for x in (position, cross))
 
-    def _composed(
-        self, theta: ArrayLike, order: int, which: list[tuple[int, int]]
-    ) -> list[Jet]:
+    def _composed(self, theta: ArrayLike, order: int, which: list[tuple[int, int]]) -> list[Jet]:
         """Partial derivatives of the surface along the curve as jets by theta, [..., 3]."""
         c = self._parameters.derivatives(theta, order)
         pair = [
@@ -143,7 +141,8 @@ def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
             continue
         own, period = values[:, k], breaks[-1] - breaks[0]
         laps = np.arange(
-            math.floor((own.min() - breaks[0]) / period), math.ceil((own.max() - breaks[0]) / period)
+            math.floor((own.min() - breaks[0]) / period),
+            math.ceil((own.max() - breaks[0]) / period),
         )
         levels = np.unique(breaks + period * laps[:, None]) if closed else breaks[1:-1]
         for level in levels:
