@@ -8,8 +8,8 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, fit_pieces, power_coefficients
 from pfsc_drake.geometry.paths.arc_length import ArcLength
-from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.point import PathPointLayout
+from pfsc_drake.geometry.paths.turned_frame import Frame
 
 _DEGREE = 7
 # Of each quantity, relative to its size on the path.
@@ -44,7 +44,7 @@ def tabulate(
     position: Curve,
     orientation: OrientationCurve | None,
     arc_length: ArcLength,
-    frame: ParallelTransportFrame,
+    frame: Frame,
     layout: PathPointLayout,
 ) -> PathTable:
     """Table of a path.
@@ -56,7 +56,7 @@ def tabulate(
         position: Curve sigma_t in R^3.
         orientation: Curve of quaternions, or None.
         arc_length: Arc length of `position`.
-        frame: Parallel transport frame of `position`.
+        frame: Frame along `position`.
         layout: Which quantities, and where they go.
 
     Raises:
@@ -72,6 +72,8 @@ def tabulate(
         if orientation is not None:
             q = orientation.derivatives(theta, order)
             points[:, layout.quaternion] = q.reshape(len(theta), -1)
+        if layout.turning:
+            points[:, layout.turn] = frame.turning(theta, order)
         return points
 
     breakpoints = _common_breakpoints(position, orientation, frame)
@@ -97,6 +99,7 @@ def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
     """
     scale = np.ones(layout.size)
     vectors = [(layout.eta, 1), (layout.normal, 3), (layout.position, 3), (layout.quaternion, 4)]
+    vectors.append((layout.turn, 1))
     for place, dimension in vectors:
         parts = np.abs(points[:, place]).reshape(len(points), -1, dimension)
         norm = np.linalg.norm(parts, axis=2).max(axis=0)[:, None]
@@ -106,7 +109,7 @@ def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
 
 
 def _common_breakpoints(
-    position: Curve, orientation: OrientationCurve | None, frame: ParallelTransportFrame
+    position: Curve, orientation: OrientationCurve | None, frame: Frame
 ) -> np.ndarray:
     """Where any of the quantities need not be smooth, [n]."""
     begin, end = position.domain
