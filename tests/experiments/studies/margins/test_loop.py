@@ -69,6 +69,18 @@ def test_a_fast_joint_is_no_fault():
     assert linearize(loop, root, loop.variables_in_loop([root])) is not None
 
 
+@pytest.mark.parametrize("task", ["reference", "limits", "conditioning"])
+def test_a_posture_that_is_pulled_is_in_the_loop(task):
+    """What pulls it depends on the joints, and they follow it; a spring to a goal knows neither."""
+    changes = [f"controller.posture.task={task}", "reference.dwell=1"]
+    loop = StationLoop(settings_of("pfc_panda_7r", *changes), folder())
+    chosen = loop.variables_in_loop([at_rest(loop)])
+    posture = loop.station.diagram.GetSubsystemByName("posture_reference")
+    own = np.isin(loop.map.rows(posture), chosen)
+    # the motion of seven joints, orders 0 to 2, not the goal
+    assert own.sum() == (0 if task == "reference" else 21)
+
+
 CASES = [
     ("pfc_elastic_3r", []),
     ("pfc_elastic_3r", ["controller.law=rigid"]),
