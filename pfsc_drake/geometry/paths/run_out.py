@@ -165,9 +165,10 @@ def continuations(
         curve = RunOut(p, p[1], end, length)
         turning = None if q is None else OrientationCurve(RunOut(q, 0.0 * q[0], end, length))
         way = ArcLength(curve)
-        through: Frame = _frame_through(curve, frame.normals(end)[0], end)
+        transported = _frame_through(curve, frame.normals(end)[0], end)
+        through: Frame = transported
         if frame.turns:
-            through = TurnedFrame(through, RunOut(psi, np.zeros(1), end, length))
+            through = TurnedFrame(transported, RunOut(psi, np.zeros(1), end, length))
         made.append(
             Continuation(
                 curve,

@@ -99,13 +99,27 @@ def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
     """
     scale = np.ones(layout.size)
     vectors = [(layout.eta, 1), (layout.normal, 3), (layout.position, 3), (layout.quaternion, 4)]
-    vectors.append((layout.turn, 1))
     for place, dimension in vectors:
         parts = np.abs(points[:, place]).reshape(len(points), -1, dimension)
         norm = np.linalg.norm(parts, axis=2).max(axis=0)[:, None]
         scale[place] = np.maximum(parts.max(axis=0), _SMALL_COMPONENT * norm).ravel()
+    if layout.turning:
+        scale[layout.turn] = _turn_scale(points, layout)
     scale[scale == 0.0] = 1.0
     return scale
+
+
+def _turn_scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
+    """Size of the derivatives of psi, [order]: of a frame that turns as fast as the path bends.
+
+    A torsion that is constant but for rounding errors has derivatives of no size of their own.
+    """
+    sizes = np.abs(points[:, layout.turn]).max(axis=0)
+    position = points[:, layout.position].reshape(len(points), -1, 3)
+    bends = np.linalg.norm(position, axis=2).max(axis=0)[1:]
+    orders = np.arange(1, layout.order + 1)
+    rate = np.max(np.append((bends[1:] / bends[0]) ** (1.0 / orders), sizes[0]))
+    return np.asarray(np.maximum(sizes, rate**orders))
 
 
 def _common_breakpoints(

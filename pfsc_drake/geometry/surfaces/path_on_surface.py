@@ -72,8 +72,7 @@ class CurveOnSurface(Curve):
         """Tangent and normal as jets by theta, coefficients [..., 3]."""
         position = self._composed(theta, order + 1, [(0, 0)])[0].differentiate()
         first, second = self._composed(theta, order, [(1, 0), (0, 1)])
-        cross = jets.cross(first, second)
-        return tuple(x / jets.sqrt(_dot(x, x)) for x in (position, cross))
+        return _unit(position), _unit(jets.cross(first, second))
 
     def _composed(self, theta: ArrayLike, order: int, which: list[tuple[int, int]]) -> list[Jet]:
         """Partial derivatives of the surface along the curve as jets by theta, [..., 3]."""
@@ -147,19 +146,21 @@ def _with_seams(surface: Surface, parameters: Curve) -> np.ndarray:
         levels = np.unique(breaks + period * laps[:, None]) if closed else breaks[1:-1]
         for level in levels:
             for i in np.flatnonzero((own[:-1] - level) * (own[1:] - level) < 0.0):
-                seams.append(
-                    [
-                        brentq(
-                            lambda theta, k=k, level=level: (
-                                parameters.derivatives(theta, 0)[0, k] - level
-                            ),
-                            grid[i],
-                            grid[i + 1],
-                            xtol=1e-15,
-                        )
-                    ]
-                )
+                seams.append(_crossing(parameters, k, level, (grid[i], grid[i + 1])))
     return np.unique(np.concatenate(seams))
+
+
+def _crossing(parameters: Curve, k: int, level: float, between: tuple[float, float]) -> np.ndarray:
+    """Where a component of a curve has a value, [1]."""
+
+    def excess(theta: float) -> float:
+        return float(parameters.derivatives(theta, 0)[0, k]) - level
+
+    return np.array([brentq(excess, *between, xtol=1e-15)])
+
+
+def _unit(x: Jet) -> Jet:
+    return x / jets.sqrt(_dot(x, x))
 
 
 def _dot(x: Jet, y: Jet) -> Jet:
