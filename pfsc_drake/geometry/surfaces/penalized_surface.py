@@ -1,0 +1,174 @@
+"""Penalized tensor-product B-splines: least squares with a penalty on rough coefficients."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
+from scipy.sparse.linalg import splu
+
+from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
+
+_REFINEMENTS = 2
+# Random vectors from which traces are estimated.
+_PROBES = 24
+# Logarithms of the roughness: beyond them only the knots decide, or rounding errors do.
+_LEAST, _MOST, _STEP = -8.0, 10.0, 0.1
+
+
+class PenalizedSurface:
+    """Scalar splines of two parameters that give and take between closeness and smoothness.
+
+    The coefficients c minimize, after P. H. C. Eilers and B. D. Marx, "Flexible smoothing with
+    B-splines and penalties", Statistical Science 11 (1996),
+
+        sum_i w_i (sum_j B_j(theta_i) c_j - z_i)^2
+            + roughness (n / cells) sum_a binom(m, a) sum |D_1^a D_2^(m-a) c|^2
+
+    with differences D of neighbouring coefficients, relative to the mean of both knot steps: a
+    discrete form of the energy of a thin plate, int sum_a binom(m, a) (d^m f / d theta_1^a d
+    theta_2^(m-a))^2, of order m = degree // 2 + 1. It does not depend on how the axes are turned.
+
+    Args:
+        theta: theta_i, [n, 2], within the knots' domains.
+        values: z_i, [n].
+        first: Knots of theta_1.
+        second: Knots of theta_2.
+    """
+
+    def __init__(
+        self,
+        theta: np.ndarray,
+        values: np.ndarray,
+        first: UniformKnots,
+        second: UniformKnots,
+    ) -> None:
+        self.first, self.second = first, second
+        self._values = values
+        self._basis = _products(first, second, theta)
+        self._differences = _differences(first, second) * math.sqrt(
+            len(values) / (first.intervals * second.intervals)
+        )
+        self._penalty = self._differences.T @ self._differences
+        self.weigh(np.ones(len(values)))
+
+    def weigh(self, weights: np.ndarray) -> None:
+        """Give each value a weight w_i, [n], positive; they are one at first."""
+        self._weights = weights
+        weighted = csr_array(diags_array(weights) @ self._basis).T
+        self._closeness = weighted @ self._basis
+        self._right = weighted @ self._values
+
+    def fit(self, exponent: float) -> np.ndarray:
+        """Coefficients of the best spline, [first.count * second.count].
+
+        Args:
+            exponent: Decimal logarithm of the roughness.
+        """
+        return self._fit(self._solver(exponent), exponent)
+
+    def residuals(self, coefficients: np.ndarray) -> np.ndarray:
+        """Spline less values, [n]."""
+        return np.asarray(self._basis @ coefficients - self._values)
+
+    def best_predicting(self) -> tuple[float, float]:
+        """Roughness whose spline predicts left-out points best, and the noise it leaves.
+
+        The score is that of generalized cross-validation, n |w^(1/2) r|^2 / (n - p)^2 with
+        residuals r and p the trace of the map from values to the spline's (P. Craven and G.
+        Wahba, Numerische Mathematik 31, 1979), p estimated from random signs (M. F. Hutchinson).
+
+        Returns:
+            Decimal logarithm of the roughness, and sqrt(|w^(1/2) r|^2 / (n - p)).
+        """
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(self._values), _PROBES))
+        probes = self._basis.T @ (np.sqrt(self._weights)[:, None] * signs)
+
+        def judge(exponent: float) -> tuple[float, float]:
+            solve = self._solver(exponent)
+            parameters = float(np.sum(probes * solve(probes))) / _PROBES
+            free = max(len(self._values) - parameters, 1e-3 * len(self._values))
+            square = float(self._weights @ self.residuals(self._fit(solve, exponent)) ** 2)
+            return square / free**2, math.sqrt(square / free)
+
+        found = minimize_scalar(
+            lambda exponent: math.log(judge(exponent)[0] + np.finfo(float).tiny),
+            bounds=(_LEAST, _MOST),
+            method="bounded",
+            options={"xatol": _STEP},
+        )
+        return float(found.x), judge(found.x)[1]
+
+    def strongest(self, allowed: Callable[[np.ndarray], bool], least: float) -> float:
+        """The strongest penalty whose spline is allowed, but not less than ``least``.
+
+        Args:
+            allowed: Told coefficients.
+            least: Decimal logarithm of a roughness.
+
+        Returns:
+            Decimal logarithm of the roughness.
+        """
+        low, high = least, max(least, _MOST)
+        if allowed(self.fit(high)):
+            return high
+        while high - low > _STEP:
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if allowed(self.fit(middle)) else (low, middle)
+        return low
+
+    def _solver(self, exponent: float) -> Callable[[np.ndarray], np.ndarray]:
+        normal = self._closeness + 10.0**exponent * self._penalty
+        return splu(normal.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0).solve
+
+    def _fit(self, solve: Callable[[np.ndarray], np.ndarray], exponent: float) -> np.ndarray:
+        coefficients = solve(self._right)
+        # A strong penalty makes the matrix ill-conditioned, but not the differences themselves.
+        for _ in range(_REFINEMENTS):
+            bent = self._differences.T @ (self._differences @ coefficients)
+            error = self._right - self._closeness @ coefficients - 10.0**exponent * bent
+            coefficients = coefficients + solve(error)
+        return coefficients
+
+
+def _products(first: UniformKnots, second: UniformKnots, theta: np.ndarray) -> csr_array:
+    """All products of B-splines of both directions at parameters, [n, coefficients]."""
+    columns, entries = [], []
+    for axis, knots in enumerate((first, second)):
+        every = knots.knots
+        # Knots are multiples of a step: the ends are not exactly on them.
+        inside = np.clip(theta[:, axis], every[knots.degree], every[-knots.degree - 1])
+        basis = BSpline.design_matrix(inside, every, knots.degree)
+        columns.append(basis.indices.reshape(len(theta), -1) % knots.count)
+        entries.append(basis.data.reshape(len(theta), -1))
+    data = entries[0][:, :, None] * entries[1][:, None, :]
+    place = columns[0][:, :, None] * second.count + columns[1][:, None, :]
+    rows = np.repeat(np.arange(len(theta)), data[0].size)
+    shape = (len(theta), first.count * second.count)
+    return csr_array(coo_array((data.ravel(), (rows, place.ravel())), shape=shape))
+
+
+def _differences(first: UniformKnots, second: UniformKnots) -> csr_array:
+    """All differences of order m of neighbouring coefficients, weighted and stacked."""
+    order = first.degree // 2 + 1
+    ratio = math.sqrt(second.step / first.step)
+    along = [_powers(first, order), _powers(second, order)]
+    parts = [
+        kron(along[0][a], along[1][order - a])
+        * (math.sqrt(math.comb(order, a)) * ratio ** (2 * a - order))
+        for a in range(order + 1)
+    ]
+    return csr_array(vstack(parts))
+
+
+def _powers(knots: UniformKnots, order: int) -> list[csr_array]:
+    """Differences of order 0..order of the coefficients in one direction."""
+    found = [csr_array(eye_array(knots.count, format="csr"))]
+    for _ in range(order):
+        last = found[-1]
+        rows = last.shape[0]
+        following = csr_array(last[np.arange(1, rows + knots.closed) % rows])
+        found.append(csr_array(following - last[: following.shape[0]]))
+    return found
