@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.optimize import minimize_scalar
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
+from scipy.sparse import csr_array, diags_array, eye_array, kron, vstack
 from scipy.sparse.linalg import splu
 
 from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
@@ -135,19 +134,13 @@ class PenalizedSurface:
 
 def _products(first: UniformKnots, second: UniformKnots, theta: np.ndarray) -> csr_array:
     """All products of B-splines of both directions at parameters, [n, coefficients]."""
-    columns, entries = [], []
-    for axis, knots in enumerate((first, second)):
-        every = knots.knots
-        # Knots are multiples of a step: the ends are not exactly on them.
-        inside = np.clip(theta[:, axis], every[knots.degree], every[-knots.degree - 1])
-        basis = BSpline.design_matrix(inside, every, knots.degree)
-        columns.append(basis.indices.reshape(len(theta), -1) % knots.count)
-        entries.append(basis.data.reshape(len(theta), -1))
-    data = entries[0][:, :, None] * entries[1][:, None, :]
-    place = columns[0][:, :, None] * second.count + columns[1][:, None, :]
+    columns_1, entries_1 = first.entries(theta[:, 0])
+    columns_2, entries_2 = second.entries(theta[:, 1])
+    data = entries_1[:, :, None] * entries_2[:, None, :]
+    place = columns_1[:, :, None] * second.count + columns_2[:, None, :]
     rows = np.repeat(np.arange(len(theta)), data[0].size)
     shape = (len(theta), first.count * second.count)
-    return csr_array(coo_array((data.ravel(), (rows, place.ravel())), shape=shape))
+    return csr_array((data.ravel(), (rows, place.ravel())), shape=shape)
 
 
 def _differences(first: UniformKnots, second: UniformKnots) -> csr_array:

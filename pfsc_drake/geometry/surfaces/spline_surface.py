@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.sparse import csr_array
 
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate_at, piecewise
@@ -50,6 +51,22 @@ class UniformKnots(NamedTuple):
     def linear(self) -> np.ndarray:
         """Coefficients of the function theta itself, of an open direction, [count]."""
         return self.begin + self.step * (np.arange(self.count) - (self.degree - 1) / 2.0)
+
+    def entries(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """B-splines that are not zero at parameters [n]: which and their values, [n, degree + 1]."""
+        knots = self.knots
+        # Knots are multiples of a step: the ends are not exactly on them.
+        inside = np.clip(theta, knots[self.degree], knots[-self.degree - 1])
+        matrix = BSpline.design_matrix(inside, knots, self.degree)
+        shape = (len(theta), self.degree + 1)
+        return matrix.indices.reshape(shape) % self.count, matrix.data.reshape(shape)
+
+    def basis(self, theta: np.ndarray) -> csr_array:
+        """B-splines at parameters [n] within the domain, [n, count]."""
+        columns, values = self.entries(theta)
+        rows = np.broadcast_to(np.arange(len(theta))[:, None], columns.shape)
+        place = (rows.ravel(), columns.ravel())
+        return csr_array((values.ravel(), place), shape=(len(theta), self.count))
 
     def unfolded(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients of all knots from the distinct ones, along the first axis."""
