@@ -31,7 +31,7 @@ class Base(Protocol):
     period: float
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """theta of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
+        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
 
     def heights(self, points: np.ndarray) -> np.ndarray:
         """Distances of points [n, 3] from the base along its normals, m, [n]."""

@@ -29,7 +29,7 @@ BaseChoice = Literal["auto", "plane", "cylinder"] | Axis
 
 # Cosine of the angle between normals of points and of their base, one of fifty being steeper:
 # a plane that is so good is taken, and none is that is worse.
-_GOOD, _BEARABLE = 0.5, 0.25
+_GOOD, _BEARABLE = 0.7, 0.25
 _STEEPEST = 0.02
 # Component of a normal from which on it points up or down.
 _UPRIGHT = 0.1
@@ -53,7 +53,8 @@ def choose_base(
         points: [n, 3], m.
         near: Their neighbourhoods.
         choice: "auto" takes the plane that the normals are nearest to, or where they lean away
-            from it by more than 60 degrees the cylinder whose axis they meet; or "plane",
+            from it by more than 45 degrees the better of it and the cylinder whose axis they
+            meet; or "plane",
             "cylinder", or a cylinder of the axis given.
         seen_from: A point on the side that the normal points to, [3], m. By default it points
             upwards on a plane, and outward on a cylinder.
@@ -88,7 +89,9 @@ def choose_base(
         steepest = _steepest(base, points, near)
         fold = _fold(base, points, near)
         if fold is not None:
-            failures.append(f"on {base.name} two sheets lie over each other near {_numbers(fold)} m")
+            failures.append(
+                f"on {base.name} two sheets lie over each other near {_numbers(fold)} m"
+            )
         elif steepest < _BEARABLE:
             lean = math.degrees(math.acos(steepest))
             failures.append(f"on {base.name} it leans over by {lean:.0f} deg")

@@ -37,8 +37,26 @@ def surface_through_grid(
         InputError: Wrong shape, values that are not finite or too large, too few points,
             neighbours that coincide, or a surface that is not regular.
     """
+    grid = grid_for(points, smoothness, closed)
+    parameters = (grid_parameters(grid, 0), grid_parameters(grid, 1))
+    surface = interpolated_surface(parameters, grid, smoothness + 1, closed)
+    check_regular(surface)
+    return surface
+
+
+def grid_for(points: ArrayLike, smoothness: int, closed: tuple[bool, bool]) -> np.ndarray:
+    """Return a grid of points as an array, with the first row and column again where it closes.
+
+    Args:
+        points: [n_1, n_2, 3], m.
+        smoothness: k of the class C^k that is asked for.
+        closed: Which directions are periodic.
+
+    Raises:
+        InputError: As `surface_through_grid`.
+    """
     check_smoothness(smoothness)
-    grid = check_grid(points)
+    grid = _checked(points)
     for axis in (0, 1):
         if closed[axis]:
             grid = _closing(grid, axis)
@@ -49,13 +67,10 @@ def surface_through_grid(
                 f" {'a closed' if closed[axis] else 'an open'} direction;"
                 f" {needed - closed[axis]} are needed for class C^{smoothness}"
             )
-    parameters = (grid_parameters(grid, 0), grid_parameters(grid, 1))
-    surface = interpolated_surface(parameters, grid, smoothness + 1, closed)
-    check_regular(surface)
-    return surface
+    return grid
 
 
-def check_grid(points: ArrayLike) -> np.ndarray:
+def _checked(points: ArrayLike) -> np.ndarray:
     """Return a grid of points as an array [n_1, n_2, 3], m.
 
     Raises:

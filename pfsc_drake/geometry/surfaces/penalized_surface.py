@@ -15,15 +15,16 @@ _REFINEMENTS = 2
 _PROBES = 24
 # Logarithms of the roughness: beyond them only the knots decide, or rounding errors do.
 _LEAST, _MOST, _STEP = -8.0, 10.0, 0.1
+_NEAR = 1.0
 
 
 class PenalizedSurface:
-    """Scalar splines of two parameters that give and take between closeness and smoothness.
+    """Splines of two parameters that give and take between closeness and smoothness.
 
     The coefficients c minimize, after P. H. C. Eilers and B. D. Marx, "Flexible smoothing with
     B-splines and penalties", Statistical Science 11 (1996),
 
-        sum_i w_i (sum_j B_j(theta_i) c_j - z_i)^2
+        sum_i w_i |sum_j B_j(theta_i) c_j - z_i|^2
             + roughness (n / cells) sum_a binom(m, a) sum |D_1^a D_2^(m-a) c|^2
 
     with differences D of neighbouring coefficients, relative to the mean of both knot steps: a
@@ -32,7 +33,7 @@ class PenalizedSurface:
 
     Args:
         theta: theta_i, [n, 2], within the knots' domains.
-        values: z_i, [n].
+        values: z_i, [n] or [n, dimension].
         first: Knots of theta_1.
         second: Knots of theta_2.
     """
@@ -55,13 +56,13 @@ class PenalizedSurface:
 
     def weigh(self, weights: np.ndarray) -> None:
         """Give each value a weight w_i, [n], positive; they are one at first."""
-        self._weights = weights
+        self.weights = weights
         weighted = csr_array(diags_array(weights) @ self._basis).T
         self._closeness = weighted @ self._basis
         self._right = weighted @ self._values
 
     def fit(self, exponent: float) -> np.ndarray:
-        """Coefficients of the best spline, [first.count * second.count].
+        """Coefficients of the best spline, [first.count * second.count(, dimension)].
 
         Args:
             exponent: Decimal logarithm of the roughness.
@@ -69,32 +70,37 @@ class PenalizedSurface:
         return self._fit(self._solver(exponent), exponent)
 
     def residuals(self, coefficients: np.ndarray) -> np.ndarray:
-        """Spline less values, [n]."""
+        """Spline less values, shape as these."""
         return np.asarray(self._basis @ coefficients - self._values)
 
-    def best_predicting(self) -> tuple[float, float]:
+    def best_predicting(self, around: float | None = None) -> tuple[float, float]:
         """Roughness whose spline predicts left-out points best, and the noise it leaves.
 
         The score is that of generalized cross-validation, n |w^(1/2) r|^2 / (n - p)^2 with
         residuals r and p the trace of the map from values to the spline's (P. Craven and G.
         Wahba, Numerische Mathematik 31, 1979), p estimated from random signs (M. F. Hutchinson).
 
+        Args:
+            around: Decimal logarithm of a roughness that is known to be near.
+
         Returns:
             Decimal logarithm of the roughness, and sqrt(|w^(1/2) r|^2 / (n - p)).
         """
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(self._values), _PROBES))
-        probes = self._basis.T @ (np.sqrt(self._weights)[:, None] * signs)
+        probes = self._basis.T @ (np.sqrt(self.weights)[:, None] * signs)
 
         def judge(exponent: float) -> tuple[float, float]:
             solve = self._solver(exponent)
             parameters = float(np.sum(probes * solve(probes))) / _PROBES
             free = max(len(self._values) - parameters, 1e-3 * len(self._values))
-            square = float(self._weights @ self.residuals(self._fit(solve, exponent)) ** 2)
+            residuals = self.residuals(self._fit(solve, exponent))
+            square = float(self.weights @ np.sum(residuals.reshape(len(signs), -1) ** 2, axis=1))
             return square / free**2, math.sqrt(square / free)
 
+        low, high = (_LEAST, _MOST) if around is None else (around - _NEAR, around + _NEAR)
         found = minimize_scalar(
             lambda exponent: math.log(judge(exponent)[0] + np.finfo(float).tiny),
-            bounds=(_LEAST, _MOST),
+            bounds=(max(low, _LEAST), min(high, _MOST)),
             method="bounded",
             options={"xatol": _STEP},
         )
@@ -117,6 +123,21 @@ class PenalizedSurface:
             middle = (low + high) / 2.0
             low, high = (middle, high) if allowed(self.fit(middle)) else (low, middle)
         return low
+
+    def standard_errors(self, theta: np.ndarray, exponent: float) -> np.ndarray:
+        """How uncertain the spline is, over the noise of values of weight one.
+
+        Args:
+            theta: Parameters, [n, 2].
+            exponent: Decimal logarithm of the roughness, as found by `best_predicting`.
+
+        Returns:
+            sqrt(b' (B' W B + roughness penalty)^-1 b) with the B-splines b there, [n]; for a
+            penalty that suits the values it holds both their noise and what they leave open.
+        """
+        places = _products(self.first, self.second, theta)
+        columns = places.toarray().T
+        return np.asarray(np.sqrt(np.sum(columns * self._solver(exponent)(columns), axis=0)))
 
     def _solver(self, exponent: float) -> Callable[[np.ndarray], np.ndarray]:
         normal = self._closeness + 10.0**exponent * self._penalty

@@ -4,12 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.partials import partial_index
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _STEPS = 12
 # Of a parameter relative to its domain.
 _CONVERGED = 1e-13
+# A stray point is so many standard deviations away, and so many spacings.
+_STRAY, _STRAY_SPACINGS = 10.0, 0.1
+# Median of the absolute value of a normal random number of deviation one.
+_MEDIAN_OF_NORMAL = 0.6745
+# Mean of the absolute value over the root mean square: 0.80 of normal noise, 1 of two sheets.
+_TWO_SHEETS = 0.93
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,35 @@ def residuals(surface: Surface, points: np.ndarray, theta: np.ndarray) -> Residu
     normals = np.cross(first, second)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Residuals(surface.wrap(place), np.sum(error * normals, axis=1))
+
+
+def check_scatter(
+    left: Residuals, points: np.ndarray, spacing: float, tolerance: float | None
+) -> None:
+    """Refuse points of two sheets, and without a tolerance those far away from all others.
+
+    Args:
+        left: Residuals of the points.
+        points: [n, 3], m.
+        spacing: Distance at which they stand, m.
+        tolerance: Whether the user has said how far points may be away.
+    """
+    distances = np.abs(left.distances)
+    if left.rms > _STRAY_SPACINGS * spacing and distances.mean() > _TWO_SHEETS * left.rms:
+        raise InputError(
+            f"surface points: lie {distances.mean():.3g} m to either side of the surface fitted,"
+            " none on it; points of a single sheet are required"
+        )
+    usual = float(np.median(distances)) / _MEDIAN_OF_NORMAL
+    worst = int(np.argmax(distances))
+    stray = distances[worst] > max(_STRAY * usual, _STRAY_SPACINGS * spacing)
+    if tolerance is None and stray:
+        raise InputError(
+            f"surface points: number {worst + 1} of those fitted,"
+            f" [{', '.join(f'{value:.6g}' for value in points[worst])}] m, is"
+            f" {distances[worst]:.3g} m away from the surface, the others {usual:.3g} m: take it"
+            " out, or give a tolerance"
+        )
 
 
 def _foot(

@@ -13,10 +13,11 @@ from pfsc_drake.geometry.surfaces.base import Base
 from pfsc_drake.geometry.surfaces.choose_base import BaseChoice, choose_base
 from pfsc_drake.geometry.surfaces.coverage import cover
 from pfsc_drake.geometry.surfaces.neighbours import Neighbourhoods, neighbourhoods
+from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
 from pfsc_drake.geometry.surfaces.product import ProductSurface
-from pfsc_drake.geometry.surfaces.regularity import check_regular
-from pfsc_drake.geometry.surfaces.residuals import Residuals, residuals
-from pfsc_drake.geometry.surfaces.smoothest import SmoothHeights, smoothest_heights
+from pfsc_drake.geometry.surfaces.regularity import sample_grid
+from pfsc_drake.geometry.surfaces.residuals import Residuals, check_scatter, residuals
+from pfsc_drake.geometry.surfaces.smoothest import smoothest_within
 from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.surface import Interval
 
@@ -24,14 +25,15 @@ FEWEST_POINTS, MOST_POINTS = 50, 100_000
 # Spacings that a place may be away from the nearest point.
 _REACH = 4.0
 # Spacings per knot interval, and the most coefficients.
-_SPACINGS, _MOST_COEFFICIENTS = 1.5, 6000.0
+_SPACINGS, _MOST_COEFFICIENTS = 1.5, 4000.0
 _FEWEST_INTERVALS = 8
 # Least part of the rectangle around all points that is left of it.
 _LEAST_PART = 0.25
-# A stray point is so many standard deviations away, and so many spacings.
-_STRAY, _STRAY_SPACINGS = 10.0, 0.1
-# Median of the absolute value of a normal random number of deviation one.
-_MEDIAN_OF_NORMAL = 0.6745
+# Cosine of the largest angle between normals of the surface and of its base.
+_UPRIGHT = 0.15
+_ERROR_SAMPLES = 24
+# Standard error that is borne: so many times the noise, or spacings.
+_NOISES, _ERROR_SPACINGS = 3.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ class SurfaceFit:
         hole: Largest distance of a place on the surface from the nearest point, m.
         noise: Standard deviation of the points' noise along the normal as estimated from the
             residuals and the number of parameters that the fit has used up, m.
+        uncertainty: Largest standard error of the surface along the base's normal that such
+            noise and holes explain, m; a tolerance may cost more.
     """
 
     surface: ProductSurface
@@ -84,13 +88,14 @@ class SurfaceFit:
     spacing: float
     hole: float
     noise: float
+    uncertainty: float
 
 
 def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None) -> SurfaceFit:
     """Fit a surface to scattered points.
 
     The points are projected on a plane, or on a cylinder where they bend over; their heights over
-    it are smoothed by `smoothest_heights`, with weights that make residuals distances along the
+    it are smoothed by a `PenalizedSurface`, with weights that make residuals distances along the
     normal of the surface instead of that of the base.
 
     Args:
@@ -115,24 +120,31 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     cloud = cloud[kept]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
-    found = smoothest_heights(theta, base.heights(cloud), *knots, options.tolerance)
+    spline = PenalizedSurface(theta, base.heights(cloud), *knots)
 
-    def surface_of(fit: SmoothHeights) -> ProductSurface:
-        heights = fit.coefficients.reshape(knots[0].count, knots[1].count)
+    def surface_of(coefficients: np.ndarray) -> ProductSurface:
+        heights = coefficients.reshape(knots[0].count, knots[1].count)
         return uniform_spline_surface(*knots, base.coefficients(*knots, heights))
 
-    surface = surface_of(found)
-    first, second = np.moveaxis(surface.partials(theta, 1)[:, 1:], 1, 0)
-    normals = np.cross(first, second)
-    slopes = np.sum(normals * base.normals(cloud), axis=1) / np.linalg.norm(normals, axis=1)
-    found = smoothest_heights(
-        theta, base.heights(cloud), *knots, options.tolerance, np.abs(slopes)
-    )
-    surface = surface_of(found)
-    check_regular(surface)
+    exponent, _ = spline.best_predicting()
+    slopes = _slopes(surface_of(spline.fit(exponent)), theta, base.normals(cloud))
+    spline.weigh(slopes**2)
+    exponent, noise = spline.best_predicting(exponent)
+    uncertainty = _uncertainty(spline, exponent, noise, near, options.tolerance)
+    if options.tolerance is None:
+        coefficients = spline.fit(exponent)
+    else:
+        coefficients = smoothest_within(
+            spline,
+            exponent,
+            options.tolerance,
+            lambda found: np.abs(spline.residuals(found)) * slopes,
+        )
+    surface = surface_of(coefficients)
+    _check_upright(surface, base)
     left = residuals(surface, cloud, theta)
-    _check_strays(cloud, left, near, options.tolerance)
-    return SurfaceFit(surface, cloud, left, base.name, near.spacing, hole, found.noise)
+    check_scatter(left, cloud, near.spacing, options.tolerance)
+    return SurfaceFit(surface, cloud, left, base.name, near.spacing, hole, noise, uncertainty)
 
 
 def check_cloud(points: ArrayLike) -> np.ndarray:
@@ -227,20 +239,52 @@ def _knots(
     return first, second
 
 
-def _check_strays(
-    points: np.ndarray, left: Residuals, near: Neighbourhoods, tolerance: float | None
-) -> None:
-    """Refuse points far away from all others, which would dent the surface."""
-    if tolerance is not None:
-        return
-    distances = np.abs(left.distances)
-    usual = float(np.median(distances)) / _MEDIAN_OF_NORMAL
-    worst = int(np.argmax(distances))
-    if distances[worst] > max(_STRAY * usual, _STRAY_SPACINGS * near.spacing):
+def _slopes(surface: ProductSurface, theta: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Cosines of angles between the surface's normals and directions [n, 3], [n]."""
+    first, second = np.moveaxis(surface.partials(theta, 1)[:, 1:], 1, 0)
+    normals = np.cross(first, second)
+    return np.abs(np.sum(normals * directions, axis=1)) / np.linalg.norm(normals, axis=1)
+
+
+def _uncertainty(
+    spline: PenalizedSurface,
+    exponent: float,
+    noise: float,
+    near: Neighbourhoods,
+    tolerance: float | None,
+) -> float:
+    """Largest standard error of heights; refuses what the points leave open."""
+    sides = [
+        np.linspace(knots.begin, knots.end, _ERROR_SAMPLES)
+        for knots in (spline.first, spline.second)
+    ]
+    theta = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    errors = noise * spline.standard_errors(theta, exponent)
+    worst = int(np.argmax(errors))
+    allowed = max(_NOISES * noise, _ERROR_SPACINGS * near.spacing, tolerance or 0.0)
+    if errors[worst] > allowed:
         raise InputError(
-            f"surface points: number {worst + 1} of those fitted, {points[worst].tolist()} m, is"
-            f" {distances[worst]:.3g} m away from the surface, the others {usual:.3g} m: take it"
-            " out, or give a tolerance"
+            f"surface points: leave the surface open by {errors[worst]:.2g} m (standard error) at"
+            f" theta = [{theta[worst, 0]:.4g}, {theta[worst, 1]:.4g}] m, at the edge or in a hole;"
+            f" {allowed:.2g} m would do: scan the place, or trim the patch with a smaller"
+            " largest_hole"
+        )
+    return float(errors[worst])
+
+
+def _check_upright(surface: ProductSurface, base: Base) -> None:
+    """Refuse a surface that is not regular, or nearly falls over its base."""
+    grid = sample_grid(surface)
+    normals = base.normals(grid.position.reshape(-1, 3))
+    cosines = np.sum(grid.normal.reshape(-1, 3) * normals, axis=1)
+    worst = int(np.argmin(cosines))
+    if cosines[worst] < _UPRIGHT:
+        raise InputError(
+            "surface points: the surface fitted leans over by"
+            f" {math.degrees(math.acos(max(-1.0, cosines[worst]))):.0f} deg on {base.name} near"
+            f" {np.round(grid.position.reshape(-1, 3)[worst], 4).tolist()} m; at most"
+            f" {math.degrees(math.acos(_UPRIGHT)):.0f} are allowed: leave this part out, or give"
+            " another base"
         )
 
 

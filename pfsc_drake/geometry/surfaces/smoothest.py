@@ -1,88 +1,67 @@
-"""The smoothest heights near noisy ones."""
+"""The smoothest surface near noisy points."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
-from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
 
-# Values out of the tolerance pull harder until they are in.
+# Points out of the tolerance pull harder until they are in.
 _PULLS, _LEAST_PULL, _STRONGEST = 60, 1.5, 1e9
 _INSIDE = 0.995
 
 
-class SmoothHeights(NamedTuple):
-    """A spline near values.
+def smoothest_within(
+    spline: PenalizedSurface,
+    exponent: float,
+    tolerance: float,
+    distances: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """The smoothest penalized spline that misses no point by more than a tolerance.
 
-    Attributes:
-        coefficients: [first.count * second.count].
-        noise: Standard deviation of the values that cross-validation takes for noise.
-    """
-
-    coefficients: np.ndarray
-    noise: float
-
-
-def smoothest_heights(
-    theta: np.ndarray,
-    values: np.ndarray,
-    first: UniformKnots,
-    second: UniformKnots,
-    tolerance: float | None,
-    slopes: np.ndarray | None = None,
-) -> SmoothHeights:
-    """The smoothest penalized spline that the noise or a tolerance allows.
-
-    Without a tolerance the penalty is that of `PenalizedSurface.best_predicting`. With one it is
-    the strongest that leaves all residuals within it, but not weaker than that: fitting more
-    closely would follow the noise. Values that are still outside then get larger weights.
+    The penalty is the strongest that leaves all distances within it, but not weaker than the one
+    that suits the noise: fitting more closely would follow that. Points that are still outside
+    then get larger weights.
 
     Args:
-        theta: [n, 2].
-        values: [n].
-        first: Knots of theta_1.
-        second: Knots of theta_2.
-        tolerance: Largest residual allowed, None for the noise alone.
-        slopes: What residuals are multiplied with, [n], positive; by default one.
+        spline: What is fitted; its weights may be changed.
+        exponent: Decimal logarithm of the roughness that suits the noise, see
+            `PenalizedSurface.best_predicting`.
+        tolerance: Largest distance allowed, m.
+        distances: Maps coefficients to the distances of all points, [n], m.
+
+    Returns:
+        Coefficients of the spline.
 
     Raises:
-        InputError: Some residual exceeds the tolerance even so.
+        InputError: Some point is further away even so.
     """
-    scale = np.ones(len(values)) if slopes is None else slopes
-    spline = PenalizedSurface(theta, values, first, second)
-    spline.weigh(scale**2)
-    exponent, noise = spline.best_predicting()
-    coefficients = spline.fit(exponent)
-    if tolerance is None:
-        return SmoothHeights(coefficients, noise)
-
-    def misses(found: np.ndarray) -> np.ndarray:
-        return np.asarray(np.abs(spline.residuals(found)) * scale)
 
     def near(found: np.ndarray) -> bool:
-        return bool(misses(found).max() <= _INSIDE * tolerance)
+        return bool(distances(found).max() <= _INSIDE * tolerance)
 
-    attainable = float(misses(coefficients).max())
+    coefficients = spline.fit(exponent)
+    attainable = float(distances(coefficients).max())
     if near(coefficients):
-        return SmoothHeights(spline.fit(spline.strongest(near, exponent)), noise)
-    weights = scale**2
+        return spline.fit(spline.strongest(near, exponent))
+    weights = spline.weights.copy()
     for _ in range(_PULLS):
-        missed = misses(coefficients)
+        missed = distances(coefficients)
         outside = missed > _INSIDE * tolerance
         if not np.any(outside):
-            return SmoothHeights(coefficients, noise)
+            return coefficients
         pull = np.maximum(_LEAST_PULL, (missed[outside] / tolerance) ** 2)
         weights[outside] = np.minimum(weights[outside] * pull, _STRONGEST)
         spline.weigh(weights)
         coefficients = spline.fit(exponent)
-    worst = int(np.argmax(misses(coefficients)))
+    missed = distances(coefficients)
+    worst = int(np.argmax(missed))
     digits = 1 - math.floor(math.log10(attainable))
     enough = math.ceil(1.05 * attainable * 10.0**digits) / 10.0**digits
     raise InputError(
-        f"tolerance: {tolerance:g} m: the points scatter more about every smooth surface, by"
-        f" {noise:.2g} m on average, and number {worst + 1} of those fitted by"
-        f" {misses(coefficients)[worst]:.3g} m: allow {enough:g} m, or take that point out"
+        f"tolerance: {tolerance:g} m: the points scatter more about every smooth surface, which"
+        f" misses number {worst + 1} of those fitted by {missed[worst]:.3g} m: allow {enough:g} m,"
+        " or take that point out"
     )

@@ -53,7 +53,7 @@ class UniformKnots(NamedTuple):
         return self.begin + self.step * (np.arange(self.count) - (self.degree - 1) / 2.0)
 
     def entries(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """B-splines that are not zero at parameters [n]: which and their values, [n, degree + 1]."""
+        """Which B-splines are not zero at parameters [n], and their values, [n, degree + 1] each."""
         knots = self.knots
         # Knots are multiples of a step: the ends are not exactly on them.
         inside = np.clip(theta, knots[self.degree], knots[-self.degree - 1])
@@ -118,9 +118,7 @@ def interpolated_surface(
         Surface of class C^(degree - 1).
     """
     count_1, count_2, dimension = points.shape
-    along_1 = interpolate_at(
-        parameters[0], points.reshape(count_1, -1), degree, closed=closed[0]
-    )
+    along_1 = interpolate_at(parameters[0], points.reshape(count_1, -1), degree, closed=closed[0])
     values = _second_first(along_1, count_2, dimension)
     along_2 = interpolate_at(parameters[1], values, degree, closed=closed[1])
     return _assemble(along_1, along_2, dimension)
