@@ -1,6 +1,6 @@
 """Tensor-product splines as surfaces."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -11,10 +11,9 @@ from pfsc_drake.geometry.curves.spline import interpolate_at, piecewise
 from pfsc_drake.geometry.surfaces.basis import PowerBasis
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 
-Pair = tuple[float, float]
 
-
-class UniformKnots(NamedTuple):
+@dataclass(frozen=True)
+class UniformKnots:
     """Equally spaced simple knots of a B-spline in one direction.
 
     Attributes:
@@ -53,7 +52,7 @@ class UniformKnots(NamedTuple):
         return self.begin + self.step * (np.arange(self.count) - (self.degree - 1) / 2.0)
 
     def entries(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which B-splines are not zero at parameters [n], and their values, [n, degree + 1] each."""
+        """Numbers and values of the B-splines not zero at parameters [n], [n, degree + 1] each."""
         knots = self.knots
         # Knots are multiples of a step: the ends are not exactly on them.
         inside = np.clip(theta, knots[self.degree], knots[-self.degree - 1])
@@ -139,7 +138,7 @@ def _assemble(
     table = second.coefficients.reshape(
         *second.coefficients.shape[:2], *first.coefficients.shape[:2], dimension
     ).transpose(2, 0, 3, 1, 4)
-    bases = [
+    basis_1, basis_2 = (
         PowerBasis(curve.breakpoints, degree, closed=curve.closed) for curve in (first, second)
-    ]
-    return ProductSurface(*bases, table, smoothness=degree - 1)
+    )
+    return ProductSurface(basis_1, basis_2, table, smoothness=degree - 1)
