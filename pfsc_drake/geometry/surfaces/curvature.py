@@ -1,0 +1,95 @@
+"""Fundamental forms and curvatures of surfaces (section 4.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+
+@dataclass(frozen=True)
+class FundamentalForms:
+    """First and second fundamental form at places of a surface, shapes [...].
+
+    Attributes:
+        normal: e_perp, (4.3) with the square root of E G - F^2, [..., 3].
+        E: (4.5), m^2, as F and G.
+        F: See E.
+        G: See E.
+        L: (4.8), m, as M and N.
+        M: See L.
+        N: See L.
+    """
+
+    normal: np.ndarray
+    E: np.ndarray
+    F: np.ndarray
+    G: np.ndarray
+    L: np.ndarray
+    M: np.ndarray
+    N: np.ndarray
+
+    @property
+    def weingarten(self) -> np.ndarray:
+        """Matrix alpha of (4.6), (4.7), [..., 2, 2]: row i holds the derivative of e_perp."""
+        E, F, G, L, M, N = self.E, self.F, self.G, self.L, self.M, self.N
+        rows = np.array([[M * F - L * G, L * F - M * E], [N * F - M * G, M * F - N * E]])
+        return np.asarray(np.moveaxis(rows, (0, 1), (-2, -1)) / self.determinant[..., None, None])
+
+    @property
+    def determinant(self) -> np.ndarray:
+        """E G - F^2, (4.4), m^4."""
+        return np.asarray(self.E * self.G - self.F**2)
+
+    @property
+    def principal_curvatures(self) -> tuple[np.ndarray, np.ndarray]:
+        """Largest and smallest curvature, 1/m; positive where the surface bends to e_perp."""
+        mean, spread = mean_and_spread(self.E, self.F, self.G, self.L, self.M, self.N)
+        return mean + spread, mean - spread
+
+    @property
+    def gaussian_curvature(self) -> np.ndarray:
+        """Product of the principal curvatures, 1/m^2."""
+        return np.asarray((self.L * self.N - self.M**2) / self.determinant)
+
+
+def fundamental_forms(surface: Surface, theta: ArrayLike) -> FundamentalForms:
+    """Return the fundamental forms of a surface of class C^2.
+
+    Args:
+        surface: The surface.
+        theta: Parameters, [..., 2].
+    """
+    _, first, second, *bends = np.moveaxis(surface.partials(theta, 2), -2, 0)
+    cross = np.cross(first, second)
+    normal = cross / np.linalg.norm(cross, axis=-1, keepdims=True)
+    products = [(first, first), (first, second), (second, second)]
+    products += [(bend, normal) for bend in bends]
+    return FundamentalForms(normal, *(np.sum(a * b, axis=-1) for a, b in products))
+
+
+def mean_and_spread(
+    E: np.ndarray, F: np.ndarray, G: np.ndarray, L: np.ndarray, M: np.ndarray, N: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and half of the difference of the eigenvalues of a form L, M, N relative to E, F, G.
+
+    Written in an orthonormal basis of the tangent plane, so that the difference is exact at
+    umbilics, too.
+
+    Args:
+        E: First form, [...]; F and G likewise.
+        F: See E.
+        G: See E.
+        L: Second form, [...]; M and N likewise.
+        M: See L.
+        N: See L.
+
+    Returns:
+        Both [...]; the second is not negative.
+    """
+    determinant = E * G - F * F
+    along = L / E
+    mixed = (M - F * along) / np.sqrt(determinant)
+    across = (N * E - 2.0 * F * M + F * F * along) / determinant
+    return 0.5 * (along + across), np.hypot(0.5 * (along - across), mixed)
