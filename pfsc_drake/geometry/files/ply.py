@@ -29,7 +29,7 @@ class _Element(NamedTuple):
     """What a header says of a kind of element; a property without a type is a list."""
 
     name: str
-    count: int
+    number: int
     properties: list[tuple[str, str | None]]
 
 
@@ -64,7 +64,7 @@ def read_ply_vertices(file: FilePath) -> np.ndarray:
     table = rows(data[body:], order, before, vertex)
     if table is None:
         raise InputError(
-            f"{file}: does not hold the {vertex.count} vertices that its header says, or one that"
+            f"{file}: does not hold the {vertex.number} vertices that its header says, or one that"
             " is none"
         )
     return table
@@ -96,16 +96,16 @@ def _text_rows(
     data: bytes, order: str, before: list[_Element], vertex: _Element
 ) -> np.ndarray | None:
     """Vertices [n, 3] of a file of text, None if they are not there."""
-    begin = sum(element.count for element in before)
+    begin = sum(element.number for element in before)
     rows = [line.split() for line in data.splitlines() if line.strip()]
-    rows = rows[begin : begin + vertex.count]
+    rows = rows[begin : begin + vertex.number]
     labels = [label for label, _ in vertex.properties]
     places = [labels.index(axis) for axis in "xyz"]
     try:
         table = np.array([[float(row[place]) for place in places] for row in rows])
     except (ValueError, IndexError):
         return None
-    return table if len(table) == vertex.count > 0 else None
+    return table if len(table) == vertex.number > 0 else None
 
 
 def _binary_rows(
@@ -113,11 +113,11 @@ def _binary_rows(
 ) -> np.ndarray | None:
     """Vertices [n, 3] of a binary file, None if they are not there."""
     sizes = [
-        element.count * sum(np.dtype(kind).itemsize for _, kind in element.properties)
+        element.number * sum(np.dtype(kind).itemsize for _, kind in element.properties)
         for element in before
     ]
     record = np.dtype([(label, f"{order}{kind}") for label, kind in vertex.properties])
-    if len(data) < sum(sizes) + vertex.count * record.itemsize or not vertex.count:
+    if len(data) < sum(sizes) + vertex.number * record.itemsize or not vertex.number:
         return None
-    table = np.frombuffer(data, record, vertex.count, sum(sizes))
+    table = np.frombuffer(data, record, vertex.number, sum(sizes))
     return np.stack([table[axis].astype(float) for axis in "xyz"], axis=1)

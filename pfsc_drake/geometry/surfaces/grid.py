@@ -38,7 +38,7 @@ def surface_through_grid(
             neighbours that coincide, or a surface that is not regular.
     """
     grid = grid_for(points, smoothness, closed)
-    parameters = (grid_parameters(grid, 0), grid_parameters(grid, 1))
+    parameters = grid_parameters(grid, closed)
     surface = interpolated_surface(parameters, grid, smoothness + 1, closed)
     check_regular(surface)
     return surface
@@ -92,19 +92,26 @@ def _checked(points: ArrayLike) -> np.ndarray:
     return grid
 
 
-def grid_parameters(grid: np.ndarray, axis: int) -> np.ndarray:
-    """Parameters of a grid's rows (axis 0) or columns (1), from 0, by their mean distances.
+def grid_parameters(grid: np.ndarray, closed: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters of a grid's rows and columns, from 0, by their mean distances.
 
     Args:
-        grid: [n_1, n_2, 3], m.
-        axis: Along which the parameter grows.
+        grid: [n_1, n_2, 3], m, as `grid_for` returns it.
+        closed: Which directions are periodic.
 
     Returns:
-        [n_axis], m, strictly increasing.
+        theta_1 [n_1] and theta_2 [n_2], m, strictly increasing.
 
     Raises:
         InputError: Neighbours coincide, or all lie within 0.1 mm.
     """
+    # What is there twice, at both ends of a closed direction, counts once.
+    once = grid[: len(grid) - closed[0]], grid[:, : grid.shape[1] - closed[1]]
+    return _lengths(once[1], 0), _lengths(once[0], 1)
+
+
+def _lengths(grid: np.ndarray, axis: int) -> np.ndarray:
+    """Accumulated mean distances along an axis, [n_axis], m."""
     chords = np.linalg.norm(np.diff(grid, axis=axis), axis=2)
     total = float(chords.mean(axis=1 - axis).sum())
     if not total >= SHORTEST:

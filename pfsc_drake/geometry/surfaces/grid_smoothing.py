@@ -42,7 +42,7 @@ def smooth_surface_near_grid(
         InputError: As `surface_through_grid`; or some point exceeds the tolerance.
     """
     grid = grid_for(points, smoothness, closed)
-    parameters = [grid_parameters(grid, axis) for axis in (0, 1)]
+    parameters = grid_parameters(grid, closed)
     if grid.shape[0] * grid.shape[1] > MOST_POINTS:
         raise InputError(
             f"grid of points: {grid.shape[0]} x {grid.shape[1]}; at most {MOST_POINTS} points can"

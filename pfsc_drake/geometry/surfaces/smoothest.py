@@ -11,6 +11,8 @@ from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
 # Points out of the tolerance pull harder until they are in.
 _PULLS, _LEAST_PULL, _STRONGEST = 60, 1.5, 1e9
 _INSIDE = 0.995
+# Part of all points that may be pulled: more are not stray, but the noise.
+_FEW = 0.05
 
 
 def smoothest_within(
@@ -23,7 +25,7 @@ def smoothest_within(
 
     The penalty is the strongest that leaves all distances within it, but not weaker than the one
     that suits the noise: fitting more closely would follow that. Points that are still outside
-    then get larger weights.
+    then get larger weights, if they are few.
 
     Args:
         spline: What is fitted; its weights may be changed.
@@ -36,7 +38,7 @@ def smoothest_within(
         Coefficients of the spline.
 
     Raises:
-        InputError: Some point is further away even so.
+        InputError: Some point is further away even so, or one in twenty before weights.
     """
 
     def near(found: np.ndarray) -> bool:
@@ -47,7 +49,8 @@ def smoothest_within(
     if near(coefficients):
         return spline.fit(spline.strongest(near, exponent))
     weights = spline.weights.copy()
-    for _ in range(_PULLS):
+    few = np.mean(distances(coefficients) > tolerance) <= _FEW
+    for _ in range(_PULLS if few else 0):
         missed = distances(coefficients)
         outside = missed > _INSIDE * tolerance
         if not np.any(outside):
