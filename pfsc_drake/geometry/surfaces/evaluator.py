@@ -15,7 +15,6 @@ from pfsc_drake.geometry.surfaces.projection import (
     SurfaceProjector,
     largest_eigenvalue,
 )
-from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface
 
@@ -69,7 +68,7 @@ class SurfaceEvaluator:
                 f" for a law of order {order}"
             )
         self.surface = surface
-        self._global = GlobalProjector(surface, sample_grid(surface))
+        self._global = GlobalProjector(surface)
         self._project = SurfaceProjector(surface).project
         self._sample = surface.flat_sampler(order + 1)
         self._length = TangentialLength(surface)
@@ -149,9 +148,9 @@ class SurfaceEvaluator:
                 e1 += more_1
                 e2 += more_2
                 inside = begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2
-                if not (inside and abs(e1 + e2) < math.inf):
-                    break
                 alpha = largest_eigenvalue(E, F, G, L, M, N)
+                if not (inside and abs(e1 + e2 + alpha) < math.inf):
+                    break
                 out = self._blank.copy()
                 out[:6] = (t1, t2, e1, e2, alpha, 0.0)
                 out[6 : self._rest] = rows
@@ -194,7 +193,7 @@ class SurfaceEvaluator:
     ) -> np.ndarray:
         """The same as a call, by the projector or a search of the whole surface."""
         foot = self._project(point, theta_guess)
-        if not math.isfinite(foot.distance + eta_last[0] + eta_last[1]):
+        if not math.isfinite(foot.distance + foot.alpha + eta_last[0] + eta_last[1]):
             out = np.full(self.layout.size, math.nan)
             out[self.layout.status] = _NOT_CONVERGED
             return out

@@ -8,7 +8,7 @@ from scipy.ndimage import minimum_filter
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
-from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
+from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _MAX_STARTS = 8
@@ -23,14 +23,13 @@ class GlobalProjector:
 
     Args:
         surface: Surface of class C^2.
-        grid: Its samples; made by default.
 
     Raises:
         InputError: The surface is not regular.
     """
 
-    def __init__(self, surface: Surface, grid: SampleGrid | None = None) -> None:
-        self._grid = grid or sample_grid(surface)
+    def __init__(self, surface: Surface) -> None:
+        self._grid = sample_grid(surface)
         self._project = SurfaceProjector(surface).project
         self._surface = surface
 

@@ -16,6 +16,7 @@ from pfsc_drake.geometry import (
     extruded_surface,
     paraboloid,
     plane,
+    rotation_from_axes,
     sphere,
     torus,
     zyx_to_matrix,
@@ -52,6 +53,14 @@ def test_on_a_cylinder(u, v, xi):
     assert foot.theta[1] == pytest.approx(0.1 * v, abs=1e-13)
     assert foot.distance == pytest.approx(0.09 * abs(xi), abs=1e-14)
     assert foot.alpha == pytest.approx(max(-xi, 0.0), abs=1e-12)
+
+
+def test_start_of_the_experiment_on_a_cylinder():
+    """Section 4.8.1: the initial parameters, as printed."""
+    rotation = rotation_from_axes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    turned = Turned((0.0, 0.0, 0.505), rotation, inward=True)
+    foot = GlobalProjector(cylinder(0.09, (-0.1, 0.2), turned)).project([0.0899, -0.0628, 0.5092])
+    assert foot.theta == pytest.approx((0.0467, -0.0628), abs=5e-5)
 
 
 @pytest.mark.parametrize(("u", "v", "xi"), _random(12))
