@@ -25,7 +25,7 @@ FEWEST_POINTS, MOST_POINTS = 50, 100_000
 # How far a place may be from the nearest point, over the distance at which points stand.
 _REACH = 2.0
 # Spacings per knot interval, and the most coefficients.
-_SPACINGS, _MOST_COEFFICIENTS = 1.5, 2500.0
+_SPACINGS, _MOST_COEFFICIENTS = 2.0, 2500.0
 _FEWEST_INTERVALS = 8
 # Least part of the rectangle around all points that is left of it.
 _LEAST_PART = 0.25
