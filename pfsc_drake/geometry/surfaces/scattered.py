@@ -159,7 +159,8 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
         raise InputError(f"surface points: shape {cloud.shape}; [points, 3] is required")
     if not FEWEST_POINTS <= len(cloud) <= MOST_POINTS:
         raise InputError(
-            f"surface points: {len(cloud)}; from {FEWEST_POINTS} to {MOST_POINTS} are required"
+            f"surface points: {len(cloud)}; from {FEWEST_POINTS} to {MOST_POINTS} are required,"
+            " evenly thinned out where there are more"
         )
     bad = np.argwhere(~(np.abs(cloud) <= FARTHEST))
     if bad.size:
