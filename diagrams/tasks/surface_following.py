@@ -16,7 +16,7 @@ from pfsc_drake.control.law.reference import straight_lines, together
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
-from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
