@@ -1,4 +1,4 @@
-"""Paths in space: curves, orientations, arc length, frames and projections.
+"""Paths and surfaces in space: curves, orientations, lengths, frames, curvatures, projections.
 
 Knows neither robots nor Drake. Numbers in parentheses are equations of the dissertation.
 """
@@ -34,11 +34,38 @@ from pfsc_drake.geometry.rotation import (
     zyz_to_matrix,
     zyz_to_quaternion,
 )
+from pfsc_drake.geometry.surfaces.curvature import FundamentalForms, fundamental_forms
+from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.generated import (
+    extruded_surface,
+    surface_of_revolution,
+    translated_surface,
+)
+from pfsc_drake.geometry.surfaces.partials import partial_count, partial_index, partial_orders
+from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
+from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
+from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.shapes import (
+    Turned,
+    cone,
+    cylinder,
+    paraboloid,
+    plane,
+    sphere,
+    torus,
+)
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
+from pfsc_drake.geometry.surfaces.start import GlobalProjector
+from pfsc_drake.geometry.surfaces.surface import Surface
 
 __all__ = [
     "ArcLength",
     "Curve",
     "FourierCurve",
+    "FundamentalForms",
+    "GlobalProjector",
     "OrientationCurve",
     "ParallelTransportFrame",
     "Path",
@@ -46,28 +73,52 @@ __all__ = [
     "PathPointLayout",
     "PathWaypoints",
     "PiecewisePolynomialCurve",
+    "ProductSurface",
     "Projection",
     "ProjectionStatus",
     "Projector",
     "ShapeReport",
+    "Surface",
+    "SurfaceEvaluator",
+    "SurfacePointLayout",
+    "SurfaceProjection",
+    "SurfaceProjector",
+    "SurfaceReport",
     "Tolerance",
+    "Turned",
     "WaypointTable",
     "angle_between",
     "check_rotation_matrix",
+    "check_single_sheet",
+    "cone",
+    "cylinder",
+    "extruded_surface",
+    "fundamental_forms",
     "interpolate",
     "interpolate_orientation",
     "matrix_to_quaternion",
     "matrix_to_zyx",
     "matrix_to_zyz",
     "noise_level",
+    "paraboloid",
+    "partial_count",
+    "partial_index",
+    "partial_orders",
     "path_from_waypoints",
+    "plane",
     "project_globally",
     "quaternion_to_matrix",
     "quaternion_to_zyx",
     "quaternion_to_zyz",
     "read_waypoints",
+    "rotation_from_axes",
     "rotation_to_axis",
     "shape_report",
+    "sphere",
+    "surface_of_revolution",
+    "surface_report",
+    "torus",
+    "translated_surface",
     "zyx_to_matrix",
     "zyx_to_quaternion",
     "zyz_to_matrix",

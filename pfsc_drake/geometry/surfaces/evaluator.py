@@ -8,10 +8,13 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
-from pfsc_drake.geometry.surfaces.length import TangentialLength, length_rates
+from pfsc_drake.geometry.surfaces.length import TangentialLength, panel
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
-from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
-from pfsc_drake.geometry.surfaces.regularity import sample_grid
+from pfsc_drake.geometry.surfaces.projection import (
+    SurfaceProjection,
+    SurfaceProjector,
+    largest_eigenvalue,
+)
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface
 
@@ -20,10 +23,14 @@ _NOT_CONVERGED = float(ProjectionStatus.NOT_CONVERGED)
 
 # All relative to the lengths of the domain: the longest step from one tick to the next, ...
 _NEAR = 1.0 / 32.0
+# ... one whose square counts, ...
+_SETTLED = 1e-6
 # ... a step that is not worth another evaluation, ...
 _TOLERANCE = 1e-12
 # ... and a way after which it is asked whether another place has become nearer.
 _FAR = 1.0 / 8.0
+# Relative difference of distances that is none.
+_NOT_NEARER = 1e-9
 _MAX_STEPS = 8
 # Squared ratio of successive steps that is quick.
 _QUICK = 1.0 / 16.0
@@ -61,7 +68,7 @@ class SurfaceEvaluator:
                 f" for a law of order {order}"
             )
         self.surface = surface
-        self._global = GlobalProjector(surface, sample_grid(surface))
+        self._global = GlobalProjector(surface)
         self._project = SurfaceProjector(surface).project
         self._sample = surface.flat_sampler(order + 1)
         self._length = TangentialLength(surface)
@@ -110,35 +117,39 @@ class SurfaceEvaluator:
             E = ux * ux + uy * uy + uz * uz
             F = ux * vx + uy * vy + uz * vz
             G = vx * vx + vy * vy + vz * vz
-            l = px * ax + py * ay + pz * az
-            m = px * bx + py * by + pz * bz
-            n = px * cx + py * cy + pz * cz
+            L = px * ax + py * ay + pz * az
+            M = px * bx + py * by + pz * bz
+            N = px * cx + py * cy + pz * cz
             f1 = px * ux + py * uy + pz * uz
             f2 = px * vx + py * vy + pz * vz
-            h11, h12, h22 = E - l, F - m, G - n
+            h11, h12, h22 = E - L, F - M, G - N
             det = h11 * h22 - h12 * h12
             if not (det > 0.0 and h11 > 0.0):
                 break
             s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
             r1, r2 = s1 / len_1, s2 / len_2
             size = r1 * r1 + r2 * r2
+            if size > _SETTLED * _SETTLED:
+                # How the residual bends on the way, without the part that d . sigma_ijk has in it.
+                wx, wy, wz = ux * s1 + vx * s2, uy * s1 + vy * s2, uz * s1 + vz * s2
+                ax, ay, az = ax * s1 + bx * s2, ay * s1 + by * s2, az * s1 + bz * s2
+                bx, by, bz = bx * s1 + cx * s2, by * s1 + cy * s2, bz * s1 + cz * s2
+                qx = 0.5 * (ax * s1 + bx * s2)
+                qy = 0.5 * (ay * s1 + by * s2)
+                qz = 0.5 * (az * s1 + bz * s2)
+                f1 -= wx * ax + wy * ay + wz * az + qx * ux + qy * uy + qz * uz
+                f2 -= wx * bx + wy * by + wz * bz + qx * vx + qy * vy + qz * vz
+                s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
             t1 += s1
             t2 += s2
             if size < _TOLERANCE * _TOLERANCE:
-                determinant = E * G - F * F
-                along = l / E
-                mixed = m - F * along
-                across = (n * E - 2.0 * F * m + F * F * along) / determinant
-                half = 0.5 * (along - across)
-                root = math.sqrt(half * half + mixed * mixed / determinant)
-                alpha = 0.5 * (along + across) + root
                 e1, e2 = eta_last
-                d1, d2 = t1 - g1, t2 - g2
-                a1, a2, a1_rate, a2_rate = length_rates(start, d1, d2)
-                b1, b2, b1_rate, b2_rate = length_rates(terms, d1, d2)
-                e1 += 0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0
-                e2 += 0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0
-                if not (begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2):
+                more_1, more_2 = panel(start, terms, t1 - g1, t2 - g2)
+                e1 += more_1
+                e2 += more_2
+                inside = begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2
+                alpha = largest_eigenvalue(E, F, G, L, M, N)
+                if not (inside and abs(e1 + e2 + alpha) < math.inf):
                     break
                 out = self._blank.copy()
                 out[:6] = (t1, t2, e1, e2, alpha, 0.0)
@@ -182,7 +193,7 @@ class SurfaceEvaluator:
     ) -> np.ndarray:
         """The same as a call, by the projector or a search of the whole surface."""
         foot = self._project(point, theta_guess)
-        if not math.isfinite(foot.distance + eta_last[0] + eta_last[1]):
+        if not math.isfinite(foot.distance + foot.alpha + eta_last[0] + eta_last[1]):
             out = np.full(self.layout.size, math.nan)
             out[self.layout.status] = _NOT_CONVERGED
             return out
@@ -191,7 +202,8 @@ class SurfaceEvaluator:
         )
         if way > _FAR or not foot.converged:
             best = self._global.feet(point)[0]
-            if best.distance < foot.distance * (1.0 - 1e-9) or not foot.converged:
+            nearer = best.distance < foot.distance * (1.0 - _NOT_NEARER)
+            if best.converged and (nearer or not foot.converged):
                 foot = best._replace(theta=self._nearest_lap(best.theta, theta_guess))
         status = _BEYOND_END if foot.at_border else 0.0
         eta = self._length.advance(eta_last, theta_guess, foot.theta)

@@ -28,7 +28,8 @@ def surface_of_revolution(
     """Surface that a profile leaves when it is turned about an axis.
 
     sigma = o + rho(theta_2) (e_x cos(theta_1) + e_y sin(theta_1)) + h(theta_2) e_z, with the
-    columns e of the rotation. Where h grows with theta_2 the normal (4.3) points away from the axis.
+    columns e of the rotation. Where h grows with theta_2 the normal (4.3) points away from the
+    axis.
 
     Args:
         profile: (rho, h), a curve in the plane, m.

@@ -8,6 +8,7 @@ from pfsc_drake.geometry.surfaces.surface import Surface
 # Longest panel of the integral, relative to the lengths of the domain.
 _PANEL = 1.0 / 64.0
 
+Pair = tuple[float, float]
 Rates = tuple[float, float, float, float]
 
 
@@ -25,9 +26,7 @@ class TangentialLength:
         self._sample = surface.flat_sampler(2)
         self._domain, self._closed = surface.domain, surface.closed
 
-    def advance(
-        self, eta: Sequence[float], begin: Sequence[float], end: Sequence[float]
-    ) -> tuple[float, float]:
+    def advance(self, eta: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> Pair:
         """Tangential coordinates at the end of a straight line.
 
         Args:
@@ -47,29 +46,33 @@ class TangentialLength:
         panels = max(1, math.ceil(share / _PANEL))
         d1, d2 = way[0] / panels, way[1] / panels
         e1, e2 = eta
-        a1, a2, a1_rate, a2_rate = self._rates(start[0], start[1], d1, d2)
+        here = self._sample(start[0], start[1]).tolist()
         for k in range(1, panels + 1):
-            b1, b2, b1_rate, b2_rate = self._rates(start[0] + k * d1, start[1] + k * d2, d1, d2)
-            e1 += 0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0
-            e2 += 0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0
-            a1, a2, a1_rate, a2_rate = b1, b2, b1_rate, b2_rate
+            there = self._sample(start[0] + k * d1, start[1] + k * d2).tolist()
+            more_1, more_2 = panel(here, there, d1, d2)
+            e1, e2, here = e1 + more_1, e2 + more_2, there
         return e1, e2
 
-    def _rates(self, theta_1: float, theta_2: float, d1: float, d2: float) -> Rates:
-        return length_rates(self._sample(theta_1, theta_2).tolist(), d1, d2)
 
-
-def length_rates(terms: Sequence[float], d1: float, d2: float) -> Rates:
-    """Return Sigma d (4.15) and its derivative along d.
+def panel(begin: Sequence[float], end: Sequence[float], d1: float, d2: float) -> Pair:
+    """Return the integral of Sigma d theta (4.15) over one straight step, m.
 
     Args:
-        terms: Partial derivatives up to order 2, flat, [18].
+        begin: Partial derivatives up to order 2 where it begins, flat, [18].
+        end: The same where it ends.
         d1: Step of theta_1.
         d2: Step of theta_2.
-
-    Returns:
-        Both components of Sigma d, m, and of the derivative by the share of the step, m.
     """
+    a1, a2, a1_rate, a2_rate = _rates(begin, d1, d2)
+    b1, b2, b1_rate, b2_rate = _rates(end, d1, d2)
+    return (
+        0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0,
+        0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0,
+    )
+
+
+def _rates(terms: Sequence[float], d1: float, d2: float) -> Rates:
+    """Both components of Sigma d (4.15), m, and of its derivative by the share of the step, m."""
     _, _, _, ux, uy, uz, vx, vy, vz, ax, ay, az, bx, by, bz, cx, cy, cz = terms
     # Derivatives of the tangents along d.
     px, py, pz = ax * d1 + bx * d2, ay * d1 + by * d2, az * d1 + bz * d2

@@ -10,6 +10,8 @@ from pfsc_drake.geometry.surfaces.surface import Sampler, Surface, check_partial
 
 # Samples that are evaluated at once.
 _CHUNK = 20_000
+# Up to so many products of functions it is faster to multiply all of them first.
+_FEW_PRODUCTS = 24
 
 
 class ProductSurface(Surface):
@@ -79,16 +81,19 @@ class ProductSurface(Surface):
         first, second = (basis.sampler() for basis in self._bases)
         rows = partial_orders(check_partial_order(order))
         powers = [basis.derivations(order) for basis in self._bases]
-        left = np.array([powers[0][i] for i, _ in rows])
-        right = np.array([powers[1][j] for _, j in rows])
+        left = np.array([powers[0][i].T for i, _ in rows])[:, None]
+        right = np.array([powers[1][j] for _, j in rows])[:, None]
         matrices: dict[tuple[int, int], np.ndarray] = {}
+        size_1, size_2 = self.coefficients.shape[2:4]
+        few = size_1 * size_2 <= _FEW_PRODUCTS
+        shape = (3 * len(rows), -1) if few else (3 * len(rows) * size_1, size_2)
 
         def make(cell: tuple[int, int]) -> np.ndarray:
-            table = np.einsum("rkp,klx,rlq->rxpq", left, self.coefficients[cell], right)
-            matrices[cell] = table.reshape(3 * len(rows), -1)
+            table = left @ self.coefficients[cell].transpose(2, 0, 1) @ right
+            matrices[cell] = table.reshape(shape)
             return matrices[cell]
 
-        def sample(theta_1: float, theta_2: float) -> np.ndarray:
+        def sample_at_once(theta_1: float, theta_2: float) -> np.ndarray:
             p, a = first(theta_1)
             q, b = second(theta_2)
             matrix = matrices.get((p, q))
@@ -96,4 +101,12 @@ class ProductSurface(Surface):
                 matrix = make((p, q))
             return matrix.dot([x * y for x in a for y in b])
 
-        return sample
+        def sample_one_by_one(theta_1: float, theta_2: float) -> np.ndarray:
+            p, a = first(theta_1)
+            q, b = second(theta_2)
+            matrix = matrices.get((p, q))
+            if matrix is None:
+                matrix = make((p, q))
+            return matrix.dot(b).reshape(-1, size_1).dot(a)
+
+        return sample_at_once if few else sample_one_by_one

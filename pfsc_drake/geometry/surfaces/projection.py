@@ -12,9 +12,12 @@ _TOLERANCE = 1e-12
 _STALLED = 1e-8
 _COARSE = 1e-7
 _MAX_STEP = 1.0 / 16.0
+# What lies less far beyond a border is on it.
+_BEYOND = 1e-9
 # Smallest eigenvalue of H relative to the first form that Newton's step is taken with.
 _DEFINITE = 1e-6
 
+Pair = tuple[float, float]
 Terms = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -32,7 +35,7 @@ class SurfaceProjection(NamedTuple):
         converged: False if no strict minimum was found, also for input that is not finite.
     """
 
-    theta: tuple[float, float]
+    theta: Pair
     distance: float
     alpha: float
     at_border: bool
@@ -44,8 +47,8 @@ class SurfaceProjector:
     """Local minimum of f(theta) = |y - sigma(theta)|^2 / 2 near a guess, by Newton's method (4.48).
 
     The step is limited, halved while f grows, and taken with a definite matrix where H (4.12) is
-    not. At an end of an open direction that f falls beyond, that parameter is kept and the other one
-    alone goes on. Started from the last result it follows its sheet of the surface through
+    not. At an end of an open direction that f falls beyond, that parameter is kept and the other
+    goes on alone. Started from the last result it follows its sheet of the surface through
     self-intersections.
 
     Args:
@@ -57,9 +60,7 @@ class SurfaceProjector:
         self._domain, self._closed = surface.domain, surface.closed
         self._lengths = (surface.domain[0].length, surface.domain[1].length)
 
-    def project(
-        self, point: Sequence[float], theta_guess: tuple[float, float]
-    ) -> SurfaceProjection:
+    def project(self, point: Sequence[float], theta_guess: Pair) -> SurfaceProjection:
         """Closest point near the guess.
 
         Args:
@@ -71,6 +72,7 @@ class SurfaceProjector:
             guess is not finite.
         """
         t1, t2 = theta_guess
+        point = [float(value) for value in point]
         if not (math.isfinite(t1) and math.isfinite(t2) and all(map(math.isfinite, point))):
             return SurfaceProjection((t1, t2), math.nan, math.nan, False, 0, False)
         len_1, len_2 = self._lengths
@@ -78,20 +80,21 @@ class SurfaceProjector:
         p1 = p2 = 0.0
         least, alpha, at_border = math.inf, math.nan, False
         for iteration in range(1, _MAX_ITERATIONS + 1):
-            cost, g1, g2, E, F, G, l, m, n = self._terms(theta, point)
+            cost, g1, g2, E, F, G, L, M, N = self._terms(theta, point)
             size = max(abs(p1) / len_1, abs(p2) / len_2)
             if cost > least and size > _COARSE:
                 p1, p2 = 0.5 * p1, 0.5 * p2
                 theta = (origin[0] + p1, origin[1] + p2)
                 continue
-            alpha = _largest_eigenvalue(E, F, G, l, m, n)
+            alpha = largest_eigenvalue(E, F, G, L, M, N)
             held_1, held_2 = self._held(0, theta[0], g1), self._held(1, theta[1], g2)
-            at_border = held_1 or held_2
-            p1, p2, strict = _step(g1, g2, E, F, G, (l, m, n), alpha, (held_1, held_2))
+            beyond = max(held_1 * abs(g1) / (E * len_1), held_2 * abs(g2) / (G * len_2))
+            at_border = beyond > _BEYOND
+            p1, p2, strict = _step(g1, g2, E, F, G, (L, M, N), alpha, (held_1, held_2))
             scale = min(1.0, _MAX_STEP / max(abs(p1) / len_1, abs(p2) / len_2, 1e-300))
-            target = self._inside(theta, scale * p1, scale * p2)
+            target, met = self._inside(theta, scale * p1, scale * p2)
             p1, p2 = target[0] - theta[0], target[1] - theta[1]
-            if abs(p1) < _TOLERANCE * len_1 and abs(p2) < _TOLERANCE * len_2:
+            if not met and abs(p1) < _TOLERANCE * len_1 and abs(p2) < _TOLERANCE * len_2:
                 distance = math.sqrt(2.0 * cost)
                 return SurfaceProjection(target, distance, alpha, at_border, iteration, strict)
             origin, least = theta, cost
@@ -101,7 +104,7 @@ class SurfaceProjector:
         distance = math.sqrt(2.0 * least)
         return SurfaceProjection(theta, distance, alpha, at_border, _MAX_ITERATIONS, stalled)
 
-    def _terms(self, theta: tuple[float, float], point: Sequence[float]) -> Terms:
+    def _terms(self, theta: Pair, point: Sequence[float]) -> Terms:
         """f, both of -f', first form, and second derivatives along y - sigma."""
         row = self._sample(*theta).tolist()
         x, y, z, ux, uy, uz, vx, vy, vz, ax, ay, az, bx, by, bz, cx, cy, cz = row
@@ -118,7 +121,7 @@ class SurfaceProjector:
             x * cx + y * cy + z * cz,
         )
 
-    def _clamped(self, t1: float, t2: float) -> tuple[float, float]:
+    def _clamped(self, t1: float, t2: float) -> Pair:
         first, second = (
             value if closed else min(max(value, begin), end)
             for value, (begin, end), closed in zip(
@@ -134,12 +137,12 @@ class SurfaceProjector:
         begin, end = self._domain[axis]
         return (value <= begin and descent < 0.0) or (value >= end and descent > 0.0)
 
-    def _inside(self, theta: tuple[float, float], p1: float, p2: float) -> tuple[float, float]:
-        """Where a step leads to, or its way through the first border it meets.
+    def _inside(self, theta: Pair, p1: float, p2: float) -> tuple[Pair, bool]:
+        """Where a step leads to, or its way to the first border it meets, and whether it met one.
 
         A step out of a border that theta is on already goes along it.
         """
-        share, step = 1.0, [p1, p2]
+        share, step, met = 1.0, [p1, p2], -1
         for k in (0, 1):
             begin, end = self._domain[k]
             if self._closed[k] or not step[k]:
@@ -147,9 +150,12 @@ class SurfaceProjector:
             room = (end if step[k] > 0.0 else begin) - theta[k]
             if not room:
                 step[k] = 0.0
-            else:
-                share = min(share, room / step[k])
-        return self._clamped(theta[0] + share * step[0], theta[1] + share * step[1])
+            elif room / step[k] < share:
+                share, met = room / step[k], k
+        target = list(self._clamped(theta[0] + share * step[0], theta[1] + share * step[1]))
+        if met >= 0:
+            target[met] = self._domain[met][step[met] > 0.0]
+        return (target[0], target[1]), met >= 0
 
 
 def _step(
@@ -163,25 +169,25 @@ def _step(
     held: tuple[bool, bool],
 ) -> tuple[float, float, bool]:
     """Newton's step of the parameters that are not held, and whether the minimum is strict."""
-    l, m, n = bend
+    L, M, N = bend
     if held[0] and held[1]:
         return 0.0, 0.0, True
     if held[0]:
-        return 0.0, g2 / (abs(G - n) or G), G > n
+        return 0.0, g2 / (abs(G - N) or G), G > N
     if held[1]:
-        return g1 / (abs(E - l) or E), 0.0, E > l
+        return g1 / (abs(E - L) or E), 0.0, E > L
     # alpha is the largest eigenvalue of the bend relative to the first form.
     shift = 0.0 if alpha < 1.0 - _DEFINITE else 2.0 * (alpha - 1.0) + 2.0 * _DEFINITE
-    h11, h12, h22 = (1.0 + shift) * E - l, (1.0 + shift) * F - m, (1.0 + shift) * G - n
+    h11, h12, h22 = (1.0 + shift) * E - L, (1.0 + shift) * F - M, (1.0 + shift) * G - N
     det = h11 * h22 - h12 * h12
     return (h22 * g1 - h12 * g2) / det, (h11 * g2 - h12 * g1) / det, alpha < 1.0
 
 
-def _largest_eigenvalue(E: float, F: float, G: float, l: float, m: float, n: float) -> float:
-    """Largest eigenvalue of a form relative to the first one, see `curvature.mean_and_spread`."""
+def largest_eigenvalue(E: float, F: float, G: float, L: float, M: float, N: float) -> float:
+    """Return that of a form L, M, N relative to the first one, as `curvature.mean_and_spread`."""
     determinant = E * G - F * F
-    along = l / E
-    mixed = m - F * along
-    across = (n * E - 2.0 * F * m + F * F * along) / determinant
+    along = L / E
+    mixed = M - F * along
+    across = (N * E - 2.0 * F * M + F * F * along) / determinant
     half = 0.5 * (along - across)
     return 0.5 * (along + across) + math.sqrt(half * half + mixed * mixed / determinant)

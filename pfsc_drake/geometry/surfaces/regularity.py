@@ -6,16 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _SAMPLES_PER_CELL = 4
 _FEWEST_SAMPLES, _MOST_SAMPLES = 32, 256
 # rad, which the normal may turn by from one sample to the next before more are taken, ...
 _FINE = 0.25
-# ... and from which on it does not turn but flips.
+# ... and from which on it is looked at whether it flips: on ever shorter ways it then ...
 _FLIP = math.pi / 2.0
+# ... does not turn less than this.
+_STILL_TURNS = math.pi / 4.0
+_MOST_SUSPECTS, _HALVINGS = 64, 25
 # |sigma_1 x sigma_2| over the largest |sigma_1| times the largest |sigma_2|.
 _REGULAR = 1e-6
+# Relative gap between both ends of a closed direction.
+_CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,7 @@ class SampleGrid:
 
 
 def sample_grid(surface: Surface) -> SampleGrid:
-    """Sample a surface so that its normal turns little from one sample to the next.
+    """Sample a surface so that its normal turns little from one sample to the next, and check it.
 
     Args:
         surface: The surface.
@@ -62,8 +68,10 @@ def sample_grid(surface: Surface) -> SampleGrid:
         more than 0.25 rad between two of them, as far as 256.
 
     Raises:
-        InputError: The surface is not regular (4.4), or its normal flips; says where.
+        InputError: The surface is not regular (4.4), its normal flips, it does not close where it
+            should, or its size is not that of a surface for robots; says where.
     """
+    _refuse_open_seams(surface)
     counts = [_FEWEST_SAMPLES, _FEWEST_SAMPLES]
     while True:
         grid = _sampled(surface, counts)
@@ -75,7 +83,8 @@ def sample_grid(surface: Surface) -> SampleGrid:
             for count, turn in zip(counts, turning, strict=True)
         ]
         if finer == counts:
-            _refuse_flips(grid)
+            _refuse_sizes(grid)
+            _refuse_flips(surface, grid)
             return grid
         counts = finer
 
@@ -108,17 +117,77 @@ def _sampled(surface: Surface, counts: list[int]) -> SampleGrid:
     return SampleGrid(theta_1, theta_2, position, cross / area[..., None], surface.closed)
 
 
-def _refuse_flips(grid: SampleGrid) -> None:
+def _refuse_open_seams(surface: Surface) -> None:
+    """Position and tangents must be the same at both ends of a closed direction."""
+    for axis in (0, 1):
+        if not surface.closed[axis]:
+            continue
+        across = surface.grid(_SAMPLES_PER_CELL, _FEWEST_SAMPLES)[1 - axis]
+        ends = []
+        for end in surface.domain[axis]:
+            theta = np.empty((len(across), 2))
+            theta[:, axis], theta[:, 1 - axis] = end, across
+            ends.append(surface.partials(theta, 1))
+        gap = np.abs(ends[1] - ends[0]).max(axis=2) / np.abs(ends[0]).max(axis=(0, 2))
+        if gap.max() > _CLOSED:
+            where = across[int(np.argmax(gap.max(axis=1)))]
+            raise InputError(
+                f"surface: does not close smoothly in theta_{axis + 1} at"
+                f" theta_{2 - axis} = {where:.6g}; both ends must have one position and one"
+                " tangent plane, or the direction must be open"
+            )
+
+
+def _refuse_sizes(grid: SampleGrid) -> None:
+    lengths = [float(grid.spacing(axis).sum(axis=axis).max()) for axis in (0, 1)]
+    farthest = float(np.abs(grid.position).max())
+    if min(lengths) < SHORTEST or farthest > FARTHEST:
+        raise InputError(
+            f"surface: {lengths[0]:.3g} m by {lengths[1]:.3g} m, as far as {farthest:.3g} m from"
+            f" the origin; at least {SHORTEST:g} m each way, and at most {FARTHEST:g} m away, is"
+            " required"
+        )
+
+
+def _refuse_flips(surface: Surface, grid: SampleGrid) -> None:
+    """Halve the ways on which the normal turns most, until it is clear that it flips there."""
     for axis in (0, 1):
         turning = grid.turning(axis)
-        where = np.unravel_index(int(np.argmax(turning)), turning.shape)
-        if turning[where] > _FLIP:
+        suspects = np.argwhere(turning > _FLIP)[:_MOST_SUSPECTS]
+        if not len(suspects):
+            continue
+        begin = grid.theta[tuple(suspects.T)]
+        values = (grid.theta_1, grid.theta_2)[axis]
+        ends = np.append(values, surface.domain[axis].end)
+        width = np.diff(ends)[suspects[:, axis]]
+        for _ in range(_HALVINGS):
+            width = 0.5 * width
+            normals = _normals(surface, begin[:, None] + _steps(axis, width))
+            first, second = np.linalg.norm(np.diff(normals, axis=1), axis=-1).T
+            begin[:, axis] += np.where(second > first, width, 0.0)
+        chord = np.maximum(first, second)
+        worst = int(np.argmax(chord))
+        if chord[worst] > 2.0 * math.sin(0.5 * _STILL_TURNS):
+            position = surface.partials(begin[worst], 0)[0]
             raise InputError(
-                f"surface: its normal flips by {math.degrees(turning[where]):.0f} deg at"
-                f" theta = {_numbers(grid.theta[where])}, the point"
-                f" {_numbers(grid.position[where])} m; it must turn smoothly, without edges and"
-                " folds"
+                f"surface: its normal flips at theta = {_numbers(begin[worst])}, the point"
+                f" {_numbers(position)} m; it must turn smoothly, without edges and folds"
             )
+
+
+def _steps(axis: int, width: np.ndarray) -> np.ndarray:
+    """No, one and two steps along a direction, [n, 3, 2]."""
+    steps = np.zeros((len(width), 3, 2))
+    steps[..., axis] = width[:, None] * np.arange(3)
+    return steps
+
+
+def _normals(surface: Surface, theta: np.ndarray) -> np.ndarray:
+    _, first, second = np.moveaxis(surface.partials(theta, 1), -2, 0)
+    cross = np.cross(first, second)
+    # Where the surface is not regular by chance a normal is missing, which is no flip.
+    length = np.linalg.norm(cross, axis=-1, keepdims=True)
+    return np.asarray(cross / np.where(length > 0.0, length, 1.0))
 
 
 def _differences(values: np.ndarray, axis: int, closed: tuple[bool, bool]) -> np.ndarray:

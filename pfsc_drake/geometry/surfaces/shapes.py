@@ -1,6 +1,7 @@
 """Planes, cylinders, cones, spheres, tori and paraboloids."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ class Turned(NamedTuple):
 
 
 def plane(
-    size: Pair | tuple[Pair, Pair],
+    size: Sequence[float | Pair],
     origin: ArrayLike = (0.0, 0.0, 0.0),
     rotation: ArrayLike | None = None,
 ) -> ProductSurface:
@@ -52,7 +53,7 @@ def plane(
 
 
 def paraboloid(
-    size: Pair | tuple[Pair, Pair],
+    size: Sequence[float | Pair],
     coefficient: float,
     origin: ArrayLike = (0.0, 0.0, 0.0),
     rotation: ArrayLike | None = None,
@@ -173,16 +174,16 @@ def _turned_line(start: Pair, slope: Pair, ends: Pair, turned: Turned | None) ->
 
 
 def _graph(
-    size: Pair | tuple[Pair, Pair],
+    size: Sequence[float | Pair],
     coefficient: float,
     origin: ArrayLike,
     rotation: ArrayLike | None,
 ) -> ProductSurface:
-    """o + theta_1 e_x + theta_2 e_y + c (theta_1^2 + theta_2^2) e_z."""
+    """Return o + theta_1 e_x + theta_2 e_y + c (theta_1^2 + theta_2^2) e_z."""
     o, R = checked_placement(origin, rotation)
     curves = []
     for axis, values in enumerate(size):
-        ends = (0.0, values) if isinstance(values, float | int) else values
+        ends = values if isinstance(values, Sequence) else (0.0, values)
         begin, end = _checked_ends(f"theta_{axis + 1}", ends)
         height = coefficient * R[:, 2]
         start = begin * R[:, axis] + begin**2 * height + (o if axis == 0 else 0.0)
@@ -192,7 +193,7 @@ def _graph(
     return translated_surface(*curves)
 
 
-def _checked_ends(name: str, ends: Pair) -> Pair:
+def _checked_ends(name: str, ends: Sequence[float]) -> Pair:
     begin, end = ends
     if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
         raise InputError(

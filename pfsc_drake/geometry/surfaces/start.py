@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import minimum_filter
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
-from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
+from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _MAX_STARTS = 8
@@ -22,14 +23,13 @@ class GlobalProjector:
 
     Args:
         surface: Surface of class C^2.
-        grid: Its samples; made by default.
 
     Raises:
         InputError: The surface is not regular.
     """
 
-    def __init__(self, surface: Surface, grid: SampleGrid | None = None) -> None:
-        self._grid = grid or sample_grid(surface)
+    def __init__(self, surface: Surface) -> None:
+        self._grid = sample_grid(surface)
         self._project = SurfaceProjector(surface).project
         self._surface = surface
 
@@ -44,9 +44,11 @@ class GlobalProjector:
         """
         y = np.asarray(point, dtype=float)
         cost = np.sum((y - self._grid.position) ** 2, axis=-1)
-        valleys = np.argwhere(cost <= _least_neighbour(cost, self._grid.closed))
+        modes = ["wrap" if closed else "nearest" for closed in self._grid.closed]
+        valleys = np.argwhere(cost <= minimum_filter(cost, size=3, mode=modes))
         order = np.argsort(cost[tuple(valleys.T)], kind="stable")[:_MAX_STARTS]
-        values, found = y.tolist(), []
+        values = y.tolist()
+        found: list[SurfaceProjection] = []
         for start in valleys[order]:
             theta_1, theta_2 = self._grid.theta_1[start[0]], self._grid.theta_2[start[1]]
             result = self._project(values, (float(theta_1), float(theta_2)))
@@ -74,7 +76,7 @@ class GlobalProjector:
             raise InputError(f"point: {y.tolist()}; 3 finite numbers, in m, are required")
         where = f"point [{', '.join(f'{value:.6g}' for value in y)}] m"
         best, *others = self.feet(y)
-        if not (best.converged and best.alpha < 1.0 or best.at_border):
+        if not (best.converged and (best.alpha < 1.0 or best.at_border)):
             raise InputError(
                 f"{where}: no closest point on the surface, it is {best.distance:.6g} m away, which"
                 " is as far as its centre of curvature; a point nearer to the surface is required"
@@ -94,16 +96,6 @@ class GlobalProjector:
             if min(apart, 1.0 - apart if self._surface.closed[k] else math.inf) > _SAME:
                 return False
         return True
-
-
-def _least_neighbour(cost: np.ndarray, closed: tuple[bool, bool]) -> np.ndarray:
-    """Smallest value of the samples next to each one, and its own."""
-    modes = ["wrap" if each else "edge" for each in closed]
-    padded = np.pad(cost, ((1, 1), (0, 0)), mode=modes[0])
-    padded = np.pad(padded, ((0, 0), (1, 1)), mode=modes[1])
-    n, m = cost.shape
-    shifts = [padded[i : i + n, j : j + m] for i in range(3) for j in range(3)]
-    return np.asarray(np.min(shifts, axis=0))
 
 
 def _pair(theta: tuple[float, float]) -> str:

@@ -1,0 +1,104 @@
+"""Whether a surface meets itself."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+# Samples of one direction that are looked at, and steps between two that are neighbours.
+_MOST_SAMPLES = 96
+_NEIGHBOURS = 3
+_MOST_PAIRS = 2_000
+_ITERATIONS = 12
+# Of the surface's extent: places at this distance are the same.
+_SAME = 1e-9
+# Of the steps between two samples: places that came nearer to each other are no crossing.
+_APART = 1.5
+
+
+def check_single_sheet(surface: Surface) -> None:
+    """Check that a surface does not meet itself: no crossings, and nothing covered twice.
+
+    Samples that are near to each other, but far in the parameters, are moved until they meet
+    (Newton's method). What is smaller than the samples, see `sample_grid`, may be overlooked.
+
+    Args:
+        surface: Surface of class C^1.
+
+    Raises:
+        InputError: It meets itself; says at which parameters.
+    """
+    grid = sample_grid(surface)
+    strides = [-(-len(values) // _MOST_SAMPLES) for values in (grid.theta_1, grid.theta_2)]
+    one, other, steps = _suspects(grid, strides)
+    if not len(one):
+        return
+    lengths = np.array([ends.length for ends in surface.domain])
+    begin = np.array([ends.begin for ends in surface.domain])
+    closed = np.array(surface.closed)
+    extent = float(np.linalg.norm(np.ptp(grid.position.reshape(-1, 3), axis=0)))
+    for _ in range(_ITERATIONS):
+        here, there = surface.partials(one, 1), surface.partials(other, 1)
+        slopes = np.concatenate([here[:, 1:], -there[:, 1:]], axis=1).transpose(0, 2, 1)
+        # In shares of the domain, so that the least change means something.
+        slopes = slopes * np.tile(lengths, 2)
+        gap = here[:, 0] - there[:, 0]
+        move = -(np.linalg.pinv(slopes, rcond=1e-9) @ gap[..., None])[..., 0]
+        move /= np.maximum(1.0, np.abs(move).max(axis=1, keepdims=True) / 0.1)
+        one, other = one + move[:, :2] * lengths, other + move[:, 2:] * lengths
+        one, other = (
+            np.where(closed, place, np.clip(place, begin, begin + lengths))
+            for place in (one, other)
+        )
+    gap = np.linalg.norm(surface.partials(one, 0) - surface.partials(other, 0), axis=-1)[:, 0]
+    apart = np.abs(one - other) / lengths
+    apart = np.where(closed, np.abs(apart - np.round(apart)), apart) / steps
+    meets = np.flatnonzero((gap < _SAME * extent) & (apart.max(axis=1) > _APART))
+    if len(meets):
+        first, second = one[meets[0]], other[meets[0]]
+        raise InputError(
+            f"surface: meets itself at theta = {_pair(first)} and {_pair(second)}; must be a single"
+            " sheet, so take a part of it"
+        )
+
+
+def _suspects(grid: SampleGrid, strides: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Parameters of near samples that are no neighbours, each [n, 2], and steps of samples [2]."""
+    part = (slice(None, None, strides[0]), slice(None, None, strides[1]))
+    position, theta = grid.position[part], grid.theta[part]
+    shape = np.array(position.shape[:2])
+    size = _cell_sizes(position, grid.closed).ravel()
+    points = position.reshape(-1, 3)
+    near = cKDTree(points).query_ball_point(points, size)
+    counts = [len(each) for each in near]
+    one, other = np.repeat(np.arange(len(points)), counts), np.concatenate(near).astype(int)
+    apart = np.abs(
+        np.stack(np.unravel_index(one, shape)) - np.stack(np.unravel_index(other, shape))
+    )
+    apart = np.where(
+        np.array(grid.closed)[:, None], np.minimum(apart, shape[:, None] - apart), apart
+    )
+    far = (apart.max(axis=0) > _NEIGHBOURS) & (one < other)
+    one, other = one[far], other[far]
+    ratio = np.linalg.norm(points[one] - points[other], axis=1) / size[one]
+    nearest = np.argsort(ratio, kind="stable")[:_MOST_PAIRS]
+    flat = theta.reshape(-1, 2)
+    return flat[one[nearest]], flat[other[nearest]], 1.0 / shape
+
+
+def _cell_sizes(position: np.ndarray, closed: tuple[bool, bool]) -> np.ndarray:
+    """Longest way from each sample to one of its four neighbours, [n_1, n_2]."""
+    size = np.zeros(position.shape[:2])
+    for axis in (0, 1):
+        step = np.linalg.norm(np.roll(position, -1, axis=axis) - position, axis=-1)
+        step = np.moveaxis(step, axis, 0)
+        if not closed[axis]:
+            step[-1] = 0.0
+        size = np.maximum(size, np.moveaxis(np.maximum(step, np.roll(step, 1, axis=0)), 0, axis))
+    return np.sqrt(2.0) * size
+
+
+def _pair(theta: np.ndarray) -> str:
+    return f"[{theta[0]:.6g}, {theta[1]:.6g}]"

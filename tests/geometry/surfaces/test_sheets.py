@@ -1,0 +1,66 @@
+"""Surfaces that meet themselves, and others that only come near."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import (
+    FourierCurve,
+    Turned,
+    check_single_sheet,
+    cone,
+    cylinder,
+    extruded_surface,
+    interpolate,
+    paraboloid,
+    plane,
+    sphere,
+    surface_of_revolution,
+    torus,
+)
+
+EIGHT = FourierCurve([0, 0, 0], [[0.2, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0.1, 0]])
+EIGHT_BESIDE = FourierCurve([0.5, 0], [[0.2, 0], [0, 0]], [[0, 0], [0, 0.1]])
+
+
+def _spiral(turns, pitch):
+    angle = np.linspace(0.0, 2.0 * math.pi * turns, 60)
+    radius = 0.1 + pitch * angle / (2.0 * math.pi)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
+    return extruded_surface(interpolate(points, smoothness=3), (0.0, 0.0, 1.0), 0.2)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        extruded_surface(EIGHT, (0.0, 0.0, 1.0), 0.3),
+        extruded_surface(EIGHT, (0.1, 0.2, 1.0), 0.05),
+        surface_of_revolution(EIGHT_BESIDE),
+        _spiral(1.5, 0.0),
+    ],
+    ids=["eight", "slanted eight", "ring of eights", "covered twice"],
+)
+def test_surfaces_that_meet_themselves(surface):
+    with pytest.raises(InputError, match=r"meets itself at theta = \[.*\] and \[.*\]"):
+        check_single_sheet(surface)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        plane((1.0, 2.0)),
+        cylinder(0.09, (-0.1, 0.1)),
+        cylinder(0.01, (-0.1, 0.5), Turned(angles=(0.0, 6.2))),
+        cone(0.5, (0.01, 0.3)),
+        sphere(0.2, (-1.4, 1.4)),
+        torus(0.5, 0.1),
+        torus(0.101, 0.1),
+        paraboloid(((-0.3, 0.3), (-0.3, 0.3)), 12.5),
+        _spiral(2.5, 0.01),
+    ],
+    ids=["plane", "tube", "slit tube", "cone", "sphere", "torus", "fat torus", "deep", "spiral"],
+)
+def test_single_sheets(surface):
+    check_single_sheet(surface)
