@@ -7,9 +7,9 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.geometry import FourierCurve, zyx_to_matrix
+from pfsc_drake.geometry.path_on_surface import path_on_surface
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.partials import partial_orders
-from pfsc_drake.geometry.surfaces.path_on_surface import path_on_surface
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid, torus
 
 # about horizontal, within reach of six axes

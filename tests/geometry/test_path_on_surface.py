@@ -13,8 +13,8 @@ from pfsc_drake.geometry import (
     PiecewisePolynomialCurve,
     ProjectionStatus,
 )
+from pfsc_drake.geometry.path_on_surface import CurveOnSurface, path_on_surface
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
-from pfsc_drake.geometry.surfaces.path_on_surface import CurveOnSurface, path_on_surface
 from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid, torus
 
 RADIUS = 0.25
