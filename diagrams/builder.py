@@ -30,7 +30,7 @@ from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.progress import Progress
 
 
 def build_station(

@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 from pydrake.geometry import Mesh, Meshcat, MeshcatParams
 
-from diagrams.drawing.stl import read_stl
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.stl import read_stl
 from pfsc_drake.systems.drawing.robot_visualizer import Surface
 
 _DRAWN = "obj, gltf, dae and stl"
@@ -26,8 +26,8 @@ def drawn_mesh(mesh: Mesh) -> Mesh | Surface:
     check_mesh_file(file)
     if file.suffix.lower() != ".stl":
         return mesh
-    surface = read_stl(file)
-    return Surface(surface.vertices * mesh.scale3(), surface.triangles)
+    vertices, triangles = read_stl(file)
+    return Surface(vertices * mesh.scale3(), triangles)
 
 
 def check_mesh_file(file: FilePath) -> None:

@@ -32,7 +32,7 @@ from pfsc_drake.geometry import (
     zyx_to_quaternion,
     zyz_to_quaternion,
 )
-from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.progress import Progress
 
 _GIVE_ORIENTATION = (
     "give the orientation too: columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "

@@ -19,8 +19,8 @@ from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix, shape_report, zyx_to_matrix
-from pfsc_drake.geometry.paths.smoothing import Progress
 from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint

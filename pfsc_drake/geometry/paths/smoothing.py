@@ -1,7 +1,6 @@
 """Smooth paths through noisy waypoints."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -10,8 +9,7 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve, check_neighbours
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.smoothing import SmoothFit, noise_level, smoothest_within
-
-Progress = Callable[[float, str], None]
+from pfsc_drake.geometry.progress import Progress
 
 # Points nearer than this many tolerances say nothing of the way between them.
 _STRIDE = 3.0

@@ -1,15 +1,13 @@
 """Waypoint files."""
 
-import re
-import stat
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import (
     matrix_to_quaternion,
     zyx_to_quaternion,
@@ -17,15 +15,9 @@ from pfsc_drake.geometry.rotation import (
 )
 from pfsc_drake.geometry.size import FARTHEST
 
-MAX_ROWS = 1_000_000
-_MAX_BYTES = 1 << 28
-_ROWS_PER_REPORT = 50_000
-_LARGEST = 1e12
 # rad; two turns
 _LARGEST_ANGLE = 4.0 * np.pi
 _LARGEST_DEGREES = 3600.0
-# float() also takes underscores and the digits of all scripts
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 _POSITION = ("x", "y", "z")
 _PARAMETER = "theta"
@@ -38,13 +30,6 @@ _ORIENTATIONS = {
     "matrix": tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
 }
 _EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
-_KINDS = {
-    stat.S_IFDIR: "Is a directory",
-    stat.S_IFIFO: "is a FIFO",
-    stat.S_IFCHR: "is a device",
-    stat.S_IFBLK: "is a device",
-    stat.S_IFSOCK: "is a socket",
-}
 
 
 @dataclass(frozen=True)
@@ -82,7 +67,7 @@ def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -
             or a value is not a number, too large, not increasing (theta) or not an orientation.
     """
     name = str(csv_path)
-    lines, header, rows = _read_numbers(name, progress)
+    lines, header, rows = read_numbers(name, "waypoints", _check_header, progress)
     column = {label: rows[:, index] for index, label in enumerate(header)}
     positions = np.stack([column[label] for label in _POSITION], axis=1)
     far = np.argwhere(np.abs(positions) > FARTHEST)
@@ -109,96 +94,16 @@ def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -
     return WaypointTable(positions, quaternions, parameters)
 
 
-def _read_numbers(name: str, progress: Progress | None) -> tuple[list[int], list[str], np.ndarray]:
-    """Line numbers [n], column names [m] and values [n, m] of a file."""
-    header: list[str] = []
-    lines: list[int] = []
-    rows: list[list[float]] = []
-    for line, content, fraction in _contents(name):
-        cells = [cell.strip() for cell in content.split(",")]
-        if not header:
-            header = cells
-            _check_header(name, line, header)
-            continue
-        if len(cells) != len(header):
-            raise InputError(
-                f"{name}, line {line}: {len(cells)} values; {len(header)} are required"
-            )
-        rows.append([_number(name, line, *item) for item in zip(header, cells, strict=True)])
-        lines.append(line)
-        if len(rows) > MAX_ROWS:
-            raise InputError(
-                f"{name}: more than {MAX_ROWS} waypoints; so many are the most that are read"
-            )
-        if progress is not None and len(rows) % _ROWS_PER_REPORT == 0:
-            progress(fraction, "reading the waypoints")
-    if not rows:
-        raise InputError(f"{name}: no waypoints; a line with column names and data are required")
-    return lines, header, np.array(rows)
-
-
-def _contents(name: str) -> Iterator[tuple[int, str, float]]:
-    """Lines that say something: number, text without comment, and the fraction of the file."""
-    try:
-        status = FilePath(name).stat()
-        kind = _KINDS.get(stat.S_IFMT(status.st_mode), "is no regular file")
-        if not stat.S_ISREG(status.st_mode):
-            raise OSError(0, kind)
-        if status.st_size > _MAX_BYTES:
-            raise OSError(0, f"{status.st_size >> 20} MiB, at most {_MAX_BYTES >> 20} are read")
-        text = FilePath(name).read_text(encoding="utf-8-sig")
-    # ValueError: bytes that are no UTF-8, or a name that no file can have.
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(
-            f"{_quote(name, 1000)}: {reason}; a readable CSV file is required"
-        ) from error
-    rows = text.splitlines()
-    for line, content in enumerate(rows, start=1):
-        content = content.partition("#")[0].strip()
-        if content:
-            yield line, content, line / len(rows)
-
-
-def _check_header(name: str, line: int, header: list[str]) -> None:
-    known = [
-        *_POSITION,
-        _PARAMETER,
-        *(label for group in _ORIENTATIONS.values() for label in group),
-    ]
-    for label in header:
-        if label not in known:
-            hint = "; separate columns by commas" if re.search("[;\t]", label) else ""
-            if _NUMBER.fullmatch(label):
-                hint = "; the first line names the columns"
-            raise InputError(
-                f"{name}, line {line}: column '{_quote(label)}' is unknown; allowed:"
-                f" {', '.join(known)}{hint}"
-            )
-        if header.count(label) > 1:
-            raise InputError(f"{name}, line {line}: column '{label}' twice; once is allowed")
-    present = [group for group in _ORIENTATIONS.values() if any(key in header for key in group)]
+def _check_header(place: str, header: list[str]) -> None:
+    groups = list(_ORIENTATIONS.values())
+    known = [*_POSITION, _PARAMETER, *(label for group in groups for label in group)]
+    present = [group for group in groups if any(key in header for key in group)]
+    check_columns(place, header, known, [])
     if len(present) > 1:
-        groups = " and ".join(f"'{group[0]}...'" for group in present)
-        raise InputError(f"{name}, line {line}: columns {groups}; one kind of orientation allowed")
-    for label in (*_POSITION, *(label for group in present for label in group)):
-        if label not in header:
-            raise InputError(f"{name}, line {line}: column '{label}' is missing; it is required")
-
-
-def _number(name: str, line: int, label: str, cell: str) -> float:
-    value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
-    if not abs(value) <= _LARGEST:
-        raise InputError(
-            f"{name}, line {line}, column {label}: '{_quote(cell)}'; a finite number is required"
-        )
-    return value
-
-
-def _quote(text: str, longest: int = 40) -> str:
-    """Text for a message, its middle left out if it is long."""
-    half = longest // 2
-    return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"
+        kinds = " and ".join(f"'{group[0]}...'" for group in present)
+        raise InputError(f"{place}: columns {kinds}; one kind of orientation allowed")
+    required = [*_POSITION, *(label for group in present for label in group)]
+    check_columns(place, header, known, required)
 
 
 def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:

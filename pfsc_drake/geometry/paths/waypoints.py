@@ -20,8 +20,9 @@ from pfsc_drake.geometry.curves.spline import (
     interpolate,
 )
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
-from pfsc_drake.geometry.paths.smoothing import Progress, smooth_orientation, smooth_positions
+from pfsc_drake.geometry.paths.smoothing import smooth_orientation, smooth_positions
 from pfsc_drake.geometry.paths.waypoint_file import WaypointTable
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.size import SHORTEST
 
 # Splines through more waypoints would take minutes and gigabytes.

@@ -5,8 +5,8 @@ import struct
 import numpy as np
 import pytest
 
-from diagrams.drawing.stl import read_stl
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.stl import read_stl
 
 # a tetrahedron, corners counterclockwise from outside
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3.5]])

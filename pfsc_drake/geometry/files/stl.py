@@ -1,17 +1,30 @@
-"""Reading STL files, binary and text, which Drake does not draw."""
+"""STL files, binary and text."""
 
 from pathlib import Path as FilePath
+from typing import NamedTuple
 
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.geometry.files.regular_file import read_regular_file
 
 _HEADER, _COUNT = 80, 4  # bytes before the number of triangles, and of it
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(file: FilePath) -> Surface:
+class Triangles(NamedTuple):
+    """A mesh.
+
+    Attributes:
+        vertices: Points, shape (v, 3).
+        triangles: Indices of their corners, counterclockwise from outside, shape (t, 3).
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+
+def read_stl(file: FilePath) -> Triangles:
     """Return the triangles of an STL file in its own unit; equal corners become one vertex.
 
     Args:
@@ -20,17 +33,14 @@ def read_stl(file: FilePath) -> Surface:
     Raises:
         InputError: If it cannot be read or holds no triangles with finite corners.
     """
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    data = read_regular_file(file, "STL")
     corners = _binary(data)
     if corners is None:
         corners = _text(data, file)
     if not len(corners) or not np.isfinite(corners).all():
         raise InputError(f"{file}: holds no triangles with finite corners")
     vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return Surface(vertices, indices.reshape(-1, 3))
+    return Triangles(vertices, indices.reshape(-1, 3))
 
 
 def _binary(data: bytes) -> np.ndarray | None:

@@ -1,0 +1,132 @@
+"""CSV files: columns of numbers under a line of names."""
+
+import re
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.regular_file import read_regular_file, unreadable
+from pfsc_drake.geometry.progress import Progress
+
+MAX_ROWS = 1_000_000
+_ROWS_PER_REPORT = 50_000
+_LARGEST = 1e12
+# float() also takes underscores and the digits of all scripts
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+class NumberTable(NamedTuple):
+    """Columns of numbers.
+
+    Attributes:
+        lines: Where in the file the rows stand, [n].
+        header: Names of the columns, [m].
+        rows: [n, m].
+    """
+
+    lines: list[int]
+    header: list[str]
+    rows: np.ndarray
+
+
+def read_numbers(
+    name: str,
+    what: str,
+    check_header: Callable[[str, list[str]], None],
+    progress: Progress | None = None,
+) -> NumberTable:
+    """Read a CSV file.
+
+    The first line that is neither empty nor a comment (#) names the columns.
+
+    Args:
+        name: Of a regular file of at most 256 MiB and 1,000,000 rows.
+        what: What rows are, for messages, as "waypoints".
+        check_header: Refuses names of columns; told where they stand and the names.
+        progress: Told the fraction read and what is done.
+
+    Raises:
+        InputError: The file cannot be read or is too large, has no rows or rows of different
+            lengths, or a value is not a number.
+    """
+    header: list[str] = []
+    lines: list[int] = []
+    rows: list[list[float]] = []
+    for line, content, fraction in _contents(name):
+        cells = [cell.strip() for cell in content.split(",")]
+        if not header:
+            header = cells
+            check_header(f"{name}, line {line}", header)
+            continue
+        if len(cells) != len(header):
+            raise InputError(
+                f"{name}, line {line}: {len(cells)} values; {len(header)} are required"
+            )
+        rows.append([_number(name, line, *item) for item in zip(header, cells, strict=True)])
+        lines.append(line)
+        if len(rows) > MAX_ROWS:
+            raise InputError(
+                f"{name}: more than {MAX_ROWS} {what}; so many are the most that are read"
+            )
+        if progress is not None and len(rows) % _ROWS_PER_REPORT == 0:
+            progress(fraction, f"reading the {what}")
+    if not rows:
+        raise InputError(f"{name}: no {what}; a line with column names and data are required")
+    return NumberTable(lines, header, np.array(rows))
+
+
+def check_columns(place: str, header: list[str], known: list[str], required: list[str]) -> None:
+    """Refuse columns that are unknown, there twice, or missing.
+
+    Args:
+        place: File and line, for messages.
+        header: Names of columns.
+        known: Names that are allowed.
+        required: Names that must be there.
+
+    Raises:
+        InputError: See above.
+    """
+    for label in header:
+        if label not in known:
+            hint = "; separate columns by commas" if re.search("[;\t]", label) else ""
+            if _NUMBER.fullmatch(label):
+                hint = "; the first line names the columns"
+            raise InputError(
+                f"{place}: column '{quote(label)}' is unknown; allowed: {', '.join(known)}{hint}"
+            )
+        if header.count(label) > 1:
+            raise InputError(f"{place}: column '{label}' twice; once is allowed")
+    for label in required:
+        if label not in header:
+            raise InputError(f"{place}: column '{label}' is missing; it is required")
+
+
+def quote(text: str, longest: int = 40) -> str:
+    """Text for a message, its middle left out if it is long."""
+    half = longest // 2
+    return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"
+
+
+def _contents(name: str) -> Iterator[tuple[int, str, float]]:
+    """Lines that say something: number, text without comment, and the fraction of the file."""
+    try:
+        text = read_regular_file(name, "CSV").decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise unreadable(name, "CSV") from error
+    rows = text.splitlines()
+    for line, content in enumerate(rows, start=1):
+        content = content.partition("#")[0].strip()
+        if content:
+            yield line, content, line / len(rows)
+
+
+def _number(name: str, line: int, label: str, cell: str) -> float:
+    value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
+    if not abs(value) <= _LARGEST:
+        raise InputError(
+            f"{name}, line {line}, column {label}: '{quote(cell)}'; a finite number is required"
+        )
+    return value

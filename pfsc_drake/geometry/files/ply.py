@@ -1,0 +1,123 @@
+"""Vertices of PLY files, text and binary."""
+
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.number_table import quote
+from pfsc_drake.geometry.files.regular_file import read_regular_file
+
+_NAMES = {
+    "i1": ("char", "int8"),
+    "u1": ("uchar", "uint8"),
+    "i2": ("short", "int16"),
+    "u2": ("ushort", "uint16"),
+    "i4": ("int", "int32"),
+    "u4": ("uint", "uint32"),
+    "f4": ("float", "float32"),
+    "f8": ("double", "float64"),
+}
+_TYPES = {name: kind for kind, names in _NAMES.items() for name in names}
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_END = b"end_header"
+_MAX_HEADER = 1 << 16
+
+
+class _Element(NamedTuple):
+    """What a header says of a kind of element; a property without a type is a list."""
+
+    name: str
+    number: int
+    properties: list[tuple[str, str | None]]
+
+
+def read_ply_vertices(file: FilePath) -> np.ndarray:
+    """Return x, y, z of the element `vertex` of a PLY file in its own unit, [n, 3].
+
+    Args:
+        file: The file.
+
+    Raises:
+        InputError: It cannot be read, is no PLY file or shorter than its header says, or has no
+            vertices, or elements with lists before them.
+    """
+    data = read_regular_file(file, "PLY")
+    at = data.find(_END, 0, _MAX_HEADER)
+    body = data.find(b"\n", at) + 1 if at >= 0 else 0
+    if not data.startswith(b"ply") or not body:
+        raise InputError(f"{file}: is no PLY file; a header from 'ply' to 'end_header' is required")
+    order, elements = _header(file, data[:at].decode("ascii", "replace").splitlines())
+    names = [element.name for element in elements]
+    if "vertex" not in names:
+        raise InputError(f"{file}: no vertices; an element 'vertex' is required in a PLY file")
+    before, vertex = elements[: names.index("vertex")], elements[names.index("vertex")]
+    labels = [label for label, _ in vertex.properties]
+    lists = any(kind is None for element in (*before, vertex) for _, kind in element.properties)
+    if lists or not {"x", "y", "z"} <= set(labels) or len(set(labels)) < len(labels):
+        raise InputError(
+            f"{file}: element 'vertex' has {', '.join(labels)}; x, y and z, each once, are"
+            " required, and no lists there or before"
+        )
+    rows = _text_rows if order == "" else _binary_rows
+    table = rows(data[body:], order, before, vertex)
+    if table is None:
+        raise InputError(
+            f"{file}: does not hold the {vertex.number} vertices that its header says, or one that"
+            " is none"
+        )
+    return table
+
+
+def _header(file: FilePath, lines: list[str]) -> tuple[str, list[_Element]]:
+    """Byte order, none for text, and the elements."""
+    order, elements = None, []
+    for number, line in enumerate(lines[1:], start=2):
+        match line.split():
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case ["format", kind, _] if kind in _ORDERS:
+                order = _ORDERS[kind]
+            case ["element", name, count] if count.isascii() and count.isdigit():
+                elements.append(_Element(name, int(count), []))
+            case ["property", "list", _, _, label] if elements:
+                elements[-1].properties.append((label, None))
+            case ["property", kind, label] if elements and kind in _TYPES:
+                elements[-1].properties.append((label, _TYPES[kind]))
+            case _:
+                raise InputError(f"{file}, line {number}: '{quote(line)}' is unknown in a PLY file")
+    if order is None:
+        raise InputError(f"{file}: no format; one of {', '.join(_ORDERS)} is required")
+    return order, elements
+
+
+def _text_rows(
+    data: bytes, order: str, before: list[_Element], vertex: _Element
+) -> np.ndarray | None:
+    """Vertices [n, 3] of a file of text, None if they are not there."""
+    begin = sum(element.number for element in before)
+    rows = [line.split() for line in data.splitlines() if line.strip()]
+    rows = rows[begin : begin + vertex.number]
+    labels = [label for label, _ in vertex.properties]
+    places = [labels.index(axis) for axis in "xyz"]
+    try:
+        table = np.array([[float(row[place]) for place in places] for row in rows])
+    except (ValueError, IndexError):
+        return None
+    return table if len(table) == vertex.number > 0 else None
+
+
+def _binary_rows(
+    data: bytes, order: str, before: list[_Element], vertex: _Element
+) -> np.ndarray | None:
+    """Vertices [n, 3] of a binary file, None if they are not there."""
+    sizes = [
+        element.number * sum(np.dtype(kind).itemsize for _, kind in element.properties)
+        for element in before
+    ]
+    record = np.dtype([(label, f"{order}{kind}") for label, kind in vertex.properties])
+    if len(data) < sum(sizes) + vertex.number * record.itemsize or not vertex.number:
+        return None
+    table = np.frombuffer(data, record, vertex.number, sum(sizes))
+    return np.stack([table[axis].astype(float) for axis in "xyz"], axis=1)

@@ -1,0 +1,137 @@
+"""Surfaces through a grid of points."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.spline import check_smoothness
+from pfsc_drake.geometry.size import FARTHEST, SHORTEST
+from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.regularity import check_regular
+from pfsc_drake.geometry.surfaces.spline_surface import interpolated_surface
+
+# Points of a closed direction.
+_FEWEST_CLOSED = 3
+# Neighbours closer than this part of the grid's length are one point.
+_COINCIDENT = 1e-9
+
+
+def surface_through_grid(
+    points: ArrayLike, *, smoothness: int, closed: tuple[bool, bool] = (False, False)
+) -> ProductSurface:
+    """Spline surface of degree smoothness + 1 through all points of a grid.
+
+    Its parameters are lengths: from one row to the next theta_1 grows by the mean distance of
+    their points, and theta_2 by that of columns, so that both tangents have a length near one.
+
+    Args:
+        points: [n_1, n_2, 3], m, by theta_1 and theta_2; the last row or column of a closed
+            direction may repeat the first.
+        smoothness: k of the class C^k, 2..6.
+        closed: Which directions are periodic.
+
+    Returns:
+        The surface, on [0, length] in both directions.
+
+    Raises:
+        InputError: Wrong shape, values that are not finite or too large, too few points,
+            neighbours that coincide, or a surface that is not regular.
+    """
+    grid = grid_for(points, smoothness, closed)
+    parameters = grid_parameters(grid, closed)
+    surface = interpolated_surface(parameters, grid, smoothness + 1, closed)
+    check_regular(surface)
+    return surface
+
+
+def grid_for(points: ArrayLike, smoothness: int, closed: tuple[bool, bool]) -> np.ndarray:
+    """Return a grid of points as an array, with the first row and column again where it closes.
+
+    Args:
+        points: [n_1, n_2, 3], m.
+        smoothness: k of the class C^k that is asked for.
+        closed: Which directions are periodic.
+
+    Raises:
+        InputError: As `surface_through_grid`.
+    """
+    check_smoothness(smoothness)
+    grid = _checked(points)
+    for axis in (0, 1):
+        if closed[axis]:
+            grid = _closing(grid, axis)
+        needed = _FEWEST_CLOSED + 1 if closed[axis] else smoothness + 2
+        if grid.shape[axis] < needed:
+            raise InputError(
+                f"grid of points: {grid.shape[axis] - closed[axis]} along theta_{axis + 1},"
+                f" {'a closed' if closed[axis] else 'an open'} direction;"
+                f" {needed - closed[axis]} are needed for class C^{smoothness}"
+            )
+    return grid
+
+
+def _checked(points: ArrayLike) -> np.ndarray:
+    """Return a grid of points as an array [n_1, n_2, 3], m.
+
+    Raises:
+        InputError: Wrong shape, not finite, or beyond 1e4 m.
+    """
+    grid = np.asarray(points, dtype=float)
+    if grid.ndim != 3 or grid.shape[2] != 3 or min(grid.shape[:2]) < 2:
+        raise InputError(
+            f"grid of points: shape {grid.shape}; [rows, columns, 3], two or more of each, is"
+            " required"
+        )
+    bad = np.argwhere(~(np.abs(grid) <= FARTHEST))
+    if bad.size:
+        row, column, axis = bad[0]
+        raise InputError(
+            f"grid of points: row {row + 1}, column {column + 1}, {'xyz'[axis]} ="
+            f" {grid[row, column, axis]:g} m; a number of at most {FARTHEST:g} is required"
+        )
+    return grid
+
+
+def grid_parameters(grid: np.ndarray, closed: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters of a grid's rows and columns, from 0, by their mean distances.
+
+    Args:
+        grid: [n_1, n_2, 3], m, as `grid_for` returns it.
+        closed: Which directions are periodic.
+
+    Returns:
+        theta_1 [n_1] and theta_2 [n_2], m, strictly increasing.
+
+    Raises:
+        InputError: Neighbours coincide, or all lie within 0.1 mm.
+    """
+    # What is there twice, at both ends of a closed direction, counts once.
+    once = grid[: len(grid) - closed[0]], grid[:, : grid.shape[1] - closed[1]]
+    return _lengths(once[1], 0), _lengths(once[0], 1)
+
+
+def _lengths(grid: np.ndarray, axis: int) -> np.ndarray:
+    """Accumulated mean distances along an axis, [n_axis], m."""
+    chords = np.linalg.norm(np.diff(grid, axis=axis), axis=2)
+    total = float(chords.mean(axis=1 - axis).sum())
+    if not total >= SHORTEST:
+        raise InputError(
+            f"grid of points: {total:.3g} m long along theta_{axis + 1}; at least {SHORTEST:g} m"
+            " are required"
+        )
+    if not np.all(chords > _COINCIDENT * total):
+        row, column = np.unravel_index(int(np.argmin(chords)), chords.shape)
+        raise InputError(
+            f"grid of points: row {row + 1}, column {column + 1} coincides with the next along"
+            f" theta_{axis + 1}, {grid[row, column].tolist()} m; neighbours must differ (leave"
+            " out poles)"
+        )
+    return np.concatenate([[0.0], np.cumsum(chords.mean(axis=1 - axis))])
+
+
+def _closing(grid: np.ndarray, axis: int) -> np.ndarray:
+    """The grid with its first row or column once more at the end, if it is not there."""
+    first, last = (np.take(grid, [place], axis=axis) for place in (0, -1))
+    if np.linalg.norm(last - first, axis=2).max() <= _COINCIDENT * np.ptp(grid):
+        return np.concatenate([np.delete(grid, -1, axis=axis), first], axis=axis)
+    return np.concatenate([grid, first], axis=axis)

@@ -1,0 +1,89 @@
+"""Files of points scanned on a surface."""
+
+from pathlib import Path as FilePath
+from typing import Literal
+
+import numpy as np
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
+from pfsc_drake.geometry.files.obj import read_obj_vertices
+from pfsc_drake.geometry.files.ply import read_ply_vertices
+from pfsc_drake.geometry.files.stl import read_stl
+from pfsc_drake.geometry.size import FARTHEST
+
+Unit = Literal["m", "cm", "mm", "inch"]
+
+_METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+_AXES = ["x", "y", "z"]
+_MESHES = {
+    ".stl": lambda file: read_stl(file).vertices,
+    ".obj": read_obj_vertices,
+    ".ply": read_ply_vertices,
+}
+# m; no robot reaches over a larger workpiece.
+_LARGEST = 50.0
+
+
+def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
+    """Read points scanned on a surface.
+
+    Args:
+        file: A CSV file with columns x, y, z in any order, or an STL, OBJ or PLY file whose
+            vertices are taken, equal ones once.
+        unit: Of the numbers in it.
+
+    Returns:
+        Points, [n, 3], m.
+
+    Raises:
+        InputError: An unknown kind of file or unit, one that cannot be read, columns that are
+            unknown or missing, values that are not finite, points of a CSV file twice, further
+            than 1e4 m away or more than 50 m apart.
+    """
+    if unit not in _METRES:
+        raise InputError(f"unit: '{unit}'; one of {', '.join(_METRES)} is required")
+    path = FilePath(file)
+    kind = path.suffix.lower()
+    if kind == ".csv":
+        points, places = _read_csv(str(file))
+    elif kind in _MESHES:
+        # the order of the file is kept
+        vertices = _MESHES[kind](path)
+        points = vertices[np.sort(np.unique(vertices, axis=0, return_index=True)[1])]
+        places = [f"vertex {number}" for number in range(1, len(points) + 1)]
+    else:
+        raise InputError(
+            f"{file}: points are read from files of the kinds .csv, {', '.join(_MESHES)}"
+        )
+    points = points * _METRES[unit]
+    bad = np.argwhere(~(np.abs(points) <= FARTHEST))
+    if bad.size:
+        row, axis = bad[0]
+        raise InputError(
+            f"{file}, {places[row]}, {'xyz'[axis]}: {points[row, axis]:g} m; a number of at most"
+            f" {FARTHEST:g} is required"
+        )
+    size = float(np.ptp(points, axis=0).max())
+    if size > _LARGEST:
+        advice = ": is its unit mm?" if unit == "m" else ""
+        raise InputError(
+            f"{file}: {size:.4g} m from end to end; at most {_LARGEST:g} m are allowed{advice}"
+        )
+    return points
+
+
+def _read_csv(name: str) -> tuple[np.ndarray, list[str]]:
+    """Points [n, 3] in the file's unit, and where they stand."""
+    table = read_numbers(
+        name, "points", lambda place, header: check_columns(place, header, _AXES, _AXES)
+    )
+    points = table.rows[:, [table.header.index(axis) for axis in _AXES]]
+    first: dict[tuple[float, ...], int] = {}
+    for line, row in zip(table.lines, map(tuple, points.tolist()), strict=True):
+        if first.setdefault(row, line) != line:
+            raise InputError(
+                f"{name}, line {line}: the same point as in line {first[row]}; each once is"
+                " required"
+            )
+    return points, [f"line {line}" for line in table.lines]
