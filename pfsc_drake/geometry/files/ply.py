@@ -60,8 +60,13 @@ def read_ply_vertices(file: FilePath) -> np.ndarray:
             f"{file}: element 'vertex' has {', '.join(labels)}; x, y and z, each once, are"
             " required, and no lists there or before"
         )
-    rows = _text_rows if order == "" else _binary_rows
-    table = rows(data[body:], order, before, vertex)
+    if order:
+        table = _binary_rows(data[body:], order, before, vertex)
+    else:
+        lines = [line for line in data[body:].splitlines() if line.strip()]
+        begin = sum(element.number for element in before)
+        complete = len(lines) >= sum(element.number for element in elements)
+        table = _text_rows(lines[begin : begin + vertex.number], labels) if complete else None
     if table is None:
         raise InputError(
             f"{file}: does not hold the {vertex.number} vertices that its header says, or one that"
@@ -92,20 +97,14 @@ def _header(file: FilePath, lines: list[str]) -> tuple[str, list[_Element]]:
     return order, elements
 
 
-def _text_rows(
-    data: bytes, order: str, before: list[_Element], vertex: _Element
-) -> np.ndarray | None:
-    """Vertices [n, 3] of a file of text, None if they are not there."""
-    begin = sum(element.number for element in before)
-    rows = [line.split() for line in data.splitlines() if line.strip()]
-    rows = rows[begin : begin + vertex.number]
-    labels = [label for label, _ in vertex.properties]
+def _text_rows(lines: list[bytes], labels: list[str]) -> np.ndarray | None:
+    """Vertices [n, 3] of lines, None if they are none."""
     places = [labels.index(axis) for axis in "xyz"]
+    rows = [line.split() for line in lines]
     try:
-        table = np.array([[float(row[place]) for place in places] for row in rows])
+        return np.array([[float(row[place]) for place in places] for row in rows]) if rows else None
     except (ValueError, IndexError):
         return None
-    return table if len(table) == vertex.number > 0 else None
 
 
 def _binary_rows(
