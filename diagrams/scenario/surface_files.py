@@ -43,6 +43,7 @@ class Fitted(Placed):
         base_point: A point on that axis [m].
         seen_from: A point on the side that the normal points to, world axes [m]; empty for
             upwards on a plane, outward on a cylinder.
+        along: Direction that theta_1 leans to on a plane, world axes; empty for the longer side.
         largest_hole: Largest distance of a place of the surface from the nearest scattered point
             [m]; zero for four times the distance of points.
         trim: Whether to take the largest part that has no larger hole, instead of refusing.
@@ -59,6 +60,7 @@ class Fitted(Placed):
     base_axis: list[float] = dc.field(default_factory=list)
     base_point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     seen_from: list[float] = dc.field(default_factory=list)
+    along: list[float] = dc.field(default_factory=list)
     largest_hole: float = 0.0
     trim: bool = False
 
@@ -73,7 +75,7 @@ class Fitted(Placed):
         require(good, "grid", self.grid, "empty, or [rows, columns] of two or more each")
         require(len(self.closed) == 2, "closed", self.closed, "two of true and false")
         self._require_of_grids()
-        for key in ("base_axis", "seen_from"):
+        for key in ("base_axis", "seen_from", "along"):
             if getattr(self, key):
                 require_numbers(key, getattr(self, key), 3)
         require_numbers("base_point", self.base_point, 3)
@@ -85,7 +87,11 @@ class Fitted(Placed):
         """Refuse what says nothing of the points that are given."""
         if self.grid:
             scattered = {"base": self.base != "auto", "seen_from": bool(self.seen_from)}
-            scattered |= {"largest_hole": self.largest_hole > 0.0, "trim": self.trim}
+            scattered |= {
+                "along": bool(self.along),
+                "largest_hole": self.largest_hole > 0.0,
+                "trim": self.trim,
+            }
             for key, given in scattered.items():
                 allowed = "for scattered points alone; leave out it or grid"
                 require(not given, key, getattr(self, key), allowed)

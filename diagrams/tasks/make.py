@@ -6,7 +6,7 @@ from diagrams.scenario import Scenario
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import Task
-from pfsc_drake.geometry.paths.smoothing import Progress
+from pfsc_drake.geometry.progress import Progress
 
 TASKS: dict[str, type[PathTask | SurfaceTask]] = {
     "path": PathTask,

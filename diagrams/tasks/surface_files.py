@@ -114,6 +114,7 @@ def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
         tolerance=shape.tolerance or None,
         base=base,
         seen_from=shape.seen_from or None,
+        along=shape.along or None,
         largest_hole=shape.largest_hole or None,
         trim=shape.trim,
     )

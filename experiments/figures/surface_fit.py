@@ -32,7 +32,6 @@ def draw_surface_fit(fit: Residuals) -> Drawing:
         counted.axvline(sign * scale * fit.rms, linestyle="--", color=INK, label=label)
     counted.set(xlabel=f"distance in {unit}", ylabel="points", title=" ")
     counted.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
-    canvas.tight_layout()
     caption = (
         f"Distances of {len(distances)} points from the surface fitted to them, along its normal, "
         f"at most {np.abs(distances).max():.3g} {unit}; they should show no pattern."

@@ -113,7 +113,7 @@ def test_virtual_work_with_the_jacobian_of_a_robot(load_robot, orientation):
 
 def test_half_way_to_the_axis_of_a_cylinder_the_force_around_it_is_half():
     manifold = SurfaceManifold(1)
-    y_t, _, point = place(manifold, "cylinder", np.random.default_rng(0))
+    _, _, point = place(manifold, "cylinder", np.random.default_rng(0))
     around, along, normal = manifold.axes(point).T
     wrench = np.append(3.0 * around + 5.0 * along + 7.0 * normal, np.zeros(3))
     tau = force(manifold, wrench, point, [0.3, 0.1, 0.125])
