@@ -112,6 +112,17 @@ class OnePeriodMap:
             section: Context right after a tick; unchanged.
             x: Variables in place of its own, shape (size,).
         """
+        self.arrive(section, x)
+        self._simulator.AdvancePendingEvents()
+        return self.variables(self.context)
+
+    def arrive(self, section: Context, x: np.ndarray | None = None) -> None:
+        """Advance to the next tick, before anything is updated there; see :meth:`advance`.
+
+        Args:
+            section: Context right after a tick; unchanged.
+            x: Variables in place of its own, shape (size,).
+        """
         context, time = self.context, section.get_time()
         # a product as in Drake's own schedule, so that rounding does not lose the tick
         next_tick = (round(time / self.period) + 1) * self.period
@@ -122,8 +133,6 @@ class OnePeriodMap:
         context.SetTime(time + _BEHIND)
         self._simulator.Initialize(self._silent)
         self._simulator.AdvanceTo(next_tick)
-        self._simulator.AdvancePendingEvents()
-        return self.variables(context)
 
     def derivative(self, section: Context, chosen: np.ndarray | None = None) -> SectionDerivative:
         """Return the map's derivative by central differences.

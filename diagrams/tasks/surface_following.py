@@ -118,7 +118,10 @@ class SurfaceTask(Task):
         if start.theta:
             require_numbers("start.theta", start.theta, 2)
             theta = start.theta
-        point = self._evaluator.evaluate_at(theta)
+        try:
+            point = self._evaluator.evaluate_at(theta)
+        except InputError as error:
+            raise InputError(f"start.theta: {error}") from None
         position = point[self.place.layout.position][:3]
         return position + start.offset[0] * self.place.axes(point)[:, 2]
 

@@ -61,7 +61,8 @@ class StationLoop:
         """Return whether a system is in its safe state.
 
         Args:
-            root: Context of the diagram.
+            root: Context of the diagram, at a tick before its updates: after them positions would
+                be compared with themselves.
         """
         return any(
             system.fault(system.GetMyContextFromRoot(root)) is not Fault.NONE
@@ -129,7 +130,7 @@ def linearize(loop: StationLoop, section: Context, chosen: np.ndarray) -> Linear
     Returns:
         The linear loop; None if the law goes to its safe state there.
     """
-    loop.map.advance(section)
+    loop.map.arrive(section)
     if loop.has_failed(loop.map.context):
         return None
     slope = loop.map.derivative(section, chosen)

@@ -152,12 +152,13 @@ def test_the_shipped_scan_is_that_of_its_formula():
 def test_a_cylinder_that_points_are_heights_over(tmp_path):
     rng = np.random.default_rng(2)
     a, h = rng.uniform(0.0, 2.0 * np.pi, 900), rng.uniform(0.0, 0.3, 900)
-    name = csv(tmp_path, "x,y,z", circle(a, h, np.full(900, 0.1)) + [0.1, 0.0, 0.0])
-    for more in ({}, {"base_axis": [0.0, 0.0, 1.0], "base_point": [0.1, 0.0, 0.0]}):
+    centre = np.array([0.1, 0.0, 0.0])
+    name = csv(tmp_path, "x,y,z", circle(a, h, np.full(900, 0.1)) + centre)
+    for more in ({}, {"base_axis": [0.0, 0.0, 1.0], "base_point": centre.tolist()}):
         shape = Fitted(file=name, base="cylinder", **more)
         surface = make(shape, "rigid", tmp_path)
         assert surface.closed == (True, False)
-        points = surface.partials(places(surface), 0)[:, 0] - [0.1, 0.0, 0.0]
+        points = surface.partials(places(surface), 0)[:, 0] - centre
         np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1]), 0.1, atol=1e-5)
 
 
