@@ -38,12 +38,8 @@ class Instant:
     def place(self) -> str:
         """In words."""
         motion = f"at {abs(self.speed):.2g} m/s" if self.speed else "at rest"
-        return f"{motion}, eta = {self.where('.3g')} m"
-
-    def where(self, digits: str) -> str:
-        """Return eta as text, its numbers formatted as told."""
-        numbers = ", ".join(f"{value:{digits}}" for value in self.eta)
-        return numbers if len(self.eta) == 1 else f"({numbers})"
+        eta = ", ".join(f"{value:.3g}" for value in self.eta)
+        return f"{motion}, eta = {eta if len(self.eta) == 1 else f'({eta})'} m"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder
 
 RADIUS, ORIGIN = 0.2, np.array([0.5, 0.0, 1.0])
+OUTSIDE = ORIGIN + np.array([0.0, 0.25, 0.1])
+FOOT = ORIGIN + np.array([0.0, RADIUS, 0.1])
 
 
 class MeshcatSpy:
@@ -40,9 +42,7 @@ def fixture_drawn():
     def draw(point=None):
         surface = cylinder(RADIUS, (0.0, 0.3), Turned(ORIGIN))
         manifold = SurfaceManifold(1)
-        evaluated = SurfaceEvaluator(surface, 1)(
-            (ORIGIN + [0.0, 0.25, 0.1]).tolist(), [1.5, 0.1], [0.0, 0.0]
-        )
+        evaluated = SurfaceEvaluator(surface, 1)(OUTSIDE.tolist(), [1.5, 0.1], [0.0, 0.0])
         spy, builder = MeshcatSpy(), DiagramBuilder()
         port = SurfaceDrawing(surface, manifold).add(builder, spy, 0.1)
         source = builder.AddSystem(ConstantVectorSource(evaluated if point is None else point))
@@ -55,7 +55,7 @@ def fixture_drawn():
 
 def test_skin_and_lines_lie_on_the_surface(drawn):
     spy, _ = drawn()
-    ((vertices, faces),) = spy.meshes.values()
+    ((vertices, _),) = spy.meshes.values()
     for points in (vertices.T, *(line.T for line in spy.lines.values())):
         off = points - ORIGIN
         np.testing.assert_allclose(np.hypot(off[:, 0], off[:, 1]), RADIUS, atol=1e-12)
@@ -77,7 +77,7 @@ def test_the_frame_stands_on_the_surface_with_its_third_axis_along_the_normal(dr
     spy, _ = drawn()
     X_WF, time = spy.transforms["surface_following/frame"]
     assert time == 0.1
-    np.testing.assert_allclose(X_WF.translation(), ORIGIN + [0.0, RADIUS, 0.1], atol=1e-9)
+    np.testing.assert_allclose(X_WF.translation(), FOOT, atol=1e-9)
     expected = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]  # around, up, outward
     np.testing.assert_allclose(X_WF.rotation().matrix().T, expected, atol=1e-9)
     assert {"surface_following/frame/axis_0", "surface_following/frame/axis_2"} <= set(spy.objects)
