@@ -64,7 +64,13 @@ def surface_from_file(
         tell(0.0, f"fitting a surface to {len(points)} points")
         return _near_grid(shape, placed, made) if shape.grid else _scattered(shape, placed, made)
     if isinstance(shape, Revolved):
-        profile = _profile(shape, read_profile(file, ["radius", "height"]), made)
+        points = read_profile(file, ["radius", "height"])
+        if not points[:, 0].min() > 0.0:
+            raise InputError(
+                f"{shape.file}: radius = {points[:, 0].min():g} m; positive numbers are required, "
+                "since a profile must not meet the axis"
+            )
+        profile = _profile(shape, points, made)
         first, last = np.deg2rad(shape.angles_deg) if shape.angles_deg else (0.0, 0.0)
         return MadeSurface(
             surface_of_revolution(

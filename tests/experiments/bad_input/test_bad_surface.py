@@ -185,7 +185,7 @@ def test_a_profile_that_crosses_itself_or_the_axis(wrong, tmp_path):
     )
     height = np.linspace(-0.1, 0.1, 20)
     csv(tmp_path, np.column_stack([height + 0.02, height]), "radius,height")
-    wrong("not regular", changes=["surface.shape=!Revolved {file: points.csv}"])
+    wrong("radius = -0.08 m", "axis", changes=["surface.shape=!Revolved {file: points.csv}"])
     csv(tmp_path, np.column_stack([0.7 + t / 20, 0 * t, 1.0 + 0 * t]))
     changes = ["surface.shape=!Extruded {file: points.csv, direction: [1, 0, 0]}"]
     wrong("not regular", changes=changes)
