@@ -11,6 +11,7 @@ from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
 from diagrams.scenario import Scenario, Waypoints
+from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
@@ -125,6 +126,9 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     shape = settings.path.shape
     if isinstance(shape, Waypoints):
         shape.file = str((folder / shape.file).resolve())
+    if settings.surface and isinstance(settings.surface.shape, Fitted | Revolved | Extruded):
+        described = settings.surface.shape
+        described.file = str((folder / described.file).resolve())
     for block in (settings.robot, settings.controller):
         if Path(block.model).suffix and not block.model.startswith("package://"):
             block.model = str((folder / block.model).resolve())

@@ -197,7 +197,7 @@ def _measure(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
     metrics.update(friction_metrics(log))
-    metrics.update(shape_metrics(station.task.shape))
+    metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
     metrics.update(posture_metrics(log, lap_length(station)))
@@ -237,9 +237,8 @@ def _report(
     interrupted: bool,
 ) -> Report:
     """Draw figures if wanted, and write the page that a person opens."""
-    pictures = (
-        render_figures(measured.log, prepared.station.task.drawing.outline()) if drawn else []
-    )
+    task = prepared.station.task
+    pictures = render_figures(measured.log, task.drawing.outline(), task.fit) if drawn else []
     page = report_page(
         title=name,
         description=prepared.settings.description,

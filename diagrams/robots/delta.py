@@ -298,6 +298,9 @@ def _check(scenario: Scenario) -> None:
     require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
     keyframes = scenario.path.orientation.keyframes
     require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
+    if scenario.surface is not None:
+        kind = scenario.surface.orientation.kind
+        require(kind == "none", "surface.orientation.kind", kind, turned)
 
 
 def _weld_gripper(

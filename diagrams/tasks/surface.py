@@ -1,27 +1,25 @@
 """The surface of a scenario."""
 
+from pathlib import Path as FilePath
 from typing import Literal, cast
 
 import numpy as np
 
 from diagrams.scenario import SurfaceParameters
-from diagrams.scenario.surface import (
-    Cone,
-    Cylinder,
-    Paraboloid,
-    Plane,
-    Sphere,
-    SurfaceOrientationParameters,
-    SurfaceShape,
-    Torus,
-)
+from diagrams.scenario.surface import NumberShape, SurfaceOrientationParameters, SurfaceShape
+from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
+from diagrams.tasks.surface_files import MadeSurface, surface_from_file
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     quaternion_to_matrix,
     rotation_to_axis,
     zyx_to_quaternion,
     zyz_to_quaternion,
 )
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.shapes import (
     Pair,
@@ -33,20 +31,41 @@ from pfsc_drake.geometry.surfaces.shapes import (
     sphere,
     torus,
 )
+from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
-def make_surface(shape: SurfaceShape) -> Surface:
-    """Return a surface.
+def make_surface(
+    shape: SurfaceShape, law: str, folder: FilePath, progress: Progress | None = None
+) -> MadeSurface:
+    """Return a surface, smooth enough for the law and a single sheet.
 
     Args:
         shape: What the scenario says.
+        law: Key of ``RELATIVE_DEGREE``, r; decides the class C^(r+1) that is needed.
+        folder: Where relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
-        InputError: If the surface cannot be made.
+        InputError: If the surface cannot be made, or is not smooth enough.
     """
+    needed = RELATIVE_DEGREE[law] + 1
+    if isinstance(shape, Fitted | Revolved | Extruded):
+        made = surface_from_file(shape, needed, folder, progress)
+    else:
+        made = MadeSurface(_from_numbers(shape))
+    if made.surface.smoothness < needed:
+        raise InputError(
+            f"smoothness: class C^{made.surface.smoothness:g}, and the law '{law}' needs "
+            f"C^{needed}; write smoothness: 0 for what the law needs"
+        )
+    check_single_sheet(made.surface)
+    return made
+
+
+def _from_numbers(shape: NumberShape) -> Surface:
     rotation = rotation_from_axes(shape.axis, shape.start)
     if isinstance(shape, Plane):
         size = (_pair(shape.first), _pair(shape.second))

@@ -19,7 +19,6 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
-from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 from pfsc_drake.geometry.surfaces.target import SurfaceTarget
 from pfsc_drake.geometry.surfaces.way import way_on_surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -57,10 +56,10 @@ class SurfaceTask(Task):
                 "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
             )
         try:
-            self.surface = make_surface(parameters.shape)
-            check_single_sheet(self.surface)
+            made = make_surface(parameters.shape, law, folder, progress)
         except InputError as error:
             raise InputError(f"surface.shape: {error}") from None
+        self.surface, self.fit = made.surface, made.fit
         self.relative_degree = RELATIVE_DEGREE[law]
         self.place = make_surface_manifold(self.relative_degree, parameters)
         self.manifold = self.place
@@ -119,7 +118,10 @@ class SurfaceTask(Task):
         if start.theta:
             require_numbers("start.theta", start.theta, 2)
             theta = start.theta
-        point = self._evaluator.evaluate_at(theta)
+        try:
+            point = self._evaluator.evaluate_at(theta)
+        except InputError as error:
+            raise InputError(f"start.theta: {error}") from None
         position = point[self.place.layout.position][:3]
         return position + start.offset[0] * self.place.axes(point)[:, 2]
 

@@ -11,6 +11,7 @@ from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.geometry.surfaces.report import SurfaceReport
+from pfsc_drake.geometry.surfaces.residuals import Residuals
 from pfsc_drake.physics.hand_model import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
@@ -50,6 +51,7 @@ class Task(ABC):
         manifold: Manifold that the law makes linear.
         motion: Tangential coordinates of the reference over time, of as many dimensions.
         shape: Numbers of the manifold that decide whether it can be followed.
+        fit: Where the points stand that the manifold was fitted to, if it was.
         warnings: What is out of proportion in it, one sentence each.
     """
 
@@ -57,6 +59,7 @@ class Task(ABC):
     manifold: Manifold
     motion: PiecewisePolynomialCurve
     shape: ShapeReport | SurfaceReport
+    fit: Residuals | None = None
     warnings: list[str]
 
     @property

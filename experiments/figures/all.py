@@ -30,31 +30,41 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from experiments.figures.style import STYLE, Drawing, Figure, render
+from experiments.figures.surface_fit import draw_surface_fit
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.geometry.surfaces.residuals import Residuals
 
 
-def render_figures(log: RunLog, outline: Sequence[FloatArray]) -> list[Figure]:
+def render_figures(
+    log: RunLog, outline: Sequence[FloatArray], fit: Residuals | None = None
+) -> list[Figure]:
     """Returns all figures that the log has signals for, in the order of the report.
 
     Args:
         log: Of a path following run.
         outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
+        fit: Where the points stand that a surface was fitted to, if it was.
     """
     with matplotlib.rc_context(STYLE):
-        return [render(drawing) for drawing in draw_figures(log, outline)]
+        return [render(drawing) for drawing in draw_figures(log, outline, fit)]
 
 
-def draw_figures(log: RunLog, outline: Sequence[FloatArray]) -> Iterator[Drawing]:
+def draw_figures(
+    log: RunLog, outline: Sequence[FloatArray], fit: Residuals | None = None
+) -> Iterator[Drawing]:
     """Draws all figures that the log has signals for, one after the other.
 
     Args:
         log: Of a path following run.
         outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
+        fit: Where the points stand that a surface was fitted to, if it was.
     """
     if log.time.size == 0:
         return
     if "y_t" in log:
         yield draw_path(log, outline)
+    if fit is not None:
+        yield draw_surface_fit(fit)
     for can_draw, draw in _FIGURES:
         if can_draw(log):
             yield draw(log)

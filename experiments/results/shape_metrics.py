@@ -5,13 +5,15 @@ import math
 from experiments.results.metrics import Metrics
 from pfsc_drake.geometry import ShapeReport
 from pfsc_drake.geometry.surfaces.report import SurfaceReport
+from pfsc_drake.geometry.surfaces.residuals import Residuals
 
 
-def shape_metrics(shape: ShapeReport | SurfaceReport) -> Metrics:
+def shape_metrics(shape: ShapeReport | SurfaceReport, fit: Residuals | None = None) -> Metrics:
     """Return the numbers of a path's or a surface's shape that exist, in SI units.
 
     Args:
         shape: From :func:`shape_report` or :func:`surface_report`.
+        fit: Where the points stand that a surface was fitted to, if it was.
     """
     metrics = Metrics()
     if isinstance(shape, SurfaceReport):
@@ -20,6 +22,9 @@ def shape_metrics(shape: ShapeReport | SurfaceReport) -> Metrics:
             radius = getattr(shape, f"radius_{side}")
             if math.isfinite(radius):
                 metrics.add(f"surface_smallest_radius_{side}", radius, "m")
+        if fit is not None:
+            metrics.add("surface_fit_rms", fit.rms, "m")
+            metrics.add("surface_fit_max", fit.largest, "m")
         return metrics
     metrics.add("path_length", shape.length, "m")
     if math.isfinite(shape.smallest_radius):

@@ -37,7 +37,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
         known = [
             *metric_names(station.robot.dimension, signals | other),
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
-            *shape_metrics(station.task.shape),
+            *shape_metrics(station.task.shape, station.task.fit),
             *JointLimits.of(station.robot).metric_names(),
             *posture_metric_names(signals, is_redundant(station), station.task.lap is not None),
             "real_time_factor",

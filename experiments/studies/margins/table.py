@@ -22,7 +22,11 @@ def place_table(analysis: MarginAnalysis) -> Table:
     for number, place in enumerate(analysis.nominal.places):
         instant = place.instant
         box = max((case.places[number].rate for case in analysis.singles), default=place.rate)
-        row = [f"{instant.time:.3f}", f"{instant.eta:.3f}", f"{abs(instant.speed):.2f}"]
+        row = [
+            f"{instant.time:.3f}",
+            " ".join(f"{value:.2f}" for value in instant.eta),
+            f"{abs(instant.speed):.2f}",
+        ]
         row += [_rate(place.rate), f"{place.damping:.2f}"]
         row.append(_rate(box))
         own = margins.get(instant.time)

@@ -24,13 +24,13 @@ class Instant:
 
     Attributes:
         time: [s].
-        eta: Where on the path the reference is [m].
-        speed: Its speed [m/s].
+        eta: Where the reference is [m], one coordinate of a path, two of a surface.
+        speed: Its speed [m/s], on a path with its sign.
         section: Context right after the tick.
     """
 
     time: float
-    eta: float
+    eta: tuple[float, ...]
     speed: float
     section: Context
 
@@ -38,7 +38,8 @@ class Instant:
     def place(self) -> str:
         """In words."""
         motion = f"at {abs(self.speed):.2g} m/s" if self.speed else "at rest"
-        return f"{motion}, eta = {self.eta:.3g} m"
+        eta = ", ".join(f"{value:.3g}" for value in self.eta)
+        return f"{motion}, eta = {eta if len(self.eta) == 1 else f'({eta})'} m"
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,14 @@ def walk(
     return Walk(instants, False)
 
 
-def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, float, float]]:
+def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, tuple[float, ...], float]]:
     """Return ticks with place [m] and speed [m/s] of the reference."""
     motion, period = station.task.motion, station.controller.period
     last = max(int(duration / period + 1e-6) - 1, 1)
     times = np.linspace(period, last * period, _SAMPLES)
     inside = np.clip(times, *motion.domain)
-    eta, speed = motion.derivatives(inside, 1)[:, :, 0].T
+    eta, velocity = np.moveaxis(motion.derivatives(inside, 1), 1, 0)
+    speed = velocity[:, 0] if motion.dimension == 1 else np.linalg.norm(velocity, axis=1)
     speed = np.where(times > motion.domain[1], 0.0, speed)
     fastest = np.max(np.abs(speed))
     moving = np.abs(speed) > _SLOW * fastest if fastest > 0.0 else np.zeros(_SAMPLES, dtype=bool)
@@ -111,5 +113,6 @@ def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, float, f
     result = {}
     for sample in sorted(chosen):
         tick = min(max(round(times[sample] / period), 1), last)
-        result[tick] = (tick, float(eta[sample]), float(speed[sample] if moving[sample] else 0.0))
+        place = tuple(eta[sample].tolist())
+        result[tick] = (tick, place, float(speed[sample] if moving[sample] else 0.0))
     return list(result.values())

@@ -199,7 +199,8 @@ def _intervals(delay: int) -> str:
 
 def _instant_data(item: Any) -> dict[str, Any]:
     instant = item.instant
-    return {"t": instant.time, "eta": instant.eta, "speed": instant.speed}
+    eta = instant.eta[0] if len(instant.eta) == 1 else list(instant.eta)
+    return {"t": instant.time, "eta": eta, "speed": instant.speed}
 
 
 def _case_data(case: Case) -> dict[str, Any]:

@@ -82,10 +82,29 @@ def _suspects(grid: SampleGrid, strides: list[int]) -> tuple[np.ndarray, np.ndar
     )
     far = (apart.max(axis=0) > _NEIGHBOURS) & (one < other)
     one, other = one[far], other[far]
-    ratio = np.linalg.norm(points[one] - points[other], axis=1) / size[one]
+    # Neighbours are as far apart on the surface as in space, and would crowd out what meets.
+    way = _ways(position, grid.closed, one, other)
+    ratio = np.linalg.norm(points[one] - points[other], axis=1) / way
     nearest = np.argsort(ratio, kind="stable")[:_MOST_PAIRS]
     flat = theta.reshape(-1, 2)
     return flat[one[nearest]], flat[other[nearest]], 1.0 / shape
+
+
+def _ways(
+    position: np.ndarray, closed: tuple[bool, bool], one: np.ndarray, other: np.ndarray
+) -> np.ndarray:
+    """Lengths of ways on the surface between samples, first along theta_1, [n]."""
+    shape = position.shape[:2]
+    begin, end = np.unravel_index(one, shape), np.unravel_index(other, shape)
+    corner = (end[0], begin[1])
+    total = np.zeros(len(one))
+    for axis, (here, there) in enumerate(((begin, corner), (corner, end))):
+        steps = np.linalg.norm(np.roll(position, -1, axis=axis) - position, axis=-1)
+        lap = steps.sum(axis=axis)[here[1 - axis]]
+        sums = np.cumsum(steps, axis=axis) - steps
+        length = np.abs(sums[here] - sums[there])
+        total += np.minimum(length, lap - length) if closed[axis] else length
+    return total
 
 
 def _cell_sizes(position: np.ndarray, closed: tuple[bool, bool]) -> np.ndarray:

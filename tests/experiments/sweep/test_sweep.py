@@ -152,3 +152,14 @@ def test_without_the_extra(tmp_path, capfd, monkeypatch):
 def test_a_value_that_is_wrong_in_some_samples_is_the_business_of_their_rows():
     sweep = define_sweep("pfc_elastic_3r", ["reference.velocity=-1,1"])
     assert len(sweep.tasks) == 2
+
+
+def test_surfaces_that_differ(address, tmp_path):
+    out = tmp_path / "out"
+    vary = ("surface.shape.coefficient=1.4,1.667",)
+    sweep = define_sweep("sfc_viscoelastic_3r", vary, duration=0.05, samples=None, seed=0)
+    run_sweep(sweep, out, Console(file=io.StringIO()), scheduler=address)
+    flat, deep = rows_of(out)
+    assert flat["status"] == deep["status"] == "completed"
+    # of z = c (x^2 + y^2) over a square
+    assert 0.0 < float(flat["surface_area"]) < float(deep["surface_area"])

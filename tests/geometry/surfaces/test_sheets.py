@@ -32,15 +32,23 @@ def _spiral(turns, pitch):
     return extruded_surface(interpolate(points, smoothness=3), (0.0, 0.0, 1.0), 0.2)
 
 
+def _loop():
+    """A cubic that crosses itself at t = -1 and 1, its points in dense and in wide steps."""
+    t = np.linspace(-2.0, 2.0, 40)
+    points = 0.1 * np.stack([t**3 - t, 0.0 * t, t**2], axis=1)
+    return extruded_surface(interpolate(points, smoothness=4), (0.0, 1.0, 0.0), 0.2)
+
+
 @pytest.mark.parametrize(
     "surface",
     [
+        _loop(),
         extruded_surface(EIGHT, (0.0, 0.0, 1.0), 0.3),
         extruded_surface(EIGHT, (0.1, 0.2, 1.0), 0.05),
         surface_of_revolution(EIGHT_BESIDE),
         _spiral(1.5, 0.0),
     ],
-    ids=["eight", "slanted eight", "ring of eights", "covered twice"],
+    ids=["loop", "eight", "slanted eight", "ring of eights", "covered twice"],
 )
 def test_surfaces_that_meet_themselves(surface):
     with pytest.raises(InputError, match=r"meets itself at theta = \[.*\] and \[.*\]"):

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
@@ -170,3 +171,23 @@ def test_the_box():
 def test_refused_boxes(wrong):
     with pytest.raises(InputError, match="--"):
         Box(**wrong)
+
+
+def test_margins_along_a_surface():
+    """Places have both coordinates, and a joint at 2 rad/s is no fault."""
+    analysis = analysis_of(
+        "sfc_elastic_6r", "reference.places=[[0, 0], [-0.15, 0.2]]", only_start=False
+    )
+    assert analysis.nominal.is_stable
+    assert analysis.tightest.smallest > 0.1
+    instants = [place.instant for place in analysis.nominal.places]
+    eta = np.array([instant.eta for instant in instants])
+    np.testing.assert_allclose(eta[0], 0.0, atol=1e-4)
+    np.testing.assert_allclose(eta[-1], [-0.15, 0.2], atol=1e-4)
+    # along a straight line, at a speed that is that of both
+    np.testing.assert_allclose(eta @ [0.2, 0.15], 0.0, atol=1e-9)
+    speeds = [instant.speed for instant in instants]
+    assert speeds[0] == speeds[-1] == 0.0
+    assert 0.5 < max(speeds) <= 1.0
+    assert "eta = (-0.15, 0.2) m" in instants[-1].place
+    assert all(place.modes is not None for place in analysis.nominal.places)

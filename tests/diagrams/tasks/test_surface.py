@@ -1,0 +1,202 @@
+"""Surfaces as scenarios give them, against their closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from diagrams.scenario import SurfaceParameters
+from diagrams.scenario.surface import SurfaceOrientationParameters
+from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
+from diagrams.tasks.surface import given_quaternion, make_surface, make_surface_manifold
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import quaternion_to_matrix
+from tests.experiments import scanned_panel as panel
+
+# x of the surface's axes leans to y of the world, z points along x
+PLACED = {"origin": [0.5, -0.2, 1.0], "axis": [2.0, 0.0, 0.0], "start": [0.3, 1.0, 0.0]}
+AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def make(shape, law="rigid", folder=Path(), progress=None):
+    return make_surface(shape, law, folder, progress).surface
+
+
+def local(surface, theta):
+    """Return points of a surface in the axes of PLACED, shape (n, 3)."""
+    return (surface.partials(np.asarray(theta), 0)[..., 0, :] - PLACED["origin"]) @ AXES
+
+
+def places(surface, count=7):
+    ends = [np.linspace(*side, count) for side in surface.domain]
+    return np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def circle(angle, height, radius):
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+
+
+def csv(folder, header, rows, name="points.csv"):
+    lines = [",".join(f"{value:.12g}" for value in row) for row in rows]
+    (folder / name).write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+    return name
+
+
+@pytest.mark.parametrize(
+    ("shape", "closed_form"),
+    [
+        (Plane(**PLACED), lambda a, b: np.stack([a, b, 0 * a], -1)),
+        (Paraboloid(**PLACED), lambda a, b: np.stack([a, b, a**2 + b**2], -1)),
+        (Cylinder(**PLACED), lambda a, b: circle(a, b, 0.1)),
+        (Cone(**PLACED), lambda a, b: circle(a, np.sqrt(0.75) * b, 0.5 * b)),
+        (Sphere(**PLACED), lambda a, b: circle(a, 0.2 * np.sin(b), 0.2 * np.cos(b))),
+        (Torus(**PLACED), lambda a, b: circle(a, 0.1 * np.sin(b), 0.3 + 0.1 * np.cos(b))),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_shapes_stand_where_they_are_placed(shape, closed_form):
+    surface = make(shape)
+    theta = places(surface)
+    np.testing.assert_allclose(local(surface, theta), closed_form(*theta.T), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [Cylinder, Cone, Sphere, Torus])
+def test_inward_turns_the_normal_and_a_part_is_open(shape):
+    surface = make(shape(angles_deg=[30.0, 90.0], inward=True))
+    assert surface.domain[0] == pytest.approx([np.pi / 6, np.pi / 2])
+    assert not surface.closed[0]
+    place = [np.mean(surface.domain[0]), surface.domain[1].begin + 0.01]
+    position, first, second = surface.partials(np.array(place), 1)
+    away = position * [1.0, 1.0, 0.0]
+    assert np.cross(first, second) @ away < 0.0
+
+
+def test_a_profile_that_turns(tmp_path):
+    """A parabola r = 0.1 + h^2 is a polynomial, which splines reproduce."""
+    h = np.linspace(-0.2, 0.3, 12)
+    name = csv(tmp_path, "height,radius", np.column_stack([h, 0.1 + h**2]))
+    surface = make(Revolved(file=name, **PLACED), "elastic", tmp_path)
+    assert surface.closed == (True, False)
+    assert surface.smoothness == 5
+    points = local(surface, places(surface))
+    radius = np.hypot(points[:, 0], points[:, 1])
+    np.testing.assert_allclose(radius, 0.1 + points[:, 2] ** 2, atol=2e-6)
+    ring = np.column_stack([0.3 + 0.1 * np.cos(a := np.arange(24) * np.pi / 12), 0.1 * np.sin(a)])
+    name = csv(tmp_path, "radius,height", ring)
+    torus = make(Revolved(file=name, closed=True), "rigid", tmp_path)
+    assert torus.closed == (True, True)
+    points = torus.partials(places(torus), 0)[:, 0]
+    tube = np.hypot(np.hypot(points[:, 0], points[:, 1]) - 0.3, points[:, 2])
+    np.testing.assert_allclose(tube, 0.1, atol=1e-5)
+
+
+def test_a_profile_that_is_moved(tmp_path):
+    x = np.linspace(-0.2, 0.2, 15)
+    name = csv(tmp_path, "x,y,z", np.column_stack([x, 0 * x, 0.5 * x**2]))
+    shape = Extruded(file=name, direction=[0.0, 2.0, 0.0], length=0.4, **PLACED)
+    surface = make(shape, "elastic", tmp_path)
+    assert surface.domain[1] == pytest.approx([0.0, 0.4])
+    theta = places(surface)
+    points = local(surface, theta)
+    np.testing.assert_allclose(points[:, 1], theta[:, 1], atol=1e-12)
+    np.testing.assert_allclose(points[:, 2], 0.5 * points[:, 0] ** 2, atol=1e-7)
+
+
+@pytest.mark.parametrize("law", RELATIVE_DEGREE)
+def test_scattered_points_are_placed_and_as_smooth_as_the_law_needs(tmp_path, law):
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-0.1, 0.1, (2, 400))
+    rows = 1e3 * np.column_stack([x, y, x**2 - y**2])
+    name = csv(tmp_path, "x,y,z", rows)
+    said = []
+    shape = Fitted(file=name, unit="mm", along=[0.0, 1.0, 0.0], seen_from=[9.0, 0, 0], **PLACED)
+    made = make_surface(shape, law, tmp_path, lambda fraction, phase: said.append(phase))
+    assert made.surface.smoothness == max(2, RELATIVE_DEGREE[law] + 1)
+    assert any("400 points" in phase for phase in said)
+    points = local(made.surface, places(made.surface, 20))
+    np.testing.assert_allclose(points[:, 2], points[:, 0] ** 2 - points[:, 1] ** 2, atol=1e-4)
+    assert made.fit.rms < 1e-6
+    _, first, second = made.surface.partials(np.zeros(2), 1)
+    assert first @ [0.0, 1.0, 0.0] > 0.95
+    assert np.cross(first, second) @ [1.0, 0.0, 0.0] > 0.0
+
+
+@pytest.mark.parametrize("more", [{"interpolate": True}, {}, {"tolerance": 5e-4}])
+def test_grids_of_points(tmp_path, more):
+    a, h = np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0.0, 0.3, 12), indexing="ij")
+    points = circle(a, h, 0.1 + 0.1 * h).reshape(-1, 3)
+    noise = 0.0 if "interpolate" in more else 1e-4
+    points += noise * np.random.default_rng(1).normal(size=points.shape)
+    shape = Fitted(file=csv(tmp_path, "x,y,z", points), grid=[24, 12], closed=[True, False], **more)
+    made = make_surface(shape, "elastic", tmp_path)
+    assert made.surface.closed == (True, False)
+    assert made.surface.smoothness == 5
+    found = made.surface.partials(places(made.surface, 20), 0)[:, 0]
+    off = np.hypot(found[:, 0], found[:, 1]) - 0.1 - 0.1 * found[:, 2]
+    assert np.sqrt(np.mean(off**2)) < (1e-6 if not noise else 1e-4)
+    assert (made.fit is None) == (not noise)
+    if "tolerance" in more:
+        assert made.fit.largest <= 5e-4
+
+
+def test_the_shipped_scan_is_that_of_its_formula():
+    shipped = Path(__file__).parents[3] / "experiments/scenarios/surfaces/scanned_panel.csv"
+    assert shipped.read_text(encoding="utf-8") == panel.csv_text()
+    scanned = panel.distance(panel.scan() + panel.ORIGIN)
+    assert np.std(scanned) == pytest.approx(panel.NOISE, rel=0.05)
+
+
+def test_a_cylinder_that_points_are_heights_over(tmp_path):
+    rng = np.random.default_rng(2)
+    a, h = rng.uniform(0.0, 2.0 * np.pi, 900), rng.uniform(0.0, 0.3, 900)
+    centre = np.array([0.1, 0.0, 0.0])
+    name = csv(tmp_path, "x,y,z", circle(a, h, np.full(900, 0.1)) + centre)
+    for more in ({}, {"base_axis": [0.0, 0.0, 1.0], "base_point": centre.tolist()}):
+        shape = Fitted(file=name, base="cylinder", **more)
+        surface = make(shape, "rigid", tmp_path)
+        assert surface.closed == (True, False)
+        points = surface.partials(places(surface), 0)[:, 0] - centre
+        np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1]), 0.1, atol=1e-5)
+
+
+def test_what_is_not_smooth_enough_is_refused_with_what_to_write(tmp_path):
+    h = np.linspace(0.0, 0.3, 12)
+    name = csv(tmp_path, "radius,height", np.column_stack([0.1 + 0.1 * h, h]))
+    make(Revolved(file=name, smoothness=3), "rigid", tmp_path)
+    with pytest.raises(InputError) as caught:
+        make(Revolved(file=name, smoothness=3), "elastic", tmp_path)
+    for part in ("C^3", "C^5", "'elastic'", "smoothness: 0"):
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(("convention", "axes"), [("zyx", "ZYX"), ("zyz", "ZYZ")])
+def test_orientations(convention, axes):
+    angles = [20.0, 130.0, -40.0]
+    expected = Rotation.from_euler(axes, angles, degrees=True).as_matrix()
+    said = SurfaceOrientationParameters("given", convention, angles)
+    np.testing.assert_allclose(quaternion_to_matrix(given_quaternion(said)), expected, atol=1e-14)
+    manifold = make_surface_manifold(2, SurfaceParameters(Plane(), said))
+    assert manifold.is_oriented
+    said = SurfaceOrientationParameters("normal", convention, angles)
+    assert given_quaternion(said) is None
+    assert make_surface_manifold(2, SurfaceParameters(Plane(), said)).is_oriented
+
+
+def test_kinds_of_orientation_have_as_many_coordinates():
+    counts = {}
+    for kind in ("none", "given", "normal"):
+        for task in ("full", "tool_axis"):
+            said = SurfaceOrientationParameters(kind, task=task)
+            manifold = make_surface_manifold(2, SurfaceParameters(Plane(), said))
+            counts[kind, task] = len(manifold.coordinates)
+    assert counts == {
+        ("none", "full"): 3,
+        ("none", "tool_axis"): 3,
+        ("given", "full"): 6,
+        ("given", "tool_axis"): 5,
+        ("normal", "full"): 6,
+        ("normal", "tool_axis"): 5,
+    }
