@@ -1,0 +1,59 @@
+"""A force with which a tool is to press on a surface, over time."""
+
+from dataclasses import dataclass
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_profile import smooth_step
+
+
+@dataclass
+class PressParameters:
+    """Force reference of the transversal coordinate, in place of a place.
+
+    With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
+    ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
+    workpiece with little, to be slow without much damping, which would turn a slope of the
+    workpiece into a force; then with all of it; in the end the other way, off the workpiece.
+
+    Attributes:
+        force: With which it presses against the normal [N].
+        approach: The same until ``contact`` [N].
+        retreat: With which it is taken off along the normal [N].
+        begin: When it sets off [s].
+        contact: By when it surely touches the workpiece, and the full force begins [s].
+        retreat_time: How long before the end of the reference it is taken off [s].
+        ramp: Time of every change, which is C^2 [s].
+    """
+
+    force: float = 20.0
+    approach: float = 6.0
+    retreat: float = 6.0
+    begin: float = 0.1
+    contact: float = 1.0
+    retreat_time: float = 0.5
+    ramp: float = 0.1
+
+    def __post_init__(self) -> None:
+        for key in ("force", "approach", "retreat", "begin", "retreat_time"):
+            self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
+        self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
+        latest = self.begin + self.ramp
+        self._require("contact", latest <= self.contact <= 1e6, f"{latest:g} s or later")
+
+    def _require(self, key: str, good: bool, allowed: str) -> None:
+        if not good:
+            raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
+
+    def at(self, time: float, end: float) -> float:
+        """Return the force along the inward normal that the workpiece is to bear [N].
+
+        Args:
+            time: [s].
+            end: When the reference ends [s].
+        """
+        off = end - self.retreat_time
+        return (
+            self.approach * smooth_step((time - self.begin) / self.ramp)
+            + (self.force - self.approach) * smooth_step((time - self.contact) / self.ramp)
+            - (self.force + self.retreat) * smooth_step((time - off) / self.ramp)
+        )
