@@ -120,7 +120,7 @@ def _add_press(
             "transversal coordinate"
         )
     system = builder.AddNamedSystem(
-        "pressing", Pressing(lambda time: press.at(time, end), across.start, len(coordinates))
+        "pressing", Pressing(press.over_time(end), across.start, len(coordinates))
     )
     builder.Connect(force, system.GetInputPort("manifold_force"))
     return {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}

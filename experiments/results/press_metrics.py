@@ -63,6 +63,8 @@ def touch_down_overshoot(log: RunLog) -> float:
         1; NaN if the tool never touches.
     """
     press, held = log["press"].values[:, 0], held_samples(log)
+    if math.isnan(touch_down(log)):
+        return math.nan
     until = log.time[int(np.argmax(held))] if held.any() else math.inf
     counted = (log.time >= touch_down(log)) & (log.time < until) & (press >= _SMALL * press.max())
     return max(0.0, _max((force_error(log) / np.where(counted, press, 1.0))[counted]))

@@ -1,9 +1,10 @@
 """A force with which a tool is to press on a surface, over time."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from pfsc_drake.control.law.transition import Transition
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_profile import smooth_step
 
 
 @dataclass
@@ -22,7 +23,7 @@ class PressParameters:
         begin: When it sets off [s].
         contact: By when it surely touches the workpiece, and the full force begins [s].
         retreat_time: How long before the end of the reference it is taken off [s].
-        ramp: Time of every change, which is C^2 [s].
+        ramp: Time of every change, which is C^4 [s].
     """
 
     force: float = 20.0
@@ -44,16 +45,18 @@ class PressParameters:
         if not good:
             raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
 
-    def at(self, time: float, end: float) -> float:
-        """Return the force along the inward normal that the workpiece is to bear [N].
+    def over_time(self, end: float) -> Callable[[float], float]:
+        """Return the force along the inward normal that the workpiece is to bear, [s] -> [N].
 
         Args:
-            time: [s].
             end: When the reference ends [s].
         """
-        off = end - self.retreat_time
-        return (
-            self.approach * smooth_step((time - self.begin) / self.ramp)
-            + (self.force - self.approach) * smooth_step((time - self.contact) / self.ramp)
-            - (self.force + self.retreat) * smooth_step((time - off) / self.ramp)
+        rest = Transition(self.ramp, 0)
+        changes = [
+            (self.begin, self.approach),
+            (self.contact, self.force - self.approach),
+            (end - self.retreat_time, -self.force - self.retreat),
+        ]
+        return lambda time: sum(
+            size * float(1.0 - rest.at(time - begin)[0]) for begin, size in changes
         )
