@@ -8,7 +8,6 @@ from experiments.figures.style import (
     BROAD,
     COLOURS,
     REFERENCE,
-    WIDTH,
     Drawing,
     make_panels,
     place_legend,
@@ -17,7 +16,7 @@ from experiments.results.press_metrics import TOUCHING, force_error, held_sample
 from experiments.results.run_log import RunLog
 
 BAND = 2.0  # N, to either side of the reference
-_HEIGHT = 4.6  # inches
+_SIZE = (7.0, 4.6)  # inches
 _DOT = 7.0  # points^2
 
 
@@ -52,7 +51,7 @@ def draw_force_map(log: RunLog) -> Drawing:
     force = log["normal_force"].values[:, 0]
     on = force > TOUCHING
     along, across = 1e3 * log["eta"].values[on].T
-    canvas = Canvas(figsize=(WIDTH, _HEIGHT))
+    canvas = Canvas(figsize=_SIZE)
     panel = canvas.subplots()
     dots = panel.scatter(along, across, c=force[on], s=_DOT, cmap="viridis", linewidths=0.0)
     if "press" in log:
