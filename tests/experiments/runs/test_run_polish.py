@@ -49,3 +49,13 @@ def test_it_stands_as_far_off_the_taught_surface_as_the_workpiece(log):
     up = 0.002 + np.deg2rad(1.0) * 0.08 / np.cos(np.arctan(2.0 * np.linalg.norm(theta)))
     depth = np.sqrt(FORCE / (np.pi * 4e6))  # of a ball in a plane, pressure over depth
     assert log["xi"][-1, 0] == pytest.approx(up - depth, abs=4e-4)
+
+
+def test_position_control_presses_harder_and_takes_no_notice(tmp_path):
+    bare = ("--no-figures", "--no-recording", "--duration", "0.8")
+    assert main(["run", "sfc_polish_stiff", "--out", str(tmp_path), *bare]) == 0
+    metrics = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["peak_force"]["value"] > 4.0 * FORCE
+    assert "max_force_error" not in metrics
+    with h5py.File(tmp_path / "log.h5") as file:
+        assert abs(file["xi"][-1, 0]) < 1e-4
