@@ -149,6 +149,8 @@ def _start(
     if workpiece is not None:
         shift = workpiece.start_shift(part.gravity)
     start = task.start(shift)
+    if workpiece is not None:
+        workpiece.check_start(start.target.y_t)
     q_J = part.posture(start.target, scenario.start)
     for position, where in task.way():
         part.check_reach(position, where)

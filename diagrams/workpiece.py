@@ -105,6 +105,16 @@ class Workpiece(ABC):
             gravity: See :meth:`start_shift`.
         """
 
+    def check_start(self, y_t: np.ndarray) -> None:
+        """Refuse a start inside of the workpiece.
+
+        Args:
+            y_t: Tool point at the start [m], shape (3,).
+
+        Raises:
+            InputError: If it is.
+        """
+
     def normal(self, axes: np.ndarray) -> np.ndarray | None:
         """Return the direction in which it presses at the tool, shape (3,), if there is one.
 

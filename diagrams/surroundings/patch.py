@@ -12,6 +12,8 @@ from diagrams.workpiece import FurtherLength, Workpiece, WorkpieceLook
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.frame import surface_axes
 from pfsc_drake.geometry.surfaces.mesh import surface_mesh
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.robot.delta.shapes import ACCENT
@@ -42,6 +44,7 @@ class PressedWorkpiece(Workpiece):
         self._surface, self.parameters = surface, parameters
         self._p_TC = parameters.ball.radius * manifold.offset[2]
         self._R = zyx_to_matrix(np.deg2rad(parameters.turn_zyx_deg))
+        self._middle = surface.partials([sum(ends) / 2.0 for ends in surface.domain], 0)[0]
 
     @property
     def time_step(self) -> float:
@@ -67,9 +70,20 @@ class PressedWorkpiece(Workpiece):
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
         """Return vertices [m] and triangles of the workpiece where it stands, world axes."""
         vertices, triangles = surface_mesh(self._surface, self.parameters.spacing)
-        middle = [sum(ends) / 2.0 for ends in self._surface.domain]
-        about = self._surface.partials(middle, 0)[0]
-        return (vertices - about) @ self._R.T + about + self.parameters.shift, triangles
+        moved = (vertices - self._middle) @ self._R.T + self._middle + self.parameters.shift
+        return moved, triangles
+
+    def check_start(self, y_t: np.ndarray) -> None:
+        """See :class:`Workpiece`; the ball reaches to the tool point."""
+        taught = (y_t - self.parameters.shift - self._middle) @ self._R + self._middle
+        theta = SurfaceEvaluator(self._surface, 1).project_globally(taught).theta
+        sigma, first, second = self._surface.partials(self._surface.wrap(theta), 1)
+        height = float(surface_axes(first, second)[:, 2] @ (taught - sigma))
+        if height < 0.0:
+            raise InputError(
+                f"start: the tool point is {-1e3 * height:.3g} mm inside of the workpiece; "
+                "start.offset[0] must be larger, along the normal"
+            )
 
     def start_shift(self, gravity: np.ndarray) -> np.ndarray:
         """Return zero: how far from the surface it starts is the scenario's to say."""

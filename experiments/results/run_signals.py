@@ -13,6 +13,7 @@ from experiments.results.link_signals import (
 )
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
+from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -65,7 +66,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_orientation(log, station, raw["manifold_point"], points, pose)
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
-    _add_pressing(log, station, raw, points)
+    add_pressing(log, station, raw, points)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -80,7 +81,7 @@ def optional_signals(station: Station) -> set[str]:
         station: The station, simulated or not.
     """
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
-    if _is_pressed(station):
+    if is_pressed(station):
         names.add("normal_force")
     if "desired_reference" in names:
         names.add("xi_d")
@@ -260,26 +261,6 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         for kind, part, names in _kinds(station):
             labels = [name.replace(kind.value, f"{kind.value}_d", 1) for name in names]
             log.add(f"{kind.value}_d", desired[:, part], kind.unit, labels)
-
-
-def _add_pressing(
-    log: RunLog, station: Station, raw: dict[str, np.ndarray], points: np.ndarray
-) -> None:
-    """Add the force with which a workpiece presses along its normal, and what it is to be."""
-    if "press" in raw:
-        log.add("press", raw["press"], "N", ["press"])
-    if _is_pressed(station):
-        workpiece, axes = station.workpiece, station.task.place.axes
-        assert workpiece is not None
-        normals = np.array([workpiece.normal(axes(point)) for point in points]).reshape(-1, 3)
-        force = np.sum(raw["wrench_ext"][:, :3] * normals, axis=1, keepdims=True)
-        log.add("normal_force", force, "N", ["f_n"])
-
-
-def _is_pressed(station: Station) -> bool:
-    """Return whether a workpiece has a normal to press along."""
-    workpiece = station.workpiece
-    return workpiece is not None and workpiece.normal(np.eye(3)) is not None
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:

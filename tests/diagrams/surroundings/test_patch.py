@@ -71,6 +71,8 @@ def test_the_ball_touches_where_the_tool_point_is_on_the_workpiece(station):
         ("workpiece.turn_zyx_deg=[0, 60, 0]", ["turn_zyx_deg", "45"]),
         ("workpiece.time_step=7e-4", ["workpiece.time_step", "whole fraction"]),
         ("workpiece.spacing=0", ["'workpiece': spacing"]),
+        ("start.offset=[0.001, 0]", ["start", "mm inside of the workpiece", "start.offset[0]"]),
+        ("start.offset=[-0.01, 0]", ["start", "mm inside of the workpiece"]),
         ("notch={}", ["notch", "null where there is a workpiece"]),
         ("surface.orientation={kind: given}", ["surface.orientation.kind", "normal"]),
         ("compliance.transversal.stiffness.value=100", ["press", "stiffness.value is 0"]),
@@ -82,3 +84,11 @@ def test_refused(change, parts):
         build_station(load(change), SCENARIO_DIRECTORY)
     for part in parts:
         assert part in str(caught.value)
+
+
+def test_what_a_start_is_inside_of_is_the_workpiece_where_it_stands(station):
+    vertices, _ = station.workpiece.mesh()
+    vertex, normal = vertices[len(vertices) // 3], station.workpiece.normal(np.eye(3))
+    station.workpiece.check_start(vertex + 1e-5 * normal)
+    with pytest.raises(InputError, match="inside of the workpiece"):
+        station.workpiece.check_start(vertex - 1e-5 * normal)
