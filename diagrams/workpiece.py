@@ -105,6 +105,7 @@ class Workpiece(ABC):
             gravity: See :meth:`start_shift`.
         """
 
+    @abstractmethod
     def check_start(self, y_t: np.ndarray) -> None:
         """Refuse a start inside of the workpiece.
 

@@ -60,6 +60,9 @@ class NotchedWorkpiece(Workpiece):
         up = upwards(gravity, "notch")
         return np.array(self.parameters.displacement) + self.parameters.clearance * up
 
+    def check_start(self, y_t: np.ndarray) -> None:
+        """See :class:`Workpiece`; :meth:`start_shift` leads out of it."""
+
     def lengths(
         self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
