@@ -26,6 +26,7 @@ from experiments.results.link_signals import lap_length
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.posture_metrics import posture_metrics
+from experiments.results.press_metrics import press_metrics
 from experiments.results.provenance import standard_attributes
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, collect_motion
@@ -196,6 +197,7 @@ def _measure(
     metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.update(press_metrics(log))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)

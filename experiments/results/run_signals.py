@@ -13,6 +13,7 @@ from experiments.results.link_signals import (
 )
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
+from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -65,6 +66,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_orientation(log, station, raw["manifold_point"], points, pose)
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
+    add_pressing(log, station, raw, points)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -79,6 +81,8 @@ def optional_signals(station: Station) -> set[str]:
         station: The station, simulated or not.
     """
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
+    if is_pressed(station):
+        names.add("normal_force")
     if "desired_reference" in names:
         names.add("xi_d")
     if "friction_torque" in names:
