@@ -3,14 +3,8 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.replay import RecordedMotion, RecordedPushes
 from diagrams.station import Station
-from experiments.results.link_signals import (
-    add_link_signals,
-    elbow_motion,
-    has_elbow,
-    push_forces,
-)
+from experiments.results.link_signals import add_link_signals
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.press_signals import add_pressing, is_pressed
@@ -116,36 +110,6 @@ def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
     if len(q_J) == 0:
         return np.zeros((0, 12))
     return np.array(pose_function(station.robot).map(len(q_J))(q_J.T)).T
-
-
-def collect_motion(station: Station, root: Context, period: float) -> RecordedMotion:
-    """Return the motion of a run at the frames of a recording, as far as it is finite.
-
-    Args:
-        station: The station that was simulated.
-        root: Its context at the end.
-        period: Time between frames [s].
-    """
-    times, raw = station.log.read(root)
-    finite = np.isfinite(np.hstack([raw["manifold_point"], raw["joint_state"]])).all(axis=1)
-    usable = np.flatnonzero(finite)
-    stride = max(1, round(period / station.controller.period))
-    frames = usable[::stride]
-    state = raw["joint_state"][frames]
-    states = [station.part.coordinates.plant_state(x) for x in state]
-    half = station.part.coordinates.num_states // 2
-    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
-    pushes = None
-    if "push_wrench" in raw:
-        pushes = RecordedPushes(raw["push_point"][frames], push_forces(raw)[frames])
-    return RecordedMotion(
-        times[frames],
-        positions,
-        _tool_poses(station, state),
-        raw["manifold_point"][frames],
-        elbow_motion(station, state) if has_elbow(station) else None,
-        pushes,
-    )
 
 
 def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
