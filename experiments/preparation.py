@@ -10,7 +10,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
-from diagrams.scenario import Scenario, Waypoints
+from diagrams.scenario import OnSurface, Scenario, Waypoints
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
@@ -123,7 +123,7 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     for name, package in settings.robot.packages.items():
         settings.robot.packages[name] = str((folder / package).resolve())
     shape = settings.path.shape
-    if isinstance(shape, Waypoints):
+    if isinstance(shape, Waypoints) or (isinstance(shape, OnSurface) and shape.file):
         shape.file = str((folder / shape.file).resolve())
     for block in (settings.robot, settings.controller):
         if Path(block.model).suffix and not block.model.startswith("package://"):

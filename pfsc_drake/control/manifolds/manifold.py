@@ -141,10 +141,6 @@ class PlaceManifold(Manifold, Protocol):
     """A manifold that the tool is projected onto, in whose coordinates its place is told."""
 
     @property
-    def tool_axis(self) -> np.ndarray | None:
-        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
-
-    @property
     def layout(self) -> PlaceLayout:
         """Layout of the manifold's point."""
 
