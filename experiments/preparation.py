@@ -10,7 +10,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
-from diagrams.scenario import Scenario, Waypoints
+from diagrams.scenario import OnSurface, Scenario, Waypoints
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
@@ -124,7 +124,7 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     for name, package in settings.robot.packages.items():
         settings.robot.packages[name] = str((folder / package).resolve())
     shape = settings.path.shape
-    if isinstance(shape, Waypoints):
+    if isinstance(shape, Waypoints) or (isinstance(shape, OnSurface) and shape.file):
         shape.file = str((folder / shape.file).resolve())
     if settings.surface and isinstance(settings.surface.shape, Fitted | Revolved | Extruded):
         described = settings.surface.shape

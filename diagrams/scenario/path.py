@@ -124,8 +124,38 @@ class Waypoints:
         require(good, "tolerance_deg", self.tolerance_deg, "0.001 deg to 90 deg")
 
 
+@dc.dataclass
+class OnSurface:
+    """A path on the scenario's ``surface``, whose transversal coordinates are normal and sideways.
+
+    Its orientation is ``surface.orientation``. It is a spline through waypoints, given either by
+    the surface's parameters or by points in space.
+
+    Attributes:
+        thetas: Waypoints ``[theta_1, theta_2]``; two are joined by a straight line in the
+            parameters. Closed directions of the surface may be led round and round.
+        file: CSV file with columns ``x, y, z`` [m] instead, relative to the scenario's folder;
+            the path is where the surface is nearest to them.
+        max_distance: Largest distance of these points from the surface [m].
+        closed: Whether the path is closed.
+    """
+
+    thetas: list[list[float]] = dc.field(default_factory=list)
+    file: str = ""
+    max_distance: float = 1e-3
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        for i, theta in enumerate(self.thetas):
+            require_numbers(f"thetas[{i}]", theta, 2)
+        good = 0.0 < self.max_distance <= FARTHEST
+        require(good, "max_distance", self.max_distance, f"a positive number up to {FARTHEST:g} m")
+
+
 # the first is what a shape without a tag means
-PathShape = Union[Waypoints, BentLemniscate, Circle, Line]  # noqa: UP007 (Drake's YAML needs it)
+PathShape = Union[  # noqa: UP007 (Drake's YAML needs it)
+    Waypoints, BentLemniscate, Circle, Line, OnSurface
+]
 
 
 @dc.dataclass
@@ -183,7 +213,8 @@ class PathParameters:
     """The path.
 
     Attributes:
-        shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``.
+        shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``,
+            ``!OnSurface``.
         orientation: Orientation; without keyframes the waypoint file's, or none.
     """
 

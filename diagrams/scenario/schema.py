@@ -53,7 +53,7 @@ class Scenario:
         description: One line.
         robot: Which robot.
         path: Which path.
-        surface: Which surface, for ``controller.manifold: surface``.
+        surface: Which surface, for ``controller.manifold: surface`` or a path on it.
         controller: The controller.
         model_error: What the controller believes wrongly of the robot.
         reference: Motion along the path.

@@ -120,13 +120,12 @@ def _soft_joints(
     scenario: Scenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
 ) -> list[str]:
     """Warn of joints that are too soft for a law that takes them for stiff."""
-    parameters, coordinates = scenario.controller, law.linearization.manifold.coordinates
+    parameters, manifold = scenario.controller, law.linearization.manifold
     if parameters.law not in ("singular_perturbation", "rigid") or not robot.is_elastic:
         return []
     q_J = link_state[: robot.dimension]
-    turns = any(coordinate.kind is Kind.ROTATIONAL for coordinate in coordinates)
-    axis = scenario.path.orientation.axis
-    joints = soft_joints(robot, q_J, oriented=turns, tool_axis=axis)
+    turns = any(coordinate.kind is Kind.ROTATIONAL for coordinate in manifold.coordinates)
+    joints = soft_joints(robot, q_J, oriented=turns, tool_axis=manifold.tool_axis)
     if parameters.law == "rigid":
         softness = bending(joints)
         what = "acts on the motors, and bending joints let the tool leave the path"

@@ -10,6 +10,7 @@ from diagrams.scenario import (
     BentLemniscate,
     Circle,
     Line,
+    OnSurface,
     OrientationParameters,
     PathParameters,
     Waypoints,
@@ -47,7 +48,7 @@ def make_path(
     """Return the path, smooth enough for the law, without an orientation that is no task.
 
     Args:
-        parameters: What the scenario says.
+        parameters: What the scenario says; on a surface :func:`make_path_on_surface` makes it.
         law: Key of ``RELATIVE_DEGREE``; decides the class C^(r+1) of splines.
         folder: Where relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
@@ -60,6 +61,7 @@ def make_path(
     if isinstance(shape, Waypoints):
         path = _through_waypoints(parameters, shape, smoothness, folder, progress)
     else:
+        assert not isinstance(shape, OnSurface)
         position = _position(shape)
         path = Path(position, _orientation(parameters.orientation, position, smoothness))
     task = parameters.orientation.task

@@ -11,7 +11,9 @@ from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.path import make_path, require_orientation
+from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
+from diagrams.tasks.surface import followed_axis, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
@@ -53,13 +55,20 @@ class PathTask(Task):
     ) -> None:
         reference = scenario.reference
         self._scenario, law = scenario, scenario.controller.law
-        self.path = make_path(scenario.path, law, folder, progress)
+        surface = surface_of_path(scenario)
+        if surface is None:
+            self.path = make_path(scenario.path, law, folder, progress)
+            tool_axis = scenario.path.orientation.axis
+        else:
+            self.path = make_path_on_surface(scenario.path, surface, law, folder, progress)
+            tool_axis = followed_axis(surface.orientation)
         self.shape = shape_report(self.path)
         self.warnings = path_warnings(self.path, self.shape)
         self.relative_degree = RELATIVE_DEGREE[law]
         followed: dict[str, Any] = {
             "oriented": self.path.orientation is not None,
-            "tool_axis": scenario.path.orientation.axis,
+            "tool_axis": tool_axis,
+            "turning": self.path.frame.turns,
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)
@@ -78,7 +87,10 @@ class PathTask(Task):
 
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""
-        require_orientation(self.path, self._scenario.path.orientation.task, num_joints)
+        if surface_of_path(self._scenario) is None:
+            require_orientation(self.path, self._scenario.path.orientation.task, num_joints)
+        else:
+            require_joints(self.manifold, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """See :class:`Task`."""

@@ -11,6 +11,7 @@ from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 from diagrams.tasks.surface_files import MadeSurface, surface_from_file
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
@@ -91,6 +92,12 @@ def given_quaternion(orientation: SurfaceOrientationParameters) -> np.ndarray | 
     return _EULER[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
 
 
+def normal_offset(orientation: SurfaceOrientationParameters) -> np.ndarray:
+    """Return the rotation of the tool away from the surface's frame, shape (3, 3)."""
+    turn = _EULER[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
+    return quaternion_to_matrix(turn)
+
+
 def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceManifold:
     """Return the manifold of a surface with its orientation.
 
@@ -103,12 +110,33 @@ def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceM
     """
     said = parameters.orientation
     kind = None if said.kind == "none" else cast(Literal["given", "normal"], said.kind)
-    offset = None
-    if kind == "normal":
-        turn = _EULER[said.convention](np.deg2rad([said.angles_deg]))[0]
-        offset = quaternion_to_matrix(turn)
-    axis = rotation_to_axis(said.tool_axis)[:, 0] if said.task == "tool_axis" and kind else None
-    return SurfaceManifold(order, orientation=kind, offset=offset, tool_axis=axis)
+    offset = normal_offset(said) if kind == "normal" else None
+    return SurfaceManifold(order, orientation=kind, offset=offset, tool_axis=followed_axis(said))
+
+
+def followed_axis(orientation: SurfaceOrientationParameters) -> np.ndarray | None:
+    """Return the axis of the tool that alone follows an orientation, shape (3,), or None."""
+    if orientation.kind == "none" or orientation.task != "tool_axis":
+        return None
+    return rotation_to_axis(orientation.tool_axis)[:, 0]
+
+
+def require_joints(manifold: Manifold, num_joints: int) -> None:
+    """Refuse a robot with fewer joints than a surface, or a path on it, has coordinates.
+
+    Args:
+        manifold: The manifold.
+        num_joints: Of the robot.
+
+    Raises:
+        InputError: If it has.
+    """
+    names = [coordinate.name for coordinate in manifold.coordinates]
+    if num_joints < len(names):
+        raise InputError(
+            f"surface: {num_joints} joints for {len(names)} outputs ({', '.join(names)}); "
+            "surface.orientation.task: tool_axis needs 5, kind: none 3"
+        )
 
 
 def _pair(values: object) -> Pair:

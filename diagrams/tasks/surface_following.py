@@ -9,7 +9,12 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.drawing.manifold_drawing import SurfaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_numbers
-from diagrams.tasks.surface import given_quaternion, make_surface, make_surface_manifold
+from diagrams.tasks.surface import (
+    given_quaternion,
+    make_surface,
+    make_surface_manifold,
+    require_joints,
+)
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
@@ -73,12 +78,7 @@ class SurfaceTask(Task):
 
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""
-        names = [coordinate.name for coordinate in self.manifold.coordinates]
-        if num_joints < len(names):
-            raise InputError(
-                f"surface: {num_joints} joints for {len(names)} outputs ({', '.join(names)}); "
-                "surface.orientation.task: tool_axis needs 5, kind: none 3"
-            )
+        require_joints(self.manifold, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """See :class:`Task`."""

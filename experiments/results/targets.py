@@ -14,7 +14,7 @@ from pfsc_drake.errors import InputError
 
 # signals that another law may log on the same robot
 _OF_OTHER_LAWS = {"xi_M"}
-# signals of a path's orientation, which may be no task
+# signals of an orientation, which may be no task
 _OF_ORIENTATIONS = {"phi"}
 # signals of an observer, which may be left out
 _OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
@@ -31,7 +31,8 @@ def check_targets(settings: Scenario, station: Station) -> None:
         InputError: One line that names law, metric and the metrics that there are.
     """
     signals = optional_signals(station)
-    if settings.path.orientation.task == "none":
+    surface = settings.surface
+    if settings.path.orientation.task == "none" or (surface and surface.orientation.kind == "none"):
         signals |= _OF_ORIENTATIONS
     for law, targets in settings.targets.items():
         other = set() if law == settings.controller.law else _OF_OTHER_LAWS

@@ -103,6 +103,10 @@ class Manifold(Protocol):
     def layout(self) -> PointLayout:
         """Layout of the manifold's point."""
 
+    @property
+    def tool_axis(self) -> np.ndarray | None:
+        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
+
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.
 
@@ -139,10 +143,6 @@ class Manifold(Protocol):
 
 class PlaceManifold(Manifold, Protocol):
     """A manifold that the tool is projected onto, in whose coordinates its place is told."""
-
-    @property
-    def tool_axis(self) -> np.ndarray | None:
-        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
 
     @property
     def layout(self) -> PlaceLayout:

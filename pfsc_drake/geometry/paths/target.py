@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.geometry import Path
 from pfsc_drake.geometry.paths.frame import manifold_axes
 
 
@@ -14,13 +14,16 @@ class PathTarget:
 
         p' = e_par eta' (1 - xi_1 k . e_perp - xi_2 k . e_cross) + xi_1' e_perp + xi_2' e_cross
 
+    A given frame, which turns by ``w = d psi / d eta``, adds
+    ``w eta' (xi_1 e_cross - xi_2 e_perp)``.
+
     Args:
         path: The path. Beyond the ends of an open path eta is clamped.
     """
 
     def __init__(self, path: Path) -> None:
         self._path, self._evaluator = path, path.evaluator(1)
-        self._layout = PathPointLayout(1, path.orientation is not None)
+        self._layout = self._evaluator.layout
 
     def __call__(self, coordinates: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return p [m] and p' [m/s], world axes, shape (3,) each.
@@ -38,4 +41,8 @@ class PathTarget:
         e_par, normals = axes[:, 0], axes[:, 1:]
         curvature = (bend - e_par * (e_par @ bend)) / (slope @ slope)
         along = rates[0] * (1.0 - xi @ (normals.T @ curvature))
-        return sigma + normals @ xi, along * e_par + normals @ rates[1:]
+        across = rates[1:]
+        if self._layout.turning:
+            spin = point[self._layout.turn][0] / np.linalg.norm(slope)
+            across = across + rates[0] * spin * np.array([-xi[1], xi[0]])
+        return sigma + normals @ xi, along * e_par + normals @ across

@@ -1,0 +1,100 @@
+"""The path of a scenario, where it lies on the scenario's surface."""
+
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from diagrams.scenario import OnSurface, PathParameters, Scenario, SurfaceParameters
+from diagrams.scenario.surface import SurfaceOrientationParameters
+from diagrams.tasks.surface import given_quaternion, make_surface, normal_offset
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import Curve, OrientationCurve, Path, read_waypoints
+from pfsc_drake.geometry.path_on_surface import path_on_surface
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.waypoints_on_surface import (
+    curve_through,
+    normal_orientation,
+    project_waypoints,
+)
+
+
+def surface_of_path(scenario: Scenario) -> SurfaceParameters | None:
+    """Return the surface that a scenario's path lies on, or None if it lies on none.
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        InputError: If the path is on a surface and there is none, or both say the orientation.
+    """
+    if not isinstance(scenario.path.shape, OnSurface):
+        return None
+    if scenario.surface is None:
+        raise InputError(
+            "path.shape = !OnSurface: there is no surface; write surface: {shape: !Plane {..}}"
+        )
+    said = scenario.path.orientation
+    if said.keyframes or said.task != "full":
+        raise InputError(
+            "path.orientation: given, and a path on a surface takes surface.orientation: "
+            "{kind: none|given|normal, task: full|tool_axis}; leave out path.orientation"
+        )
+    return scenario.surface
+
+
+def make_path_on_surface(
+    said: PathParameters,
+    parameters: SurfaceParameters,
+    law: str,
+    folder: FilePath,
+    progress: Progress | None = None,
+) -> Path:
+    """Return a path on a surface, smooth enough for the law.
+
+    Args:
+        said: What the scenario says of the path; its shape is :class:`OnSurface`.
+        parameters: What it says of the surface.
+        law: Key of ``RELATIVE_DEGREE``, r; decides the class C^(r+1) of splines.
+        folder: Where relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If surface or path cannot be made, or are not smooth enough.
+    """
+    shape, smoothness = said.shape, RELATIVE_DEGREE[law] + 1
+    assert isinstance(shape, OnSurface)
+    if bool(shape.thetas) == bool(shape.file):
+        raise InputError(
+            f"path.shape = !OnSurface: {'both' if shape.file else 'neither'} of thetas and file; "
+            "write thetas: [[theta_1, theta_2], ..] or file: NAME"
+        )
+    try:
+        surface = make_surface(parameters.shape, law, folder, progress).surface
+    except InputError as error:
+        raise InputError(f"surface.shape: {error}") from None
+    thetas = np.array(shape.thetas)
+    try:
+        if shape.file:
+            positions = read_waypoints(folder / shape.file, progress).positions
+            thetas = project_waypoints(surface, positions, shape.max_distance, closed=shape.closed)
+        curve = curve_through(surface, thetas, smoothness=smoothness, closed=shape.closed)
+        orientation = _orientation(parameters.orientation, surface, curve, smoothness)
+        path = path_on_surface(surface, curve, orientation)
+    except InputError as error:
+        raise InputError(f"path.shape: {error}") from None
+    path.require_smoothness(smoothness, f"the law '{law}'")
+    return path
+
+
+def _orientation(
+    said: SurfaceOrientationParameters, surface: Surface, curve: Curve, smoothness: int
+) -> OrientationCurve | None:
+    """Return the orientation along a curve of parameters, or None if it is no task."""
+    quaternion = given_quaternion(said)
+    if quaternion is not None:
+        return OrientationCurve.fixed(quaternion, curve.domain)
+    if said.kind == "none":
+        return None
+    return normal_orientation(surface, curve, normal_offset(said), smoothness=smoothness)
