@@ -112,12 +112,15 @@ class OnePeriodMap:
             section: Context right after a tick; unchanged.
             x: Variables in place of its own, shape (size,).
         """
-        self.arrive(section, x)
+        self.approach(section, x)
         self._simulator.AdvancePendingEvents()
         return self.variables(self.context)
 
-    def arrive(self, section: Context, x: np.ndarray | None = None) -> None:
-        """Advance to the next tick, before anything is updated there; see :meth:`advance`.
+    def approach(self, section: Context, x: np.ndarray | None = None) -> None:
+        """Go to the next tick, which is not made yet.
+
+        What watches differences between ticks finds there what it finds in a run; right after a
+        tick it would compare a state with itself.
 
         Args:
             section: Context right after a tick; unchanged.

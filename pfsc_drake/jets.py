@@ -294,15 +294,13 @@ def compose_pair(partials: Sequence[Coefficient], first: Jet, second: Jet) -> Je
     """
     order = min((math.isqrt(8 * len(partials) + 1) - 3) // 2, first.order, second.order)
     powers = [_scaled_powers(inner.truncate(order)) for inner in (first, second)]
-    # highest total order first: what the linear terms add to is the same whatever they are
-    terms = [(n - j, j) for n in range(order, 0, -1) for j in range(n + 1)]
-    products = [powers[0][i] * powers[1][j] for i, j in terms]
-    factors = [partials[(i + j) * (i + j + 1) // 2 + j] for i, j in terms]
     result = [partials[0]]
     for k in range(1, order + 1):
-        start = (order - k) * (order + k + 3) // 2
-        pairs = zip(factors[start:], products[start:], strict=True)
-        result.append(sum(factor * product.coefficients[k] for factor, product in pairs))
+        # the linear terms last: what they add to is the same whatever coefficients they have
+        terms = [(n - j, j) for n in range(k, 0, -1) for j in range(n + 1)]
+        products = [(powers[0][i] * powers[1][j]).coefficients[k] for i, j in terms]
+        factors = [partials[(i + j) * (i + j + 1) // 2 + j] for i, j in terms]
+        result.append(sum(f * p for f, p in zip(factors, products, strict=True)))
     return Jet(result)
 
 

@@ -34,6 +34,8 @@ STRANGERS = [
     ("pfsc_drake.systems.control", "pfsc_drake.physics"),
     ("pfsc_drake.robot.serial", "pfsc_drake.robot.delta"),
     ("pfsc_drake.geometry.curves", "pfsc_drake.geometry.paths"),
+    ("pfsc_drake.geometry.files", "pfsc_drake.geometry.paths"),
+    ("pfsc_drake.geometry.files", "pfsc_drake.geometry.surfaces"),
     ("pfsc_drake.geometry.curves", "pfsc_drake.geometry.surfaces"),
     ("pfsc_drake.geometry.surfaces", "pfsc_drake.geometry.paths"),
 ]

@@ -15,7 +15,7 @@ from experiments.results.run_log import FloatArray, RunLog
 
 REST = 0.1  # s, end of a run over which the joints' speeds are looked at
 AT_REST = 1e-3  # m/s, below which the tool rests
-MOVED_OFF = 1e-4  # of a lap
+AWAY = 1e-2  # m, from where on the tool has set off
 PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
 
 
@@ -109,26 +109,35 @@ def final_joint_speed(log: RunLog) -> float:
 def posture_return(log: RunLog, lap: float) -> float:
     """Largest difference of a joint from where it was in the first lap at the same place.
 
-    The first lap begins when the tool moves off, so that a start beside path or posture does not
-    count.
+    The first lap begins where the tool sets off, so that what it does beside the path before
+    does not count.
 
     Args:
-        log: With ``q_J`` and ``eta`` of a closed path.
+        log: With ``q_J``, ``eta`` and ``eta_dot`` of a closed path.
         lap: Length of the path [m].
 
     Returns:
         rad (m of slides); NaN if there is no second lap.
     """
-    eta, q = log["eta"].values[:, 0], log["q_J"].values
+    begin = _setting_off(log)
+    eta, q = log["eta"].values[begin:, 0], log["q_J"].values[begin:]
     along = np.maximum.accumulate(eta)
-    begin, end = np.searchsorted(along, [eta[0] + MOVED_OFF * lap, eta[0] + lap])
-    first = slice(max(int(begin) - 1, 0), int(end))
+    first = along <= eta[0] + lap
     later = eta > eta[0] + lap
     if not later.any():
         return math.nan
     place = eta[0] + np.mod(eta[later] - eta[0], lap)
     expected = [np.interp(place, along[first], column[first]) for column in q.T]
     return _largest(q[later] - np.stack(expected, axis=1))
+
+
+def _setting_off(log: RunLog) -> int:
+    """Return the last sample at rest before the tool goes away from where it starts."""
+    eta, speed = log["eta"].values[:, 0], log["eta_dot"].values[:, 0]
+    away = eta - eta[0] > AWAY
+    gone = int(np.argmax(away)) if away.any() else len(eta)
+    resting = np.flatnonzero(np.abs(speed[:gone]) < AT_REST)
+    return int(resting[-1]) if resting.size else 0
 
 
 def posture_metrics(log: RunLog, lap: float | None) -> Metrics:

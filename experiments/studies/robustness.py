@@ -60,6 +60,11 @@ SUBJECTS = (
         "pfc_comau_6r_elastic",
         (_equal_poles("elastic", eta=-40, xi=-60, phi=-50), "start.transition=0"),
     ),
+    Subject(
+        "pfc_elastic_7r",
+        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
+        friction=("friction={}", "friction.file=franka_emika_panda"),
+    ),
     Subject("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
     Subject("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
     Subject("pfc_comau_6r"),
@@ -90,9 +95,10 @@ _SHOWN = (2e-5, 1e3)  # mm
 BEFORE, AFTER = "before", "after"
 _DESCRIPTION = (
     "Every row believes its robot to be what the disturbance says, while the plant stays as it "
-    "is; friction is that of Tab. C.3 (of the drives, on the DELTA robot). Before: gains with "
-    "equal poles, nothing known of friction. After: the scenario's gains, and an observer of the "
-    "drives' disturbance torque (300 1/s), on three elastic axes of the external torque too "
+    "is; friction is that of Tab. C.3 (of the drives on the DELTA robot, the identified one on "
+    "seven axes). Before: gains with equal poles, nothing known of friction. After: the scenario's "
+    "gains, and an observer of the drives' disturbance torque (300 1/s), on three elastic axes of "
+    "the external torque too "
     "(60 1/s). 'All at once' is friction, masses 5 % too low, K_s 5 % too high, and encoders of 4 "
     "million increments with difference quotients. Largest distances after the transition from "
     "the start to the path; of pfc_compliant_6r from the reference that yields."

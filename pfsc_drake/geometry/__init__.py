@@ -41,12 +41,16 @@ from pfsc_drake.geometry.surfaces.generated import (
     surface_of_revolution,
     translated_surface,
 )
+from pfsc_drake.geometry.surfaces.grid import surface_through_grid
+from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
 from pfsc_drake.geometry.surfaces.partials import partial_count, partial_index, partial_orders
 from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
+from pfsc_drake.geometry.surfaces.point_file import read_surface_points
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
 from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, SurfaceFit, fit_scattered
 from pfsc_drake.geometry.surfaces.shapes import (
     Turned,
     cone,
@@ -77,9 +81,11 @@ __all__ = [
     "Projection",
     "ProjectionStatus",
     "Projector",
+    "ScatteredFitOptions",
     "ShapeReport",
     "Surface",
     "SurfaceEvaluator",
+    "SurfaceFit",
     "SurfacePointLayout",
     "SurfaceProjection",
     "SurfaceProjector",
@@ -93,6 +99,7 @@ __all__ = [
     "cone",
     "cylinder",
     "extruded_surface",
+    "fit_scattered",
     "fundamental_forms",
     "interpolate",
     "interpolate_orientation",
@@ -110,13 +117,16 @@ __all__ = [
     "quaternion_to_matrix",
     "quaternion_to_zyx",
     "quaternion_to_zyz",
+    "read_surface_points",
     "read_waypoints",
     "rotation_from_axes",
     "rotation_to_axis",
     "shape_report",
+    "smooth_surface_near_grid",
     "sphere",
     "surface_of_revolution",
     "surface_report",
+    "surface_through_grid",
     "torus",
     "translated_surface",
     "zyx_to_matrix",

@@ -16,6 +16,7 @@ from pfsc_drake.geometry import (
     interpolate,
     paraboloid,
     sphere,
+    surface_through_grid,
     torus,
     translated_surface,
 )
@@ -31,12 +32,19 @@ def _wave(axis):
     return interpolate(points, smoothness=5)
 
 
+def _hills():
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, 30), np.linspace(-0.4, 0.4, 25), indexing="ij")
+    points = np.stack([x, y, 0.02 * np.sin(9.0 * x) * np.cos(7.0 * y)], axis=-1)
+    return surface_through_grid(points, smoothness=5)
+
+
 SURFACES = {
     "cylinder": (cylinder(0.09, (-0.3, 0.3)), (0.0, 0.0), (10.0, 0.3)),
     "sphere": (sphere(0.2, (-1.4, 1.4)), (0.0, 0.0), (3.0, 3.0)),
     "torus": (torus(0.5, 0.1), (0.0, 0.0), (1.4, 5.0)),
     "paraboloid": (paraboloid(((-0.3, 0.3), (-0.3, 0.3)), 1.667), (-0.1, -0.1), (0.8, 0.4)),
     "splines": (translated_surface(_wave(0), _wave(1)), None, (0.7, 0.7)),
+    "grid": (_hills(), None, (0.7, 0.7)),
     "extrusion": (extruded_surface(_wave(0), (0.0, 1.0, 0.0), 0.8), (0.2, 0.2), (0.9, 0.2)),
 }
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import BrakeParameters, ForcePulse
+from diagrams.scenario import BrakeParameters, ForcePulse, GainParameters, LawGains
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
@@ -21,6 +21,19 @@ def soft(load_scenario):
     settings = load_scenario("pfc_elastic_3r")
     settings.reference.dwell, settings.start.offset = 0.05, [0.0, 0.0]
     return settings
+
+
+@pytest.fixture
+def seven(load_scenario):
+    """Return seven light axes with elastic joints, or rigid ones, on their way."""
+
+    def make(name="pfc_elastic_7r"):
+        settings = load_scenario(name)
+        settings.reference.dwell, settings.start.transition = 0.05, 0.0
+        settings.start.offset, settings.start.rotation_deg = [0.0, 0.0], [0.0, 0.0, 0.0]
+        return settings
+
+    return make
 
 
 @pytest.fixture
@@ -67,6 +80,56 @@ def test_a_sensor_of_an_elastic_joint(soft, kind, component):
     assert f": {name} at eta = " in result.fault
     assert 0.35 <= result.fault_time < 0.45
     check_rest(station, result, times, log, degrees=6.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("nan", "v_M_2"),
+        ("frozen", "q_M_4"),
+        ("jump", "v_J_6"),
+        ("frozen", "v_J_4"),
+        ("jump", "q_M_2"),
+        ("frozen", "v_M_6"),
+    ],
+)
+def test_a_sensor_of_a_light_arm_with_more_joints_than_outputs(seven, kind, name):
+    settings = seven()
+    failure = settings.simulation.sensor_failure
+    side, joint = ["q_J", "v_J", "q_M", "v_M"].index(name[:3]), int(name[4])
+    failure.time, failure.kind, failure.component = 0.35, kind, 7 * side + joint - 1
+    failure.size = 0.02 if name.startswith("q") else 1.0
+    station, result, times, log = go_on(settings, 1.0)
+    assert f": {name} at eta = " in result.fault
+    assert 0.35 <= result.fault_time < 0.46
+    check_rest(station, result, times, log)
+
+
+def test_a_fault_while_a_hand_holds_the_elbow(seven):
+    """Held with 250 N/m, the arm stands; the hand moves on for a while."""
+    settings = seven("pfc_elbow_7r")
+    (push,) = settings.pushes
+    push.begin, push.duration = 0.1, 0.3
+    settings.simulation.sensor_failure.time = 0.45
+    settings.simulation.sensor_failure.component = 17
+    station, result, times, log = go_on(settings, 0.6)
+    assert ": q_M_4 at eta = " in result.fault
+    assert np.abs(log["push_wrench"]).max() > 5.0
+    check_rest(station, result, times, log)
+
+
+def test_lost_frames_of_a_light_arms_bus(seven):
+    settings = seven("pfc_panda_7r")
+    settings.controller.law = "velocity_servo"
+    settings.controller.gains = {
+        "velocity_servo": LawGains(*[GainParameters(poles=[-20.0]) for _ in range(4)])
+    }
+    settings.servo.bus_delay = 2e-3
+    settings.servo.lost.begin, settings.servo.lost.end = 0.6, np.inf
+    station, result, times, log = go_on(settings, 1.0)
+    assert result.fault.startswith(f"velocity_servo: {Fault.BUS_LOST.explanation} at eta")
+    assert 0.61 < result.fault_time < 0.62
+    check_rest(station, result, times, log)
 
 
 def test_brakes_hold_a_joint_of_which_nothing_is_seen(six_axes):

@@ -23,6 +23,13 @@ BASES = {
     "boundary_layer": ("pfc_elastic_3r", "controller.law=singular_perturbation", "forces=[{}]"),
     "parallel": ("pfc_delta", "forces=[{force: [1, 0, 0]}]"),
     "contact": ("pfc_delta_notch",),
+    "redundant": (
+        "pfc_panda_7r",
+        "controller.posture={task: limits, yields: observed}",
+        "path.orientation.task=tool_axis",
+        "pushes=[{link: link_3, way: [0, 0.1, 0]}]",
+        "targets={}",
+    ),
 }
 ROWS = ["0.0,0.8,0.2,1.0,0,0.1,0", "0.3,0.75,0.1,1.05,0,0.2,0", "0.6,0.8,0,1.1,0,0.1,0.1"]
 

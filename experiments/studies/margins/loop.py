@@ -61,8 +61,7 @@ class StationLoop:
         """Return whether a system is in its safe state.
 
         Args:
-            root: Context of the diagram, at a tick before its updates: after them positions would
-                be compared with themselves.
+            root: Context of the diagram at a tick that is not made yet.
         """
         return any(
             system.fault(system.GetMyContextFromRoot(root)) is not Fault.NONE
@@ -130,7 +129,7 @@ def linearize(loop: StationLoop, section: Context, chosen: np.ndarray) -> Linear
     Returns:
         The linear loop; None if the law goes to its safe state there.
     """
-    loop.map.arrive(section)
+    loop.map.approach(section)
     if loop.has_failed(loop.map.context):
         return None
     slope = loop.map.derivative(section, chosen)

@@ -11,6 +11,9 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.model_error import ModelErrorParameters
 
+# times the drives' limits, which then nothing reaches
+_UNLIMITED = 1e6
+
 
 def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     """Return a scenario without what has no slope or acts from outside, and what was taken off.
@@ -22,6 +25,10 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
         settings: The scenario; unchanged.
     """
     result, removed = deepcopy(settings), []
+    # a model that errs asks for more at a state of one that does not; at its limit a drive is
+    # no loop any more
+    result.controller.effort_scale *= _UNLIMITED
+    removed.append("limits of the drives")
     rubs = settings.drive_friction is not False and is_delta(settings.robot.model)
     if settings.friction.is_given or rubs:
         result.friction = JointFrictionParameters()

@@ -11,12 +11,19 @@ from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 
+# of a joint's velocity limit, up to which a posture is pulled
+_LARGEST_SPEED = 0.5
+
 
 class YieldingPosture:
     """A :class:`NullSpaceImpedance` under external torques and the pull of a potential.
 
     With ``N'`` the projection on what leaves the outputs alone, the posture is driven by
     ``u = N' (tau_ext + pull_stiffness (-dV/dq))``.
+
+    What pulls, spring or potential, is scaled down as a whole where the damper alone would let
+    it move a joint faster than half its velocity limit: far from its goal a posture must not
+    take away what the drives need for the outputs.
 
     Args:
         robot: The robot, N joints.
@@ -56,6 +63,8 @@ class YieldingPosture:
         self._evaluate, self._pull = function.evaluate, function.results["pull"]
         self._A = function.results["A"].reshape((len(manifold.coordinates), -1), order="F")
         self._weight = function.results["weight"]
+        speed = _LARGEST_SPEED * robot.gather("velocity_limit")
+        self._largest = impedance.parameters.damping * speed
 
     def start(self, posture: np.ndarray) -> np.ndarray:
         """Return the state at rest in a posture (N,), flat, shape ((r + 1) N,)."""
@@ -80,20 +89,31 @@ class YieldingPosture:
         """
         rows = state.reshape(-1, self._n)
         free = np.zeros(self._n)
+        spring = self.impedance.parameters.stiffness * (goal - rows[0])
+        pull = spring
         if torque is not None or self._pulls:
-            free = self._free_torque(q, point, torque)
+            free, pulled = self._free_torques(q, point, torque)
+            free, pull = free + pulled, spring + pulled
+        excess = float(np.max(np.abs(pull) / self._largest))
+        if excess > 1.0:
+            free = free - (1.0 - 1.0 / excess) * pull
         return self.impedance.update(rows, free, goal).ravel()
 
-    def _free_torque(
+    def _free_torques(
         self, q: np.ndarray, point: np.ndarray, torque: np.ndarray | None
-    ) -> np.ndarray:
-        """Return the part of all torques that does no work on the outputs; NaN if not finite."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the parts of external torques and pull that do no work on the outputs.
+
+        NaN if not finite, each (N,).
+        """
         self._q[:], self._point[:] = q, point
         self._evaluate()
-        whole = self._pulls * self._pull
-        if torque is not None:
-            whole = whole + torque
-        if not np.isfinite(self._A.sum() + whole.sum()):
-            return np.full(self._n, np.nan)
+        nothing = np.zeros(self._n)
+        given = nothing if torque is None else torque
+        if not np.isfinite(self._A.sum() + self._pull.sum() + given.sum()):
+            return np.full(self._n, np.nan), nothing
         scale = scale_of(self._weight.reshape((self._n, -1))) if self._inertial else self._scale
-        return free_torque(self._A, whole, scale)
+        free = nothing if torque is None else free_torque(self._A, torque, scale)
+        if not self._pulls:
+            return free, nothing
+        return free, free_torque(self._A, self._pulls * self._pull, scale)

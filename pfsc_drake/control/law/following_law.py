@@ -144,7 +144,9 @@ class FollowingLaw:
             n if tells_reference_velocity else 0,
             linearization.num_outputs if inverse.damped_below else 0,
         )
-        self.function = law_function(robot, linearization, stabilization, posture)
+        self.function = law_function(
+            robot, linearization, stabilization, posture, damped=inverse.damped_below > 0.0
+        )
         self._completion = completion_function(linearization, self.limits)
         self._fault_index = self.layout.status.start
         self._alpha_index = linearization.manifold.layout.alpha.start
@@ -240,7 +242,7 @@ class FollowingLaw:
         return result
 
     def _spare(self) -> Spare | None:
-        """Return what joints beyond the number of outputs are to do."""
+        """Return what joints are to do that the outputs leave free."""
         if self._wish is None:
             return None
         if self._weight is not None:
@@ -256,7 +258,7 @@ class FollowingLaw:
         if not self.linearization.manifold.follows_time:
             error = error - self._reference[m : 2 * m]
         moving = self._state[velocity]
-        if self._wish is None:
+        if self.posture is None:
             return moving - self._inverse.solve(self._A, error).x
         n = len(moving)
         spare = Spare(self._posture[n : 2 * n], self._scale)

@@ -1,6 +1,7 @@
 """What a law computes before and after the decoupling matrix is inverted, as CasADi functions."""
 
 import math
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -17,6 +18,8 @@ def law_function(
     linearization: Linearization,
     stabilization: Stabilization,
     posture: Posture | None,
+    *,
+    damped: bool = False,
 ) -> ca.Function:
     """Return everything up to the decoupling matrix's inverse as one function.
 
@@ -25,6 +28,8 @@ def law_function(
         linearization: The relation between its drives and the virtual output.
         stabilization: Gains of the virtual output.
         posture: What joints beyond the number of outputs do; None if there are none.
+        damped: Whether the inverse is damped near singular postures: joints that the outputs
+            do not move there come to rest.
     """
     n, m = linearization.num_joints, linearization.num_outputs
     r = linearization.relative_degree
@@ -68,6 +73,8 @@ def law_function(
         wanted = ca.vertsplit(arguments["posture"], n)
         wishes = posture_expressions(posture, robot, ca.horzsplit(motion), wanted)
         results |= {name: x for name, x in wishes._asdict().items() if x.numel()}
+    elif damped:
+        results["wish"] = _coming_to_rest(stabilization, ca.horzsplit(motion))
     return ca.Function(
         "following_law",
         list(arguments.values()),
@@ -75,6 +82,18 @@ def law_function(
         list(arguments),
         list(results),
     )
+
+
+def _coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> ca.SX:
+    """Return the highest joint derivative that brings joints to rest wherever they are.
+
+    With the gains of the first coordinate but the one of its position; what is left of an error
+    dynamics with real poles is stable.
+    """
+    wish = ca.SX(motion[0].numel(), 1)
+    for gains, derivative in zip(stabilization.proportional[1:], motion[1:], strict=True):
+        wish -= gains[0] * derivative
+    return wish
 
 
 def _whole_turns(angle: ca.SX) -> ca.SX:

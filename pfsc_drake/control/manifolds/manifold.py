@@ -123,7 +123,8 @@ class Manifold(Protocol):
             wrench: ``[force, torque]`` on the tool at the tool point, world axes, shape (6,).
             point: The manifold's point.
             reference: Virtual output that the tool is to have, shape (m,), for the
-                orientation that torques are resolved in.
+                orientation that torques are resolved in, and for the distance from a manifold
+                whose lever arms change with it.
             with_turning: Whether torques act along tangential coordinates where the
                 manifold's orientation turns.
         """

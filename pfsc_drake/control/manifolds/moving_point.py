@@ -6,7 +6,7 @@ import casadi as ca
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.orientation import orientation_error, quaternion_rotation
-from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported
+from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported, turned
 from pfsc_drake.control.manifolds.path_force import force_components
 from pfsc_drake.jets import Jet
 
@@ -41,6 +41,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     e_perp = transported(path.normal, e_par)
     axes = (e_par, e_perp, jets.cross(e_par, e_perp))
     position = [jets.dot(axis, error) for axis in axes]
+    if path.turn:
+        position[1:] = turned(position[1:], jets.compose([ca.SX(0), *path.turn], theta_d))
     if not path.quaternion:
         return position
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta_d))

@@ -19,7 +19,11 @@ from pfsc_drake.control.manifolds.orientation_force import (
     rotational_force,
     torque_across_axis,
 )
-from pfsc_drake.control.manifolds.path_force import translational_force, turning_force
+from pfsc_drake.control.manifolds.path_force import (
+    frame_turning_force,
+    translational_force,
+    turning_force,
+)
 from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix
 from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
@@ -44,6 +48,8 @@ class PathGeometry:
             empty for arms that have no orientation to follow.
         alignment: Rotation whose first column is the axis of the tool that alone matters, shape
             (3, 3), see :func:`orientation_error`; None if all of the orientation does.
+        turn: Derivatives 1..r by theta of the angle about the tangent by which ``e_perp`` turns
+            against parallel transport [rad], scalars; empty where it does not.
     """
 
     eta: ca.SX
@@ -51,6 +57,7 @@ class PathGeometry:
     position: Sequence[ca.SX]
     quaternion: Sequence[ca.SX]
     alignment: np.ndarray | None = None
+    turn: Sequence[ca.SX] = ()
 
 
 def path_parameter(y: Jet, path: PathGeometry) -> Jet:
@@ -77,7 +84,8 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ``eta' = |sigma'| theta'`` (3.13). ``xi`` are the projections of
     ``y_t - sigma`` on the parallel transport frame, whose derivatives are
     ``xi_i' = e_i . y_t'`` (3.16), (3.17); ``e_perp' = -(e_par' . e_perp) e_par``
-    (3.4), primes being time derivatives. ``phi`` are the ZYX Euler angles of
+    (3.4), primes being time derivatives. A given frame, which turns about the tangent by the angle
+    ``psi``, sees them turned by it. ``phi`` are the ZYX Euler angles of
     ``R_d' R_e``, see (3.43)-(3.47), or the two of the tool's axis; that the reference
     orientation moves with the progress on the path sits in their derivatives.
 
@@ -101,6 +109,8 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
         jets.dot(e, velocity).integrate(ca.dot(e.coefficients[0], offset))
         for e in (e_perp, jets.cross(e_par, e_perp))
     ]
+    if path.turn:
+        xi = turned(xi, jets.compose([ca.SX(0), *path.turn], theta))
     if not path.quaternion:
         return [eta, *xi]
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta))
@@ -115,6 +125,12 @@ def transported(normal: ca.SX, e_par: Jet) -> Jet:
     return jets.solve_ode(lambda e: -(e_par * jets.dot(turning, e)), normal, e_par.order)
 
 
+def turned(xi: Sequence[Jet], psi: Jet) -> list[Jet]:
+    """Return the components of a vector in axes that are turned by the angle ``psi``."""
+    sin, cos = jets.sin_cos(psi)
+    return [cos * xi[0] + sin * xi[1], cos * xi[1] - sin * xi[0]]
+
+
 class PathManifold:
     """A path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
@@ -126,6 +142,8 @@ class PathManifold:
         oriented: Whether the path has an orientation.
         tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
+        turning: Whether ``e_perp`` is given with the path, such as the normal of a surface that
+            the path lies on, rather than transported in parallel.
 
     Attributes:
         alignment: Rotation whose first column is the axis, shape (3, 3), or None.
@@ -139,9 +157,16 @@ class PathManifold:
     name = "path"
     follows_time = False
 
-    def __init__(self, order: int, *, oriented: bool, tool_axis: np.ndarray | None = None) -> None:
+    def __init__(
+        self,
+        order: int,
+        *,
+        oriented: bool,
+        tool_axis: np.ndarray | None = None,
+        turning: bool = False,
+    ) -> None:
         orientation = ToolOrientation(oriented, tool_axis, self.name)
-        self.layout = PathPointLayout(order, oriented)
+        self.layout = PathPointLayout(order, oriented, turning)
         self.alignment, self.tool_axis = orientation.alignment, orientation.tool_axis
         self.coordinates = (*_TRANSLATIONAL, *orientation.coordinates)
 
@@ -164,6 +189,7 @@ class PathManifold:
             position=ca.vertsplit(point[layout.position], 3),
             quaternion=quaternion,
             alignment=self.alignment,
+            turn=ca.vertsplit(point[layout.turn]) if layout.turning else (),
         )
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
@@ -176,7 +202,8 @@ class PathManifold:
         """Return (3.41) for the translational coordinates, (3.44) and (3.45) for the angles.
 
         Their power ``tau . yhat'`` is ``f . y_t' + mu . (omega - omega_d)``: the power of the
-        wrench, the rotation being that relative to the path's orientation. With
+        wrench, the rotation being that relative to the path's orientation. Where the frame turns
+        with eta, the tool is taken to be where the reference tells. With
         ``with_turning`` :func:`turning_force` is added to the tangential one; the power is then
         ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where
         only an axis of the tool matters, all of this holds for torques across it; what acts about
@@ -184,6 +211,8 @@ class PathManifold:
         """
         force, torque, layout = wrench[:3], wrench[3:], self.layout
         translational = translational_force(force, point, layout)
+        if layout.turning:
+            translational[0] += frame_turning_force(force, point, layout, reference[1:3])
         if not layout.oriented:
             return translational
         torque, rotational = self.rotational_force(torque, point, reference[3:])

@@ -54,3 +54,20 @@ def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX
     """
     quaternion, slope = point[layout.quaternion], point[layout.position][3:6]
     return turning_torque(torque, quaternion[:4], quaternion[4:8]) / ca.norm_2(slope)
+
+
+def frame_turning_force(force: ca.SX, point: ca.SX, layout: PathPointLayout, xi: ca.SX) -> ca.SX:
+    """Return the force along eta of a tool beside a path whose frame turns about it [N].
+
+    With ``w = psi' / |sigma'|`` [rad/m], the frame's turn per length of the path, a tool that keeps
+    its transversal coordinates moves by ``w (xi_1 e_cross - xi_2 e_perp) eta'`` besides.
+
+    Args:
+        force: Force on the tool at the tool point, world axes [N], shape (3,).
+        point: Path point of a turning frame next to the tool, laid out by ``layout``.
+        layout: Layout of ``point``.
+        xi: Transversal coordinates of the tool [m], shape (2,).
+    """
+    _, perp, cross = ca.vertsplit(force_components(force, point, layout))
+    w = point[layout.turn][0] / ca.norm_2(point[layout.position][3:6])
+    return w * (xi[0] * cross - xi[1] * perp)

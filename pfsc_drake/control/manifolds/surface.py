@@ -264,8 +264,8 @@ class SurfaceManifold:
         if len(self.coordinates) == 3:
             return translational
         phi, quaternion = reference[3:], point[self.layout.quaternion]
-        given = self.offset is None
-        R_d = quaternion_matrix(quaternion[:4]) if given else plane.axes @ self.offset
+        frame = None if self.offset is None else plane.axes @ self.offset
+        R_d = quaternion_matrix(quaternion[:4]) if frame is None else frame
         if self.alignment is not None:
             torque = torque_across_axis(torque, R_d, phi, self.alignment)
         if with_turning:

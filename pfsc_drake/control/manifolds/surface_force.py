@@ -87,7 +87,7 @@ def quaternion_turning_force(torque: ca.SX, plane: TangentPlane, quaternion: ca.
     Args:
         torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
         plane: The surface next to the tool.
-        quaternion: Partial derivatives of the quaternion, the first three rows, shape (12+,).
+        quaternion: The quaternion and its two first partial derivatives, shape (12 or more,).
     """
     q, q_1, q_2 = ca.vertsplit(quaternion[:12], 4)
     powers = ca.vertcat(turning_torque(torque, q, q_1), turning_torque(torque, q, q_2))

@@ -10,11 +10,11 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
-from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projection, Projector
 from pfsc_drake.geometry.paths.run_out import Continuation, JoinedCurve, continuations
 from pfsc_drake.geometry.paths.table import PathTable, tabulate
+from pfsc_drake.geometry.paths.turned_frame import Frame
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 
 _BEYOND_END = float(ProjectionStatus.BEYOND_END)
@@ -56,7 +56,7 @@ class PathEvaluator:
         position: Curve sigma_t in R^3.
         orientation: Curve of quaternions, or None.
         arc_length: Arc length of `position`.
-        frame: Parallel transport frame of `position`.
+        frame: Frame along `position`.
         projector: Projector onto `position`.
         order: Relative degree r of the law.
 
@@ -69,11 +69,11 @@ class PathEvaluator:
         position: Curve,
         orientation: OrientationCurve | None,
         arc_length: ArcLength,
-        frame: ParallelTransportFrame,
+        frame: Frame,
         projector: Projector,
         order: int,
     ) -> None:
-        self.layout = PathPointLayout(order, orientation is not None)
+        self.layout = PathPointLayout(order, orientation is not None, frame.turns)
         table = tabulate(position, orientation, arc_length, frame, self.layout)
         # An open path goes on beyond its ends, before its first piece and after its last.
         self._project_beyond: Callable[[Sequence[float], float], Projection] | None = None
@@ -230,9 +230,10 @@ class PathEvaluator:
                 out[3] = _NOT_CONVERGED
             return out
         out[3] = _BEYOND_END
-        rest = self.layout.position.stop
-        out[13:rest] = 0.0
-        out[rest + 4 :] = 0.0
+        layout = self.layout
+        out[13 : layout.position.stop] = 0.0
+        out[layout.quaternion][4:] = 0.0
+        out[layout.turn] = 0.0
         x, y, z, dx, dy, dz = out[7:13].tolist()
         along = (point[0] - x) * dx + (point[1] - y) * dy + (point[2] - z) * dz
         out[1] += along / math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -37,6 +37,7 @@ class ParallelTransportFrame:
             z, or x where the tangent is within 26 degrees of z.
 
     Attributes:
+        turns: False: it does not turn about the tangent.
         holonomy: Angle from e_perp(theta) to e_perp(theta + period) about e_par, rad, in
             (-pi, pi]; zero for an open curve.
         breakpoints: Between two of them e_perp is smooth, with those of the curve, [n].
@@ -45,6 +46,8 @@ class ParallelTransportFrame:
         InputError: the curve is not three-dimensional or has a corner, or the initial
             normal is parallel to the tangent.
     """
+
+    turns = False
 
     def __init__(self, curve: Curve, initial_normal: ArrayLike | None = None) -> None:
         if curve.dimension != 3:
@@ -88,6 +91,10 @@ class ParallelTransportFrame:
         turn = (laps * self.holonomy)[..., None]
         c, s = np.cos(turn), np.sin(turn)
         return c * e_perp + s * e_cross, c * e_cross - s * e_perp
+
+    def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """Derivatives 1..order of the angle by which it turns, all zero, [..., order]."""
+        return np.zeros((*np.shape(theta), order))
 
 
 def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

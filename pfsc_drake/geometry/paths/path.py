@@ -14,6 +14,7 @@ from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
+from pfsc_drake.geometry.paths.turned_frame import Frame
 
 _IRREGULAR = 1e-6
 _SUSPICIOUS = 0.2
@@ -42,13 +43,14 @@ class Path:
         orientation: Quaternions over the same parameter, or None for arms that only
             position. Closed if `position` is, with a period of one or two laps.
         initial_normal: e_perp at the begin of the path, [3], see `ParallelTransportFrame`.
+        frame: Frame along the path; one of parallel transport by default.
         waypoints: What the path was made of, if it was.
 
     Attributes:
         position: The curve sigma_t.
         orientation: The curve of quaternions, or None.
         arc_length: Arc length of `position`.
-        frame: Parallel transport frame of `position`.
+        frame: Frame along `position`.
         projector: Projector onto `position`.
         waypoints: What the path was made of, or None.
 
@@ -63,6 +65,7 @@ class Path:
         orientation: OrientationCurve | None = None,
         *,
         initial_normal: ArrayLike | None = None,
+        frame: Frame | None = None,
         waypoints: PathWaypoints | None = None,
     ) -> None:
         if position.dimension != 3:
@@ -74,7 +77,7 @@ class Path:
         self.orientation = orientation
         self.waypoints = waypoints
         self.arc_length = ArcLength(position)
-        self.frame = ParallelTransportFrame(position, initial_normal)
+        self.frame = frame or ParallelTransportFrame(position, initial_normal)
         self.projector = Projector(position)
         self._evaluators: dict[int, PathEvaluator] = {}
 

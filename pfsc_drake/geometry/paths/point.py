@@ -20,16 +20,21 @@ class PathPointLayout:
     | `normal`     | 3               | e_perp, (3.4)                                        |
     | `position`   | 3 (order + 2)   | derivatives 0..order + 1 of sigma_t, row-major, m    |
     | `quaternion` | 4 (order + 1)   | derivatives 0..order of q; empty if not oriented     |
+    | `turn`       | order           | derivatives 1..order of psi, rad; empty if not turning |
 
     Derivatives are with respect to theta, the index of the derivative is the slow one.
     Beyond an end of an open path it goes on smoothly to a straight line and a constant
     orientation, see `paths.run_out`. Beyond that theta is clamped: derivatives of sigma_t from
-    the second and of q from the first, and alpha, are zero, e_perp is kept, and
+    the second, of q from the first and of psi, and alpha, are zero, e_perp is kept, and
     eta = s(theta) + e_par . (y - sigma_t(theta)).
+
+    psi is the angle about e_par by which a given e_perp turns against one that is transported in
+    parallel: psi' = (e_par x e_perp) . e_perp'.
 
     Args:
         order: Relative degree r of the law that reads it, 1..5.
         oriented: True if the path has an orientation.
+        turning: True if e_perp is given, such as by a surface, rather than transported.
 
     Raises:
         InputError: order out of range.
@@ -37,6 +42,7 @@ class PathPointLayout:
 
     order: int
     oriented: bool
+    turning: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.order, int) or not 1 <= self.order <= _MAX_ORDER:
@@ -86,6 +92,12 @@ class PathPointLayout:
         return slice(begin, begin + (4 * (self.order + 1) if self.oriented else 0))
 
     @property
+    def turn(self) -> slice:
+        """Slice of the derivatives of psi, [order], or empty."""
+        begin = self.quaternion.stop
+        return slice(begin, begin + (self.order if self.turning else 0))
+
+    @property
     def size(self) -> int:
         """Length of the whole array."""
-        return self.quaternion.stop
+        return self.turn.stop

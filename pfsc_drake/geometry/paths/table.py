@@ -8,8 +8,8 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, fit_pieces, power_coefficients
 from pfsc_drake.geometry.paths.arc_length import ArcLength
-from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.point import PathPointLayout
+from pfsc_drake.geometry.paths.turned_frame import Frame
 
 _DEGREE = 7
 # Of each quantity, relative to its size on the path.
@@ -44,7 +44,7 @@ def tabulate(
     position: Curve,
     orientation: OrientationCurve | None,
     arc_length: ArcLength,
-    frame: ParallelTransportFrame,
+    frame: Frame,
     layout: PathPointLayout,
 ) -> PathTable:
     """Table of a path.
@@ -56,7 +56,7 @@ def tabulate(
         position: Curve sigma_t in R^3.
         orientation: Curve of quaternions, or None.
         arc_length: Arc length of `position`.
-        frame: Parallel transport frame of `position`.
+        frame: Frame along `position`.
         layout: Which quantities, and where they go.
 
     Raises:
@@ -72,6 +72,8 @@ def tabulate(
         if orientation is not None:
             q = orientation.derivatives(theta, order)
             points[:, layout.quaternion] = q.reshape(len(theta), -1)
+        if layout.turning:
+            points[:, layout.turn] = frame.turning(theta, order)
         return points
 
     breakpoints = _common_breakpoints(position, orientation, frame)
@@ -101,12 +103,27 @@ def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
         parts = np.abs(points[:, place]).reshape(len(points), -1, dimension)
         norm = np.linalg.norm(parts, axis=2).max(axis=0)[:, None]
         scale[place] = np.maximum(parts.max(axis=0), _SMALL_COMPONENT * norm).ravel()
+    if layout.turning:
+        scale[layout.turn] = _turn_scale(points, layout)
     scale[scale == 0.0] = 1.0
     return scale
 
 
+def _turn_scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
+    """Size of the derivatives of psi, [order]: of a frame that turns as fast as the path bends.
+
+    A torsion that is constant but for rounding errors has derivatives of no size of their own.
+    """
+    sizes = np.abs(points[:, layout.turn]).max(axis=0)
+    position = points[:, layout.position].reshape(len(points), -1, 3)
+    bends = np.linalg.norm(position, axis=2).max(axis=0)[1:]
+    orders = np.arange(1, layout.order + 1)
+    rate = np.max(np.append((bends[1:] / bends[0]) ** (1.0 / orders), sizes[0]))
+    return np.asarray(np.maximum(sizes, rate**orders))
+
+
 def _common_breakpoints(
-    position: Curve, orientation: OrientationCurve | None, frame: ParallelTransportFrame
+    position: Curve, orientation: OrientationCurve | None, frame: Frame
 ) -> np.ndarray:
     """Where any of the quantities need not be smooth, [n]."""
     begin, end = position.domain

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 from pfsc_drake.geometry.surfaces.surface import Interval
 
@@ -83,6 +83,25 @@ def cover(
     cells = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1) - begins
     distances, _ = tree.query(cells)
     return Coverage((first, second), distances)
+
+
+def stand(theta: np.ndarray) -> float:
+    """Distance at which points stand, also those on lines that are further apart than they.
+
+    Args:
+        theta: Parameters, lengths in m, [n, 2], not along one line.
+
+    Returns:
+        Longest side of the Delaunay triangle that covers a place, median over all places, m;
+        1.8 / sqrt(density) for points thrown at random.
+    """
+    corners = theta[Delaunay(theta).simplices]
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    areas = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
+    order = np.argsort(longest)
+    below = np.cumsum(areas[order])
+    return float(longest[order][np.searchsorted(below, 0.5 * below[-1])])
 
 
 def _largest_rectangle(mask: np.ndarray) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -12,9 +12,9 @@ from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
 
 _REFINEMENTS = 2
 # Random vectors from which traces are estimated.
-_PROBES = 24
+_PROBES = 16
 # Logarithms of the roughness: beyond them only the knots decide, or rounding errors do.
-_LEAST, _MOST, _STEP = -8.0, 10.0, 0.1
+_LEAST, _MOST, _STEP = -8.0, 10.0, 0.2
 _NEAR = 1.0
 
 

@@ -11,7 +11,7 @@ from pfsc_drake.geometry.curves.spline import check_smoothness
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.base import Base
 from pfsc_drake.geometry.surfaces.choose_base import BaseChoice, choose_base
-from pfsc_drake.geometry.surfaces.coverage import cover
+from pfsc_drake.geometry.surfaces.coverage import cover, stand
 from pfsc_drake.geometry.surfaces.neighbours import Neighbourhoods, neighbourhoods
 from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
 from pfsc_drake.geometry.surfaces.product import ProductSurface
@@ -22,10 +22,10 @@ from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots, uniform_sp
 from pfsc_drake.geometry.surfaces.surface import Interval
 
 FEWEST_POINTS, MOST_POINTS = 50, 100_000
-# Spacings that a place may be away from the nearest point.
-_REACH = 4.0
+# How far a place may be from the nearest point, over the distance at which points stand.
+_REACH = 2.0
 # Spacings per knot interval, and the most coefficients.
-_SPACINGS, _MOST_COEFFICIENTS = 1.5, 4000.0
+_SPACINGS, _MOST_COEFFICIENTS = 2.0, 2500.0
 _FEWEST_INTERVALS = 8
 # Least part of the rectangle around all points that is left of it.
 _LEAST_PART = 0.25
@@ -50,7 +50,7 @@ class ScatteredFitOptions:
             a plane, and outward on a cylinder.
         along: Direction that theta_1 leans to, on a plane; by default the longer side.
         largest_hole: Largest distance of a place on the surface from the nearest point, m; by
-            default four times the distance at which points stand.
+            default twice the distance at which points stand, see `stand`.
         trim: Keep the largest rectangle of the parameters that has no larger hole, instead of
             refusing.
     """
@@ -116,7 +116,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     _check_length("largest_hole", options.largest_hole)
     near = neighbourhoods(cloud)
     base = choose_base(cloud, near, options.base, options.seen_from, options.along)
-    kept, domain, hole = _covered(cloud, near, base, options)
+    kept, domain, hole = _covered(cloud, base, options)
     cloud = cloud[kept]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
@@ -159,7 +159,8 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
         raise InputError(f"surface points: shape {cloud.shape}; [points, 3] is required")
     if not FEWEST_POINTS <= len(cloud) <= MOST_POINTS:
         raise InputError(
-            f"surface points: {len(cloud)}; from {FEWEST_POINTS} to {MOST_POINTS} are required"
+            f"surface points: {len(cloud)}; from {FEWEST_POINTS} to {MOST_POINTS} are required,"
+            " evenly thinned out where there are more"
         )
     bad = np.argwhere(~(np.abs(cloud) <= FARTHEST))
     if bad.size:
@@ -185,7 +186,7 @@ def check_cloud(points: ArrayLike) -> np.ndarray:
 
 
 def _covered(
-    points: np.ndarray, near: Neighbourhoods, base: Base, options: ScatteredFitOptions
+    points: np.ndarray, base: Base, options: ScatteredFitOptions
 ) -> tuple[np.ndarray, tuple[Interval, Interval], float]:
     """Which points are kept, the rectangle of parameters, and the radius of its largest hole."""
     theta = base.parameters(points)
@@ -194,8 +195,7 @@ def _covered(
     if base.closed[0]:
         domain = (Interval(0.0, base.period), domain[1])
     area = domain[0].length * domain[1].length
-    stand = max(near.spacing, math.sqrt(_LEAST_PART * area / len(points)))
-    reach = options.largest_hole or _REACH * stand
+    reach = options.largest_hole or _REACH * stand(theta)
     coverage = cover(theta, domain, reach, closed=base.closed[0])
     centre, radius = coverage.hole
     if radius <= reach:

@@ -1,16 +1,15 @@
 """Path and moving frame in Meshcat."""
 
 import numpy as np
-from pydrake.geometry import Cylinder, Meshcat, Rgba
+from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.systems.drawing.moving_frame import draw_frame
 
 _ROOT = "path_following"
 _PATH_COLOR = Rgba(0.15, 0.4, 0.85, 1.0)
-_AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
-_AXIS_LENGTH, _AXIS_RADIUS = 0.08, 0.003
 
 
 class PathVisualizer(LeafSystem):
@@ -41,14 +40,7 @@ class PathVisualizer(LeafSystem):
         theta = np.linspace(*self._path.position.domain, 800)
         points = self._path.position.derivatives(theta, 0)[:, 0, :]
         self._meshcat.SetLine(f"{_ROOT}/path", points.T, 3.0, _PATH_COLOR)
-        for i, color in enumerate(_AXIS_COLORS):
-            direction = np.eye(3)[i]
-            X_FA = RigidTransform(
-                RotationMatrix.MakeFromOneVector(direction, 2), direction * _AXIS_LENGTH / 2
-            )
-            axis = f"{_ROOT}/frame/axis_{i}"
-            self._meshcat.SetObject(axis, Cylinder(_AXIS_RADIUS, _AXIS_LENGTH), color)
-            self._meshcat.SetTransform(axis, X_FA)
+        draw_frame(self._meshcat, f"{_ROOT}/frame")
         return EventStatus.Succeeded()
 
     def _draw(self, context: Context) -> None:

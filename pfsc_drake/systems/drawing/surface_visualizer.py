@@ -3,14 +3,14 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from pydrake.geometry import Cylinder, Meshcat, Rgba
+from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from pfsc_drake.systems.drawing.moving_frame import draw_frame
+
 _ROOT = "surface_following"
 _LINE, _SKIN = Rgba(0.15, 0.4, 0.85, 1.0), Rgba(0.45, 0.65, 0.95, 0.35)
-_AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
-_AXIS_LENGTH, _AXIS_RADIUS = 0.08, 0.003
 
 
 class SurfaceVisualizer(LeafSystem):
@@ -51,14 +51,7 @@ class SurfaceVisualizer(LeafSystem):
         self._meshcat.SetTriangleMesh(f"{_ROOT}/skin", vertices.T, both.T, _SKIN)
         for i, line in enumerate(self._lines):
             self._meshcat.SetLine(f"{_ROOT}/line_{i}", line.T, 1.0, _LINE)
-        for i, color in enumerate(_AXIS_COLORS):
-            direction = np.eye(3)[i]
-            X_FA = RigidTransform(
-                RotationMatrix.MakeFromOneVector(direction, 2), direction * _AXIS_LENGTH / 2
-            )
-            axis = f"{_ROOT}/frame/axis_{i}"
-            self._meshcat.SetObject(axis, Cylinder(_AXIS_RADIUS, _AXIS_LENGTH), color)
-            self._meshcat.SetTransform(axis, X_FA)
+        draw_frame(self._meshcat, f"{_ROOT}/frame")
         return EventStatus.Succeeded()
 
     def _draw(self, context: Context) -> None:

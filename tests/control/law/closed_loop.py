@@ -11,6 +11,8 @@ from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.geometry import quaternion_to_matrix
 
 STEP, STEPS = 5e-3, 100
+# first derivative from nine equidistant values, error h^8 f^(9) / 630
+NINE_POINTS = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 
 
 class ClosedLoop:
@@ -141,3 +143,32 @@ def predicted(initial, poles):
         errors.append(e[-1])
         e = transition @ e
     return np.array(errors)
+
+
+def assert_linear_dynamics(Y, v, outputs, reference):
+    """Check that outputs are what they are called, and obey the linear dynamics of their poles.
+
+    Args:
+        Y: Derivatives 0..r-1 that the law tells, shape (samples, r, m).
+        v: Virtual inputs, shape (samples, m).
+        outputs: By other means, shape (samples, m).
+        reference: Derivatives 0..r, shape (samples, r + 1, m).
+    """
+    r, m = Y.shape[1:]
+    assert np.allclose(Y[:, 0], outputs, rtol=0, atol=1e-10)
+    # every order is the derivative of the one below
+    chain = np.concatenate([Y, v[:, None]], axis=1)
+    for k in range(r):
+        numeric = np.array([np.correlate(y, NINE_POINTS, "valid") for y in chain[:, k].T]).T / STEP
+        scale = np.abs(chain[:, k + 1]).max(axis=0)
+        assert np.all(scale > 0.0)
+        assert np.abs((numeric - chain[4:-4, k + 1]) / scale).max() < 2e-6, f"order {k + 1}"
+    # the errors are there at first, and the loop is linear
+    initial = Y[0] - reference[0, :r]
+    assert np.all(np.abs(initial) > 1e-4)
+    expected = reference[:, 0].copy()
+    for i in range(m):
+        poles = [-20.0 - 3.0 * i - 2.0 * k for k in range(r)]
+        expected[:, i] += predicted(initial[:, i], poles)
+    # the integration leaves 1e-13
+    assert np.abs(outputs - expected).max() < 1e-10

@@ -8,11 +8,10 @@ closes the loop, the differential equation is integrated tightly, and the result
 import numpy as np
 import pytest
 
-from tests.control.law.closed_loop import STEP, ClosedLoop, predicted, simulate, start
-
-# first derivative from nine equidistant values, error h^8 f^(9) / 630
-NINE_POINTS = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.path import PathManifold
+from tests.control.law.closed_loop import ClosedLoop, assert_linear_dynamics, simulate, start
+from tests.control.manifolds.surfaces import path_on_cylinder
 
 # law, model, joint damping as a fraction of the stiffness [s], orientation, damping of the drives
 CASES = {
@@ -64,39 +63,37 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     path = oriented_path if oriented else position_path
     if robot.n == 7:
         path = small_path
-    theta = 0.7
-    law = make_law(robot.chain, name, oriented)
+    check(robot, rigid, path, make_law(robot.chain, name, oriented), virtual_output)
+
+
+@pytest.mark.parametrize("name", ["velocity_servo", "rigid", "visco_elastic", "elastic"])
+def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
+    """Along it, along the surface's normal, and sideways; the frame turns about the tangent."""
+    path = path_on_cylinder()
+    r, model = RELATIVE_DEGREE[name], "comau_racer_1_4{}_3r"
+    rigid = load_robot(model.format(""))
+    robot = load_robot(model.format("_elastic")) if r > 2 else rigid
+    if name == "visco_elastic":
+        robot = load_robot(model.format("_elastic"), tuple(2e-3 * robot.chain.K_s))
+    manifold = PathManifold(r, oriented=False, turning=True)
+    point = path.evaluator(r).evaluate_at(0.7)
+    assert abs(point[manifold.layout.turn][0]) > 0.01
+    law = make_law(robot.chain, name, manifold=manifold)
+    check(robot, rigid, path, law, virtual_output)
+
+
+def check(robot, rigid, path, law, virtual_output, theta=0.7):
+    """Run a robot along a path and compare."""
     loop = ClosedLoop(robot, path, law, theta)
     x = start(robot, path, rigid, theta, loop.size)
     loop.middle = x[: robot.n] + 0.05
     times, states = simulate(loop, x)
-
     results = [loop.evaluate(t, x) for t, x in zip(times, states, strict=True)]
     assert not any(result[law.layout.status][0] for result in results)
     Y = np.array([result[law.layout.manifold_state] for result in results])
-    Y = Y.reshape(len(times), loop.r, loop.m)
     v = np.array([result[law.layout.virtual_input] for result in results])
     reference = np.array([loop.reference(t) for t in times])
-
-    # the outputs are what they are called, and every order is the derivative of the one below
+    assert np.ptp(reference[:, 0, 0]) > 0.05
     poses = [robot.tool_pose(loop.state(x)) for x in states]
     outputs = np.array([virtual_output(path, *pose) for pose in poses])
-    assert np.allclose(Y[:, 0], outputs, rtol=0, atol=1e-10)
-    chain = np.concatenate([Y, v[:, None]], axis=1)
-    for k in range(loop.r):
-        numeric = np.array([np.correlate(y, NINE_POINTS, "valid") for y in chain[:, k].T]).T / STEP
-        scale = np.abs(chain[:, k + 1]).max(axis=0)
-        assert np.all(scale > 0.0)
-        assert np.abs((numeric - chain[4:-4, k + 1]) / scale).max() < 2e-6, f"order {k + 1}"
-
-    # the errors are there at first, the reference moves, and the loop is linear
-    initial = Y[0] - reference[0, : loop.r]
-    assert np.all(np.abs(initial) > 1e-4)
-    assert np.ptp(reference[:, 0, 0]) > 0.05
-    expected = reference[:, 0].copy()
-    for i in range(loop.m):
-        poles = [-20.0 - 3.0 * i - 2.0 * k for k in range(loop.r)]
-        expected[:, i] += predicted(initial[:, i], poles)
-    deviation = np.abs(outputs - expected).max(axis=0)
-    # the integration leaves 1e-13
-    assert deviation.max() < 1e-10
+    assert_linear_dynamics(Y.reshape(len(times), loop.r, loop.m), v, outputs, reference)

@@ -14,13 +14,11 @@ from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
 from tests.control.law.closed_loop import (
-    STEP,
     ClosedLoop,
-    predicted,
+    assert_linear_dynamics,
     rest_of_state,
     simulate,
 )
-from tests.control.law.test_closed_loop import NINE_POINTS
 from tests.control.manifolds.surfaces import frame, further_coordinates, project
 
 # seen from above, the tool looks down on it
@@ -124,27 +122,10 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     Y = Y.reshape(len(times), loop.r, loop.m)
     v = np.array([result[made.layout.virtual_input] for result in results])
 
-    # xi and the angles are what they are called, and every order is the derivative of the one below
     further = []
     for x in states:
         y_t, R_e = robot.tool_pose(loop.state(x[:-2]))
         theta = project(geometry, y_t, theta)
         further.append(further_coordinates(manifold, geometry, theta, y_t, R_e))
     outputs = np.column_stack([states[:, -2:], further])
-    assert np.allclose(Y[:, 0], outputs, rtol=0, atol=1e-10)
-    chain = np.concatenate([Y, v[:, None]], axis=1)
-    for k in range(r):
-        numeric = np.array([np.correlate(y, NINE_POINTS, "valid") for y in chain[:, k].T]).T / STEP
-        scale = np.abs(chain[:, k + 1]).max(axis=0)
-        assert np.all(scale > 0.0)
-        assert np.abs((numeric - chain[4:-4, k + 1]) / scale).max() < 2e-6, f"order {k + 1}"
-
-    reference = np.array([loop.reference(t) for t in times])
-    initial = Y[0] - reference[0, :r]
-    assert np.all(np.abs(initial) > 1e-4)
-    expected = reference[:, 0].copy()
-    for i in range(loop.m):
-        poles = [-20.0 - 3.0 * i - 2.0 * k for k in range(r)]
-        expected[:, i] += predicted(initial[:, i], poles)
-    deviation = np.abs(outputs - expected).max(axis=0)
-    assert deviation.max() < 1e-10
+    assert_linear_dynamics(Y, v, outputs, np.array([loop.reference(t) for t in times]))

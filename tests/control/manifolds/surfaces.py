@@ -6,7 +6,8 @@ import numpy as np
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.geometry import FourierCurve, zyx_to_matrix
+from pfsc_drake.geometry.path_on_surface import path_on_surface
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.partials import partial_orders
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid, torus
@@ -27,6 +28,14 @@ def surface(name):
         ),
         "saddle": lambda: torus(0.5, 0.2, Turned([0.9, 0.0, 0.7], TILT)),
     }[name]()
+
+
+@cache
+def path_on_cylinder():
+    """Return an oval on the cylinder, oblique to its axis, whose frame turns to and fro."""
+    return path_on_surface(
+        surface("cylinder"), FourierCurve([0.7, 0.04], [[0.5, 0.05]], [[0.1, 0.15]])
+    )
 
 
 # a place, and the tool's distance from there along the normal

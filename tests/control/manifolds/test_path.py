@@ -17,6 +17,7 @@ from pfsc_drake.geometry import (
     rotation_to_axis,
 )
 from pfsc_drake.jets import Jet
+from tests.control.manifolds.surfaces import path_on_cylinder
 from tests.control.manifolds.tool_motion import NODES, ORDER, ToolMotion, assert_derivatives
 
 
@@ -28,7 +29,8 @@ def straight_piece():
 
 
 @pytest.fixture(
-    params=["lemniscate", "oriented", "circle, alpha one half", "straight"], name="situation"
+    params=["lemniscate", "oriented", "circle, alpha one half", "straight", "on a surface"],
+    name="situation",
 )
 def fixture_situation(request, oriented_path):
     """A path, a parameter on it, and the tool's offset from there in the plane across."""
@@ -39,6 +41,7 @@ def fixture_situation(request, oriented_path):
         "lemniscate": (Path(FourierCurve.bent_lemniscate()), 0.9, [0.01, -0.02, 0.015]),
         "oriented": (oriented_path, 2.45, [0.01, 0.015, -0.02]),
         "circle, alpha one half": (Path(circle), theta, 0.5 * inwards),
+        "on a surface": (path_on_cylinder(), 0.7, [0.03, -0.02, 0.025]),
         "straight": (Path(straight_piece()), 0.8, [0.05, 0.02, -0.04]),
     }[request.param]
 
@@ -66,6 +69,7 @@ def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
         [ca.SX(row) for row in point[layout.position].reshape(-1, 3)],
         [ca.SX(row) for row in quaternion],
         alignment,
+        [ca.SX(x) for x in point[layout.turn]],
     )
     outputs = path_coordinates(motion.y.truncate(order), motion.R.truncate(order), geometry)
     rows = [[float(ca.evalf(y.derivative(k))) for y in outputs] for k in range(order + 1)]
@@ -94,7 +98,10 @@ def outputs_over_time(path, point, motion, times, alignment=None):
             0
         ]
         tight = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15}
-        e_perp = solve_ivp(transport, (theta, s), point[4:7], **tight).y[:, -1]
+        if path.frame.turns:
+            e_perp = path.frame.normals(s)[0]
+        else:
+            e_perp = solve_ivp(transport, (theta, s), point[4:7], **tight).y[:, -1]
         sigma, slope = curve.derivatives(s, 1)
         e_par = slope / np.linalg.norm(slope)
         row = [eta + length, e_perp @ (y - sigma), np.cross(e_par, e_perp) @ (y - sigma)]

@@ -17,6 +17,7 @@ from pfsc_drake.geometry import (
     rotation_to_axis,
 )
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
+from tests.control.manifolds.surfaces import path_on_cylinder
 
 OFFSET = np.array([0.02, -0.03, 0.025])
 
@@ -240,3 +241,17 @@ def test_what_is_not_finite_stays_so(oriented_path):
     assert np.isnan(manifold_force(np.full(6, np.nan), point, layout, phi)).all()
     nowhere = np.full_like(point, np.nan)
     assert np.isnan(manifold_force(np.ones(6), nowhere, layout, phi, with_turning=True)).all()
+
+
+def test_power_beside_a_path_whose_frame_turns(virtual_output):
+    """On a surface: a tool that keeps its side step moves with the frame's turn."""
+    path, rng = path_on_cylinder(), np.random.default_rng(6)
+    y_t, R_e, point, layout, _ = place(path, 0.7, rng)
+    assert abs(point[layout.turn][0]) > 0.1
+    manifold = PathManifold(2, oriented=False, turning=True)
+    still = virtual_output(path, y_t, R_e)
+    for _ in range(3):
+        wrench, v = rng.uniform(-20, 20, 6), rng.uniform(-0.3, 0.3, 3)
+        rates = output_rates(virtual_output, path, y_t, R_e, v, np.zeros(3))
+        tau = np.array(manifold_force_function(manifold)(wrench, point, still)).ravel()
+        assert tau @ rates == pytest.approx(wrench[:3] @ v, abs=2e-8)

@@ -86,6 +86,23 @@ def test_only_measurements_reach_the_controller(load_scenario, name):
         assert not (_is_control(system) and isinstance(system, MultibodyPlant))
 
 
+def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
+    """Told of them, the law knew what no machine measures."""
+    settings = load_scenario("pfc_elbow_7r")
+    crossings = _crossings(_build(settings)) - {"reference_generator"}
+    assert crossings - MEASUREMENTS == {"link_pushes"}
+    settings.controller.posture.yields = "observed"
+    settings.controller.external_torque.source = "observed"
+    station = _build(settings)
+    assert _crossings(station) - {"reference_generator"} <= MEASUREMENTS
+    reads = [
+        source.get_name()
+        for (system, _), (source, _) in station.diagram.connection_map().items()
+        if system.get_name() == "posture_reference"
+    ]
+    assert len(reads) == 3
+
+
 def test_the_walk_finds_a_truth_that_is_told(load_scenario):
     settings = load_scenario("pfc_comau_6r_elastic")
     settings.controller.external_torque.source = "known"

@@ -46,7 +46,7 @@ def start(load_arm):
         part = _part(arm)
         x = part.state_at_rest(part.posture(begin.target, settings.start))
         arm.set_state(x)
-        return task.path, begin.theta, arm, x
+        return task.path, begin.place[0], arm, x
 
     return put
 

@@ -56,6 +56,19 @@ def test_without_a_second_lap_the_posture_does_not_return(log):
     assert "posture_return" not in posture_metrics(log, None)
 
 
+def test_what_joints_do_before_the_tool_sets_off_does_not_count(log):
+    """It rests for 0.2 s, its joints not yet; the second lap ends where they did so."""
+    resting = log.time < 0.2
+    for name in ("q_J", "eta", "eta_dot"):
+        values = log[name].values
+        values[200:] = values[:-200].copy()
+    log["eta"].values[resting] = 1e-7 * np.sin(log.time[resting])[:, None]
+    log["eta_dot"].values[resting] = 0.0
+    log["q_J"].values[resting, 5] = 0.3 * np.exp(-30.0 * log.time[resting])
+    metrics = posture_metrics(log, LAP)
+    assert metrics["posture_return"].value == pytest.approx(0.1, rel=1e-2)
+
+
 def test_the_elbows_travel_is_from_its_undisturbed_motion(log):
     elbow, eta = log["elbow"].values, log["eta"].values[:, 0]
     disturbed = log["push_force"].values.any(axis=1)

@@ -72,7 +72,9 @@ def test_six_axes_turn_the_tool_about_its_axis_meanwhile(five_axes):
         "damping: 16, inertia: 1}",
     )
     turned = np.rad2deg(run["q_J"][-1, 5] - run["q_J"][0, 5])
-    assert turned > 300.0
+    assert turned > 150.0
+    # as fast as its posture may be pulled: half of 600 deg/s
+    assert np.rad2deg(np.abs(run["v_J"][:, 5]).max()) < 320.0
     assert angle_between(run["axis_e"], run["axis_d"]).max() < 2e-6
     assert np.linalg.norm(run["xi"], axis=1).max() < 2e-6
 

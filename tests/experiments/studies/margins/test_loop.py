@@ -49,6 +49,38 @@ def fixture_three():
     return loop, section, linearize(loop, section, chosen)
 
 
+def test_a_fast_joint_is_no_fault():
+    """In one tick it moves by more than positions and velocities may contradict each other."""
+    changes = ["reference={points: [0.96, 0.7], velocity: 1.5, acceleration: 8, dwell: 0.02}"]
+    tolerance = 3e-4
+    changes += [f"faults.plausibility={tolerance}", "start.transition=0.01"]
+    loop = StationLoop(settings_of("pfc_elastic_3r", *changes), folder())
+    simulator = Simulator(loop.station.diagram)
+    loop.configure(simulator)
+    root = simulator.get_mutable_context()
+    loop.station.set_start(root)
+    simulator.Initialize()
+    simulator.AdvanceTo(0.15)
+    assert not loop.has_failed(root)
+    simulator.AdvancePendingEvents()
+    plant = loop.station.part.plant
+    v = plant.GetVelocities(plant.GetMyContextFromRoot(root))
+    assert np.abs(v).max() * loop.map.period > 2.0 * tolerance
+    assert linearize(loop, root, loop.variables_in_loop([root])) is not None
+
+
+@pytest.mark.parametrize("task", ["reference", "limits", "conditioning"])
+def test_a_posture_that_is_pulled_is_in_the_loop(task):
+    """What pulls it depends on the joints, and they follow it; a spring to a goal knows neither."""
+    changes = [f"controller.posture.task={task}", "reference.dwell=1"]
+    loop = StationLoop(settings_of("pfc_panda_7r", *changes), folder())
+    chosen = loop.variables_in_loop([at_rest(loop)])
+    posture = loop.station.diagram.GetSubsystemByName("posture_reference")
+    own = np.isin(loop.map.rows(posture), chosen)
+    # the motion of seven joints, orders 0 to 2, not the goal
+    assert own.sum() == (0 if task == "reference" else 21)
+
+
 CASES = [
     ("pfc_elastic_3r", []),
     ("pfc_elastic_3r", ["controller.law=rigid"]),

@@ -57,6 +57,16 @@ def test_six_axes_with_four_equal_poles_do_not_bear_5_percent():
     assert analysis.delay == -1
 
 
+def test_drives_of_a_light_arm_are_not_cut_off_by_the_error_that_is_tried():
+    """Weak drives would be at their limits where the believed weight is another at once."""
+    weak = "controller.effort_scale=0.4"
+    analysis = analysis_of("pfc_elastic_7r", weak, box=Box(0.05, 0.05, 0.0, 0.1))
+    assert all(case.is_stable for case in analysis.cases)
+    rate = analysis.nominal.worst.rate
+    for case in analysis.cases:
+        assert case.worst.rate == pytest.approx(rate, rel=0.3)
+
+
 def test_the_fast_pair_bears_the_box_and_has_margins():
     """With four equal poles the weakest drive bears 2 %."""
     fast = analysis_of(
