@@ -128,8 +128,10 @@ def mesh():
     """Return vertices and triangles of z = 0.5 (x^2 - y^2) on a grid, shapes (n, 3), (k, 3)."""
     x, y = np.meshgrid(np.linspace(-0.1, 0.1, 12), np.linspace(-0.2, 0.2, 16), indexing="ij")
     vertices = np.stack([x, y, 0.5 * (x**2 - y**2)], axis=-1).reshape(-1, 3)
-    corner = np.arange(12 * 16).reshape(12, 16)[:-1, :-1].reshape(-1, 1)
-    return vertices, np.vstack([corner + [0, 16, 17], corner + [0, 17, 1]])
+    corners = np.arange(12 * 16).reshape(12, 16)[:-1, :-1].reshape(-1, 1)
+    return vertices, np.vstack(
+        [corners + np.array(offsets) for offsets in ([0, 16, 17], [0, 17, 1])]
+    )
 
 
 def write_obj(file):
