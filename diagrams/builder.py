@@ -22,14 +22,17 @@ from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.notch import NotchedWorkpiece
+from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.make import make_task
 from diagrams.tasks.path_following import PathTask
+from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
-from diagrams.workpiece import Workpiece, upwards
+from diagrams.workpiece import Workpiece
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
 
@@ -108,13 +111,18 @@ def build_station(
 
 
 def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
+    period = scenario.controller.sampling_time
+    if scenario.workpiece is not None:
+        require(scenario.notch is None, "notch", "given", "null where there is a workpiece")
+        require_whole_fraction("workpiece.time_step", scenario.workpiece.time_step, period)
+        if not isinstance(task, SurfaceTask):
+            raise InputError("workpiece = given: must be null where the task is no surface")
+        return PressedWorkpiece(task.surface, task.place, scenario.workpiece)
     if scenario.notch is None:
         return None
-    step = scenario.notch.time_step
-    require_whole_fraction("notch.time_step", step, scenario.controller.sampling_time)
-    allowed = "null where the task is no path"
-    require(isinstance(task, PathTask), "notch", "given", allowed)
-    assert isinstance(task, PathTask)
+    require_whole_fraction("notch.time_step", scenario.notch.time_step, period)
+    if not isinstance(task, PathTask):
+        raise InputError("notch = given: must be null where the task is no path")
     return NotchedWorkpiece(task.path, scenario.notch)
 
 
@@ -139,8 +147,10 @@ def _start(
     """
     shift = np.zeros(3)
     if workpiece is not None:
-        shift = workpiece.start_shift(upwards(part.gravity, "notch"))
+        shift = workpiece.start_shift(part.gravity)
     start = task.start(shift)
+    if workpiece is not None:
+        workpiece.check_start(start.target.y_t)
     q_J = part.posture(start.target, scenario.start)
     for position, where in task.way():
         part.check_reach(position, where)
@@ -185,7 +195,7 @@ def build_station_replay(
     period, drawn = settings.simulation.frame_period, station.task.drawing
     look = None
     if station.workpiece is not None:
-        look = station.workpiece.look(upwards(station.part.gravity, "notch"))
+        look = station.workpiece.look(station.part.gravity)
     if isinstance(station.part, DeltaPart):
         robot = station.part.robot
         return build_delta_replay(robot, drawn, motion, meshcat, period, look)

@@ -11,7 +11,7 @@ from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import Task
-from diagrams.workpiece import FurtherLength, Workpiece, upwards
+from diagrams.workpiece import FurtherLength, Workpiece
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
@@ -171,5 +171,4 @@ class Station:
         """
         if self.workpiece is None:
             return {}
-        up = upwards(self.part.gravity, "notch")
-        return self.workpiece.lengths(self.path, y_t, self.initial_place[0], up)
+        return self.workpiece.lengths(y_t, self.initial_place, self.part.gravity)

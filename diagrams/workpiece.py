@@ -9,7 +9,6 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import Path
 from pfsc_drake.systems.drawing.robot_visualizer import Surface
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
@@ -76,33 +75,55 @@ class Workpiece(ABC):
         """
 
     @abstractmethod
-    def start_shift(self, up: np.ndarray) -> np.ndarray:
-        """Return how far from the path nothing is touched at the start [m], shape (3,).
+    def start_shift(self, gravity: np.ndarray) -> np.ndarray:
+        """Return how far from the start of the task nothing is touched [m], shape (3,).
 
         Args:
-            up: Against gravity, unit vector in the world, shape (3,).
+            gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
+
+        Raises:
+            InputError: See :meth:`add`.
         """
 
     @abstractmethod
     def lengths(
-        self, path: Path, y_t: np.ndarray, initial_theta: float, up: np.ndarray
+        self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
         """Return what is worth a look in a run, by name.
 
         Args:
-            path: The path that the tool follows.
             y_t: Motion of the tool point [m], shape (samples, 3).
-            initial_theta: Path parameter near the first sample.
-            up: See :meth:`start_shift`.
+            initial_place: Place on the manifold near the first sample.
+            gravity: See :meth:`start_shift`.
         """
 
     @abstractmethod
-    def look(self, up: np.ndarray) -> WorkpieceLook:
+    def look(self, gravity: np.ndarray) -> WorkpieceLook:
         """Return how it is drawn.
 
         Args:
-            up: See :meth:`start_shift`.
+            gravity: See :meth:`start_shift`.
         """
+
+    @abstractmethod
+    def check_start(self, y_t: np.ndarray) -> None:
+        """Refuse a start inside of the workpiece.
+
+        Args:
+            y_t: Tool point at the start [m], shape (3,).
+
+        Raises:
+            InputError: If it is.
+        """
+
+    def normal(self, axes: np.ndarray) -> np.ndarray | None:
+        """Return the direction in which it presses at the tool, shape (3,), if there is one.
+
+        Args:
+            axes: Axes of the manifold next to the tool as columns, shape (3, 3).
+        """
+        del axes
+        return None
 
 
 def upwards(gravity: np.ndarray, key: str) -> np.ndarray:

@@ -26,9 +26,11 @@ from experiments.results.link_signals import lap_length
 from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.posture_metrics import posture_metrics
+from experiments.results.press_metrics import press_metrics
 from experiments.results.provenance import standard_attributes
+from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
-from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.run_signals import collect_log
 from experiments.results.shape_metrics import shape_metrics
 from experiments.results.tick import measure_tick
 from experiments.simulation import simulate
@@ -189,13 +191,20 @@ def _measure(
         if interrupted():
             log.attributes["interrupted"] = f"at t = {end:.3f} s"
         results.write("log.h5", log.to_hdf5())
-        motion = collect_motion(station, result.root, settings.simulation.frame_period)
+        motion = collect_motion(
+            station,
+            result.root,
+            settings.simulation.frame_period,
+            log,
+            settings.reference.dwell,
+        )
         progress(end, "measuring the tick")
         tick = measure_tick(station, result.root, log) * 1e6
     # the tool comes to the path during the first rest; from then on deviations count
     metrics = path_following_metrics(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
+    metrics.update(press_metrics(log))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)

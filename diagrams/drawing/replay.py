@@ -1,7 +1,8 @@
 """A logged run in Meshcat: robot, path, moving frame and trail of the tool."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
@@ -17,6 +18,7 @@ from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
 from diagrams.workpiece import WorkpieceLook
+from pfsc_drake.systems.drawing.color_scale import signed_color
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
 from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
@@ -29,7 +31,7 @@ _TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class RecordedPushes:
-    """What pushes K points of a robot's links, at the recording's frames.
+    """What pushes K points of a robot, at the recording's frames.
 
     Attributes:
         points: Where [m], shape (frames, 3K).
@@ -38,6 +40,19 @@ class RecordedPushes:
 
     points: np.ndarray
     forces: np.ndarray
+
+
+@dataclass(frozen=True)
+class RecordedDistance:
+    """The tool's distance from a surface, at the recording's frames.
+
+    Attributes:
+        values: Signed [m], shape (frames,).
+        largest: Magnitude that has full colour [m], positive.
+    """
+
+    values: np.ndarray
+    largest: float
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,8 @@ class RecordedMotion:
         manifold_point: The manifold next to the tool, shape (frames, layout.size).
         elbow: A point of the arm whose way is drawn, too [m], shape (frames, 3).
         pushes: What pushes its links.
+        distance: What the colour of the tool's way tells; of one colour without.
+        tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
     """
 
     times: np.ndarray
@@ -59,6 +76,8 @@ class RecordedMotion:
     manifold_point: np.ndarray
     elbow: np.ndarray | None = None
     pushes: RecordedPushes | None = None
+    distance: RecordedDistance | None = None
+    tool_force: np.ndarray | None = None
 
 
 def build_replay(
@@ -123,7 +142,7 @@ def add_motion(
     builder.Connect(sources["manifold_point"], manifold.add(builder, meshcat, period))
     if workpiece is not None:
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
-    _add_trail(builder, "path_following", _TOOL, motion, motion.tool_pose[:, :3], meshcat, period)
+    _add_tool(builder, motion, meshcat, period)
     _add_links(builder, motion, meshcat, period)
     return sources["positions"]
 
@@ -131,16 +150,51 @@ def add_motion(
 def _add_trail(
     builder: DiagramBuilder,
     name: str,
-    color: Rgba,
+    color: Rgba | Callable[[float], Rgba],
     motion: RecordedMotion,
     points: np.ndarray,
     meshcat: Meshcat,
     period: float,
-) -> None:
-    """Add the way of a point, shape (frames, 3)."""
+) -> TrailVisualizer:
+    """Add the way of a point, shape (frames, 3), and return what draws it."""
     trail = builder.AddNamedSystem(f"{name}_trail", TrailVisualizer(name, color, meshcat, period))
     source = add_source(builder, f"{name}_point", motion.times, points)
     builder.Connect(source, trail.GetInputPort("point"))
+    return trail
+
+
+def _add_arrows(
+    builder: DiagramBuilder,
+    name: str,
+    motion: RecordedMotion,
+    pushes: RecordedPushes,
+    meshcat: Meshcat,
+    period: float,
+) -> None:
+    """Add arrows for forces, the longest for the largest of all frames."""
+    points, forces = pushes.points, pushes.forces
+    size = np.linalg.norm(forces.reshape(len(forces), -1, 3), axis=2).max(initial=0.0)
+    arrows = builder.AddNamedSystem(
+        f"{name}_arrows", ForceArrows(points.shape[1] // 3, size, meshcat, period, name)
+    )
+    for port, samples in (("points", points), ("forces", forces)):
+        source = add_source(builder, f"{name}_{port}", motion.times, samples)
+        builder.Connect(source, arrows.GetInputPort(port))
+
+
+def _add_tool(
+    builder: DiagramBuilder, motion: RecordedMotion, meshcat: Meshcat, period: float
+) -> None:
+    """Add the way of the tool, and the force on it, where it is recorded."""
+    points, distance = motion.tool_pose[:, :3], motion.distance
+    color = _TOOL if distance is None else partial(signed_color, largest=distance.largest)
+    trail = _add_trail(builder, "path_following", color, motion, points, meshcat, period)
+    if distance is not None:
+        source = add_source(builder, "distance", motion.times, distance.values[:, np.newaxis])
+        builder.Connect(source, trail.GetInputPort("value"))
+    if motion.tool_force is not None:
+        forces = RecordedPushes(points, motion.tool_force)
+        _add_arrows(builder, "tool_force", motion, forces, meshcat, period)
 
 
 def _add_links(
@@ -150,14 +204,7 @@ def _add_links(
     if motion.elbow is not None:
         _add_trail(builder, "elbow", _ELBOW, motion, motion.elbow, meshcat, period)
     if motion.pushes is not None:
-        points, forces = motion.pushes.points, motion.pushes.forces
-        size = np.linalg.norm(forces.reshape(len(forces), -1, 3), axis=2).max(initial=0.0)
-        arrows = builder.AddNamedSystem(
-            "push_arrows", ForceArrows(points.shape[1] // 3, size, meshcat, period)
-        )
-        for name, samples in (("points", points), ("forces", forces)):
-            source = add_source(builder, f"push_{name}", motion.times, samples)
-            builder.Connect(source, arrows.GetInputPort(name))
+        _add_arrows(builder, "push", motion, motion.pushes, meshcat, period)
 
 
 def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
+from pfsc_drake.control.compliance.press import PressParameters
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
 
@@ -46,6 +47,8 @@ class ComplianceParameters:
         transversal: Of xi_1 and xi_2.
         rotational: Of the angles, three or those of the tool's axis; oriented paths only.
         with_turning: Whether torques act along eta where the path's orientation turns.
+        press: With which force a tool presses on a surface, whose transversal coordinate has no
+            stiffness then. None without the block.
     """
 
     source: str = "sensor"
@@ -54,9 +57,14 @@ class ComplianceParameters:
     transversal: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     rotational: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     with_turning: bool = False
+    press: PressParameters | None = None
 
     def __post_init__(self) -> None:
         require(self.source in SOURCES, "source", self.source, ", ".join(SOURCES))
+        stiffness = self.transversal.stiffness
+        free = not stiffness.at and stiffness.value == 0.0
+        allowed = "null unless transversal.stiffness.value is 0, which lets the force decide"
+        require(self.press is None or free, "press", "given", allowed)
 
     @property
     def needs_sensor(self) -> bool:

@@ -2,48 +2,33 @@
 
 import dataclasses as dc
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-    require_numbers,
+from diagrams.scenario.ball import (
+    LARGEST,
+    SMALLEST,
+    SoftBall,
+    require_contact_step,
+    require_up_to,
 )
-
-_SMALLEST, _LARGEST = 1e-4, 10.0  # m, of workpiece and ball
-
-_STEPS = (1e-5, 1e-3)
+from diagrams.scenario.checks import require, require_between, require_numbers
 
 
 @dc.dataclass
-class BallParameters:
+class BallParameters(SoftBall):
     """A ball with a soft shell on the tool.
 
     A DELTA robot holds it by a gripper; gripper, ball and force/torque sensor are the load of
     the robot's parameters.
 
     Attributes:
-        radius: Radius, 1e-4 to 10 [m].
         distance: From the tool point down to the ball's centre [m]; 0 on robots that turn
             their tool.
-        modulus: Elasticity of the shell, pressure per relative depth [Pa].
-        dissipation: Of Hunt and Crossley [s/m].
-        friction: Coulomb coefficient between ball and notch.
-        resolution: Edge length of the mesh that contact is computed with, 1e-4 m or more.
     """
 
-    radius: float = 0.02
     distance: float = 0.12
-    modulus: float = 1e6
-    dissipation: float = 1.0
-    friction: float = 0.2
-    resolution: float = 6e-3
 
     def __post_init__(self) -> None:
-        for key in ("radius", "resolution"):
-            require_between(key, getattr(self, key), _SMALLEST, _LARGEST, "m, a positive number")
-        require_between("modulus", self.modulus, 1.0, 1e12, "Pa, a positive number")
-        for key, most in {"distance": _LARGEST, "dissipation": 1e6, "friction": 1e3}.items():
-            allowed = f"zero or a positive number, at most {most:g}"
-            require(0.0 <= getattr(self, key) <= most, key, getattr(self, key), allowed)
+        super().__post_init__()
+        require_up_to("distance", self.distance, LARGEST)
 
 
 @dc.dataclass
@@ -71,16 +56,14 @@ class NotchParameters:
 
     def __post_init__(self) -> None:
         require_numbers("displacement", self.displacement, 3)
-        near = max(map(abs, self.displacement)) <= _LARGEST
-        require(near, "displacement", self.displacement, f"3 numbers of at most {_LARGEST:g} m")
+        near = max(map(abs, self.displacement)) <= LARGEST
+        require(near, "displacement", self.displacement, f"3 numbers of at most {LARGEST:g} m")
         for key in ("radius", "depth", "width"):
-            require_between(key, getattr(self, key), _SMALLEST, _LARGEST, "m, a positive number")
+            require_between(key, getattr(self, key), SMALLEST, LARGEST, "m, a positive number")
         require(self.radius > self.ball.radius, "radius", self.radius, "more than ball.radius")
         require(self.depth >= self.radius, "depth", self.depth, "radius or more")
         require(self.width > 2.0 * self.radius, "width", self.width, "more than twice the radius")
-        shortest, longest = _STEPS
-        allowed = f"{shortest:g} to {longest:g} s"
-        require(shortest <= self.time_step <= longest, "time_step", self.time_step, allowed)
+        require_contact_step(self.time_step)
 
     @property
     def clearance(self) -> float:

@@ -22,6 +22,7 @@ from diagrams.scenario.path import PathParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.simulation import SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
+from diagrams.scenario.workpiece import WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
@@ -73,6 +74,8 @@ class Scenario:
         faults: What is a fault, and how it ends.
         notch: Workpiece with a notch along the path, and a ball on the tool that runs in it; it
             starts in the middle of the notch, ``start.offset`` beside. None without the block.
+        workpiece: Workpiece under the surface, and a ball on the tool that presses on it. None
+            without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -101,6 +104,7 @@ class Scenario:
     sensor: SensorParameters = dc.field(default_factory=SensorParameters)
     faults: FaultParameters = dc.field(default_factory=FaultParameters)
     notch: NotchParameters | None = None
+    workpiece: WorkpieceParameters | None = None
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)

@@ -1,23 +1,13 @@
 """A workpiece with a notch, and the ball that runs in it."""
 
 import numpy as np
-from pydrake.common import MemoryFile
-from pydrake.geometry import (
-    AddCompliantHydroelasticProperties,
-    AddContactMaterial,
-    AddRigidHydroelasticProperties,
-    Cylinder,
-    GeometryId,
-    InMemoryMesh,
-    Mesh,
-    ProximityProperties,
-    Sphere,
-)
+from pydrake.geometry import Cylinder, GeometryId, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 
 from diagrams.scenario.notch import NotchParameters
+from diagrams.surroundings.contact_geometry import add_rigid_surface, add_soft_ball
 from diagrams.surroundings.notch_motion import place_in_notch
 from diagrams.workpiece import FurtherLength, Workpiece, WorkpieceLook, upwards
 from pfsc_drake.geometry import Path
@@ -58,56 +48,33 @@ class NotchedWorkpiece(Workpiece):
         return self.parameters.ball.radius
 
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """See :class:`Workpiece`."""
-        up = upwards(plant.gravity_field().gravity_vector(), "notch")
-        ball = self._add_ball(plant, tool, up)
-        self._add_notch(plant, up)
-        return [ball]
+        """See :class:`Workpiece`; a tool with a ball below it has the axes of the world."""
+        ball, up = self.parameters.ball, upwards(plant.gravity_field().gravity_vector(), "notch")
+        add_rigid_surface(
+            plant, *notch_surface(self._path, self.parameters, up), "notch", ball.friction
+        )
+        return [add_soft_ball(plant, tool, ball, -ball.distance * up)]
 
-    def _add_notch(self, plant: MultibodyPlant, up: np.ndarray) -> None:
-        friction = self.parameters.ball.friction
-        properties = ProximityProperties()
-        AddContactMaterial(friction=CoulombFriction(friction, friction), properties=properties)
-        AddRigidHydroelasticProperties(properties)
-        surface = notch_surface(self._path, self.parameters, up)
-        mesh = Mesh(InMemoryMesh(mesh_file=MemoryFile(_as_obj(*surface), ".obj", "notch")))
-        plant.RegisterCollisionGeometry(
-            plant.world_body(), RigidTransform(), mesh, "notch", properties
-        )
-
-    def _add_ball(self, plant: MultibodyPlant, tool: Frame, up: np.ndarray) -> GeometryId:
-        """Add the ball below the tool point, on a tool whose axes are those of the world."""
-        ball, properties = self.parameters.ball, ProximityProperties()
-        AddContactMaterial(
-            dissipation=ball.dissipation,
-            friction=CoulombFriction(ball.friction, ball.friction),
-            properties=properties,
-        )
-        AddCompliantHydroelasticProperties(
-            resolution_hint=ball.resolution,
-            hydroelastic_modulus=ball.modulus,
-            properties=properties,
-        )
-        X_BC = tool.GetFixedPoseInBodyFrame() @ RigidTransform(-ball.distance * up)
-        return plant.RegisterCollisionGeometry(
-            tool.body(), X_BC, Sphere(ball.radius), "ball", properties
-        )
-
-    def start_shift(self, up: np.ndarray) -> np.ndarray:
+    def start_shift(self, gravity: np.ndarray) -> np.ndarray:
         """Return the way to the middle of the notch, where the ball touches nothing."""
+        up = upwards(gravity, "notch")
         return np.array(self.parameters.displacement) + self.parameters.clearance * up
 
+    def check_start(self, y_t: np.ndarray) -> None:
+        """See :class:`Workpiece`; :meth:`start_shift` leads out of it."""
+
     def lengths(
-        self, path: Path, y_t: np.ndarray, initial_theta: float, up: np.ndarray
+        self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
     ) -> dict[str, FurtherLength]:
         """Return ``notch_position`` of the ball, see :func:`place_in_notch`."""
-        place = place_in_notch(path, self.parameters, y_t, initial_theta, up)
+        up = upwards(gravity, "notch")
+        place = place_in_notch(self._path, self.parameters, y_t, initial_place[0], up)
         limit = self.parameters.clearance
         return {"notch_position": FurtherLength(place, ["left", "above"], limit)}
 
-    def look(self, up: np.ndarray) -> WorkpieceLook:
+    def look(self, gravity: np.ndarray) -> WorkpieceLook:
         """Return workpiece and ball, and the ball's holder if it is away from the tool point."""
-        ball = self.parameters.ball
+        ball, up = self.parameters.ball, upwards(gravity, "notch")
         parts = [ToolPart("ball", Sphere(ball.radius), ACCENT, RigidTransform(-ball.distance * up))]
         length = ball.distance - ball.radius
         if length > 0.0:
@@ -145,9 +112,3 @@ def _profile(notch: NotchParameters) -> np.ndarray:
     if rim == 0.0:  # the rim ends where the arc begins
         left, right = left[:1], right[1:]
     return np.vstack([left, arc, right])
-
-
-def _as_obj(vertices: np.ndarray, triangles: np.ndarray) -> str:
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
-    lines += [f"f {a} {b} {c}" for a, b, c in triangles + 1]
-    return "\n".join(lines) + "\n"

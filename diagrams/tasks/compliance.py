@@ -1,13 +1,17 @@
 """Compliance: from forces on the tool to the reference of the law."""
 
+import math
+
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
+from pfsc_drake.systems.control.pressing import Pressing
 
 # up to which derivative the filter knows the external reference, see ImpedanceLaw
 _DESIRED_ORDER = 4
@@ -39,6 +43,7 @@ def add_compliance(
     linearization: Linearization,
     ports: dict[str, OutputPort],
     lap: float | None = None,
+    end: float = math.inf,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
@@ -50,9 +55,11 @@ def add_compliance(
             ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
             derivatives up to :func:`reference_order`.
         lap: Length of the path [m] if it is closed.
+        end: When the external reference ends [s].
 
     Returns:
-        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``;
+        ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
+        a force reference ``press``;
         ``compliance_status``, an :class:`ImpedanceStatus`.
 
     Raises:
@@ -81,14 +88,39 @@ def add_compliance(
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
-    builder.Connect(force, impedance.GetInputPort("manifold_force"))
+    signals = _add_press(builder, scenario, linearization, force, end)
+    builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
     builder.Connect(ports[ready], impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]
-    return {
+    return signals | {
         "reference": reference,
         "desired_reference": desired,
         "manifold_force": force,
         "compliance_status": impedance.GetOutputPort("status"),
     }
+
+
+def _add_press(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    linearization: Linearization,
+    force: OutputPort,
+    end: float,
+) -> dict[str, OutputPort]:
+    """Return ``press`` and ``pressed_force``, see :class:`Pressing`, if there is a reference."""
+    press, coordinates = scenario.compliance.press, linearization.manifold.coordinates
+    if press is None:
+        return {}
+    across = indices(coordinates, Kind.TRANSVERSAL)
+    if across.stop - across.start != 1:
+        raise InputError(
+            "compliance.press: must be null unless controller.manifold is surface, which has one "
+            "transversal coordinate"
+        )
+    system = builder.AddNamedSystem(
+        "pressing", Pressing(press.over_time(end), across.start, len(coordinates))
+    )
+    builder.Connect(force, system.GetInputPort("manifold_force"))
+    return {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}

@@ -143,8 +143,8 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        lap = following.task.lap
-        made |= add_compliance(builder, scenario, law.linearization, inputs, lap)
+        lap, end = following.task.lap, following.task.motion.domain[1]
+        made |= add_compliance(builder, scenario, law.linearization, inputs, lap, end)
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):

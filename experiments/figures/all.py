@@ -21,6 +21,7 @@ from experiments.figures.forces import draw_forces, has_forces
 from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
+from experiments.figures.polish import draw_force_map, draw_pressing
 from experiments.figures.positions import draw_positions
 from experiments.figures.posture import (
     draw_conditioning,
@@ -84,6 +85,8 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("axis_e", "axis_d"), draw_axis),
     (has_forces, draw_forces),
     (_has("notch_position"), draw_notch_position),
+    (_has("normal_force", "xi"), draw_pressing),
+    (_has("normal_force", "eta"), draw_force_map),
     (has_pushes, draw_pushes),
     (_has("q_J"), draw_positions),
     (_has("q_J", "q_posture"), draw_posture),

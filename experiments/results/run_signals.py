@@ -3,16 +3,11 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.replay import RecordedMotion, RecordedPushes
 from diagrams.station import Station
-from experiments.results.link_signals import (
-    add_link_signals,
-    elbow_motion,
-    has_elbow,
-    push_forces,
-)
+from experiments.results.link_signals import add_link_signals
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
+from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
@@ -65,6 +60,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_orientation(log, station, raw["manifold_point"], points, pose)
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
+    add_pressing(log, station, raw, points)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -79,6 +75,8 @@ def optional_signals(station: Station) -> set[str]:
         station: The station, simulated or not.
     """
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
+    if is_pressed(station):
+        names.add("normal_force")
     if "desired_reference" in names:
         names.add("xi_d")
     if "friction_torque" in names:
@@ -112,36 +110,6 @@ def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
     if len(q_J) == 0:
         return np.zeros((0, 12))
     return np.array(pose_function(station.robot).map(len(q_J))(q_J.T)).T
-
-
-def collect_motion(station: Station, root: Context, period: float) -> RecordedMotion:
-    """Return the motion of a run at the frames of a recording, as far as it is finite.
-
-    Args:
-        station: The station that was simulated.
-        root: Its context at the end.
-        period: Time between frames [s].
-    """
-    times, raw = station.log.read(root)
-    finite = np.isfinite(np.hstack([raw["manifold_point"], raw["joint_state"]])).all(axis=1)
-    usable = np.flatnonzero(finite)
-    stride = max(1, round(period / station.controller.period))
-    frames = usable[::stride]
-    state = raw["joint_state"][frames]
-    states = [station.part.coordinates.plant_state(x) for x in state]
-    half = station.part.coordinates.num_states // 2
-    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
-    pushes = None
-    if "push_wrench" in raw:
-        pushes = RecordedPushes(raw["push_point"][frames], push_forces(raw)[frames])
-    return RecordedMotion(
-        times[frames],
-        positions,
-        _tool_poses(station, state),
-        raw["manifold_point"][frames],
-        elbow_motion(station, state) if has_elbow(station) else None,
-        pushes,
-    )
 
 
 def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:

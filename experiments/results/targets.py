@@ -7,6 +7,7 @@ from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import is_redundant
 from experiments.results.path_metrics import metric_names
 from experiments.results.posture_metrics import posture_metric_names
+from experiments.results.press_metrics import press_metric_names
 from experiments.results.run_signals import optional_signals
 from experiments.results.shape_metrics import shape_metrics
 from pfsc_drake.errors import InputError
@@ -36,6 +37,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
         other = set() if law == settings.controller.law else _OF_OTHER_LAWS
         known = [
             *metric_names(station.robot.dimension, signals | other),
+            *press_metric_names(signals),
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape, station.task.fit),
             *JointLimits.of(station.robot).metric_names(),

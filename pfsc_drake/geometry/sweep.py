@@ -47,11 +47,16 @@ def swept_surface(
         + profile[None, :, :1] * left[:, None]
         + profile[None, :, 1:] * above[:, None]
     )
-    return vertices.reshape(-1, 3), _strip(len(theta), len(profile))
+    return vertices.reshape(-1, 3), strip(len(theta), len(profile))
 
 
-def _strip(rows: int, columns: int) -> np.ndarray:
-    """Return two triangles for every cell of a grid of vertices."""
+def strip(rows: int, columns: int) -> np.ndarray:
+    """Return two triangles for every cell of a grid of vertices, clockwise from row to column.
+
+    Args:
+        rows: Number of rows of vertices, one after the other.
+        columns: Number of vertices in a row.
+    """
     cell = np.arange(columns - 1) + columns * np.arange(rows - 1)[:, None]
     here, along = cell.ravel(), cell.ravel() + columns
     return np.concatenate(

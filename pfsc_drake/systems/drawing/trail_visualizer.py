@@ -1,5 +1,7 @@
 """The way of a point in Meshcat."""
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
@@ -14,6 +16,7 @@ class TrailVisualizer(LeafSystem):
 
     Ports:
         point (input): World axes [m], shape (3,); nothing is drawn where it is not finite.
+        value (input): What the colour tells, shape (1,), if it tells anything.
 
     State:
         Discrete: the point at the last frame [m], shape (3,), NaN before the first, and the
@@ -21,17 +24,25 @@ class TrailVisualizer(LeafSystem):
 
     Args:
         name: Meshcat path of the trail.
-        color: Its colour.
+        color: Its colour, or the colour that a value gives the piece that ends there.
         meshcat: Where to draw, axes of the world.
         period: Time between frames [s].
     """
 
-    def __init__(self, name: str, color: Rgba, meshcat: Meshcat, period: float) -> None:
+    def __init__(
+        self,
+        name: str,
+        color: Rgba | Callable[[float], Rgba],
+        meshcat: Meshcat,
+        period: float,
+    ) -> None:
         super().__init__()
         self._name, self._color, self._meshcat = name, color, meshcat
         self._last = self.DeclareDiscreteState(np.full(3, np.nan))
         self._frames = self.DeclareDiscreteState(1)
         self._point = self.DeclareVectorInputPort("point", 3)
+        if not isinstance(color, Rgba):
+            self.DeclareVectorInputPort("value", 1)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
 
@@ -44,10 +55,15 @@ class TrailVisualizer(LeafSystem):
         time = context.get_time()
         frame = int(context.get_discrete_state(self._frames).value()[0])
         piece = f"{self._name}/trail/{frame:05d}"
-        self._meshcat.SetLine(piece, ends, _WIDTH, self._color)
+        self._meshcat.SetLine(piece, ends, _WIDTH, self._piece_color(context))
         if time > 0.0:
             self._meshcat.SetProperty(piece, "visible", False, 0.0)
         self._meshcat.SetProperty(piece, "visible", True, time)
+
+    def _piece_color(self, context: Context) -> Rgba:
+        if isinstance(self._color, Rgba):
+            return self._color
+        return self._color(float(self.GetInputPort("value").Eval(context)[0]))
 
     def _remember(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(self._last, self._point.Eval(context))

@@ -88,7 +88,7 @@ def test_what_is_drawn_is_what_is_touched(arm_in_a_notch):
     notch = arm_in_a_notch.notch
     notch.ball.distance = 0.1
     path = build_station_path(arm_in_a_notch)
-    look = NotchedWorkpiece(path, notch).look(UP)
+    look = NotchedWorkpiece(path, notch).look(-9.81 * UP)
     vertices, triangles = notch_surface(path, notch, UP)
     np.testing.assert_array_equal(look.surface.vertices, vertices)
     np.testing.assert_array_equal(look.surface.triangles, triangles)

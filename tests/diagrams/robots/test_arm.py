@@ -8,7 +8,8 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import JointFrictionParameters, RobotParameters, Scenario
-from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.recorded_motion import collect_motion
+from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForcePulse
@@ -95,7 +96,7 @@ def test_start_and_replay(coupled):
     station, root, log = run(coupled, 0.05)
     assert np.abs(log["v_J"].values[0]).max() < 1e-15
     np.testing.assert_allclose(log["xi"].values[0], [0.01, 0.0], atol=1e-9)
-    motion = collect_motion(station, root, 0.01)
+    motion = collect_motion(station, root, 0.01, log, 0.0)
     model = station.part.model
     context = model.CreateDefaultContext()
     for positions, pose in zip(motion.positions, motion.tool_pose, strict=True):

@@ -1,0 +1,58 @@
+"""What a recording of a run draws, picked from its log."""
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
+from diagrams.station import Station
+from experiments.results.run_log import FloatArray, RunLog
+
+
+def collect_motion(
+    station: Station, root: Context, period: float, log: RunLog, start: float
+) -> RecordedMotion:
+    """Return the motion of a run at the frames of a recording, as far as it is finite.
+
+    Args:
+        station: The station that was simulated.
+        root: Its context at the end.
+        period: Time between frames [s].
+        log: What :func:`experiments.results.run_signals.collect_log` made of it.
+        start: How long the tool comes to the manifold [s]; its distance counts from then on.
+    """
+    _, raw = station.log.read(root)
+    finite = np.isfinite(np.hstack([raw["manifold_point"], raw["joint_state"]])).all(axis=1)
+    usable = np.flatnonzero(finite)
+    stride = max(1, round(period / station.controller.period))
+    frames = usable[::stride]
+    states = [station.part.coordinates.plant_state(x) for x in raw["joint_state"][frames]]
+    half = station.part.coordinates.num_states // 2
+    positions = np.array(states).reshape(len(frames), 2 * half)[:, :half]
+    pushes = None
+    if "push_force" in log:
+        pushes = RecordedPushes(log["push_point"].values[frames], log["push_force"].values[frames])
+    return RecordedMotion(
+        log.time[frames],
+        positions,
+        np.hstack([log["y_t"].values, log["R_e"].values])[frames],
+        raw["manifold_point"][frames],
+        log["elbow"].values[frames] if "elbow" in log else None,
+        pushes,
+        _distance(log.time[frames], log["xi"].values[frames], start),
+        log["wrench_ext"].values[frames, :3] if "wrench_ext" in log else None,
+    )
+
+
+def _distance(times: FloatArray, xi: FloatArray, start: float) -> RecordedDistance | None:
+    """Return the distance from a surface; None from a path, which has no sign.
+
+    Args:
+        times: Times of the frames [s], shape (frames,).
+        xi: Transversal coordinates [m], shape (frames, 1) of a surface.
+        start: Time from which on the distance counts [s].
+    """
+    if xi.shape[1] != 1:
+        return None
+    counting = np.abs(xi[times >= start, 0])
+    largest = float(counting.max(initial=0.0))
+    return RecordedDistance(xi[:, 0], largest) if largest > 0.0 else None

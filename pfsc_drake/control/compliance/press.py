@@ -1,0 +1,62 @@
+"""A force with which a tool is to press on a surface, over time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pfsc_drake.control.law.transition import Transition
+from pfsc_drake.errors import InputError
+
+
+@dataclass
+class PressParameters:
+    """Force reference of the transversal coordinate, in place of a place.
+
+    With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
+    ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
+    workpiece with little, to be slow without much damping, which would turn a slope of the
+    workpiece into a force; then with all of it; in the end the other way, off the workpiece.
+
+    Attributes:
+        force: With which it presses against the normal [N].
+        approach: The same until ``contact`` [N].
+        retreat: With which it is taken off along the normal [N].
+        begin: When it sets off [s].
+        contact: By when it surely touches the workpiece, and the full force begins [s].
+        retreat_time: How long before the end of the reference it is taken off [s].
+        ramp: Time of every change, which is C^4 [s].
+    """
+
+    force: float = 20.0
+    approach: float = 6.0
+    retreat: float = 6.0
+    begin: float = 0.1
+    contact: float = 1.0
+    retreat_time: float = 0.5
+    ramp: float = 0.1
+
+    def __post_init__(self) -> None:
+        for key in ("force", "approach", "retreat", "begin", "retreat_time"):
+            self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
+        self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
+        latest = self.begin + self.ramp
+        self._require("contact", latest <= self.contact <= 1e6, f"{latest:g} s or later")
+
+    def _require(self, key: str, good: bool, allowed: str) -> None:
+        if not good:
+            raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
+
+    def over_time(self, end: float) -> Callable[[float], float]:
+        """Return the force along the inward normal that the workpiece is to bear, [s] -> [N].
+
+        Args:
+            end: When the reference ends [s].
+        """
+        rest = Transition(self.ramp, 0)
+        changes = [
+            (self.begin, self.approach),
+            (self.contact, self.force - self.approach),
+            (end - self.retreat_time, -self.force - self.retreat),
+        ]
+        return lambda time: sum(
+            size * float(1.0 - rest.at(time - begin)[0]) for begin, size in changes
+        )

@@ -1,0 +1,55 @@
+"""Metrics of a made-up touch-down."""
+
+import numpy as np
+import pytest
+
+from experiments.results.press_metrics import press_metric_names, press_metrics
+from experiments.results.run_log import RunLog
+
+TIME = np.linspace(0.0, 4.0, 401)
+
+
+def make_log(force, press=None):
+    log = RunLog(TIME)
+    log.add("normal_force", force[:, None], "N", ["f_n"])
+    if press is not None:
+        log.add("press", press[:, None], "N", ["press"])
+    return log
+
+
+@pytest.fixture(name="press")
+def fixture_press():
+    return np.select([TIME < 0.5, TIME < 1.0, TIME < 3.0], [0.0, 5.0, 20.0], -5.0)
+
+
+def test_overshoot_is_relative_to_the_reference_of_the_moment(press):
+    force = np.where(TIME < 0.7, 0.0, np.maximum(press, 0.0))
+    force[75] = 6.0  # 20 % of 5 N
+    force[105] = 22.0  # 10 % of 20 N
+    force[200] = 18.5
+    metrics = press_metrics(make_log(force, press))
+    assert metrics["touch_down"].value == pytest.approx(0.7)
+    assert metrics["touch_down_overshoot"].value == pytest.approx(0.2)
+    assert metrics["max_force_error"].value == pytest.approx(1.5)
+    assert metrics["peak_force"].value == 22.0
+    assert metrics["contact_losses"].value == 0.0
+    assert list(metrics) == press_metric_names({"normal_force", "press"})
+
+
+def test_a_bounce_is_counted(press):
+    force = np.where(TIME < 0.7, 0.0, np.maximum(press, 0.0))
+    force[72:75] = force[80:82] = 0.0
+    assert press_metrics(make_log(force, press))["contact_losses"].value == 2.0
+
+
+def test_what_never_touches_has_no_overshoot(press):
+    metrics = press_metrics(make_log(np.zeros_like(TIME), press))
+    assert np.isnan(metrics["touch_down"].value)
+    assert np.isnan(metrics["touch_down_overshoot"].value)
+
+
+def test_position_control_has_a_peak_alone():
+    metrics = press_metrics(make_log(np.full_like(TIME, 70.0)))
+    assert list(metrics) == press_metric_names({"normal_force"}) == ["peak_force"]
+    assert metrics["peak_force"].value == 70.0
+    assert not press_metrics(RunLog(TIME))

@@ -1,0 +1,61 @@
+"""A tool that is pressed on a workpiece, through the command line, until it presses."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from experiments.cli import main
+
+FORCE, APPROACH, DAMPING = 20.0, 6.0, 300.0  # N, N, N s/m, of the scenario
+
+
+@pytest.fixture(name="out", scope="module")
+def fixture_out(tmp_path_factory):
+    out = tmp_path_factory.mktemp("polish")
+    bare = ("--no-figures", "--no-recording", "--duration", "1.5")
+    assert main(["run", "sfc_polish", "--out", str(out), *bare]) == 0
+    return out
+
+
+@pytest.fixture(name="log", scope="module")
+def fixture_log(out):
+    with h5py.File(out / "log.h5") as file:
+        return {name: dataset[:] for name, dataset in file.items()}
+
+
+def test_it_approaches_as_fast_as_force_and_damping_say(log):
+    free = (log["t"] > 0.25) & (log["t"] < 0.45)
+    assert not log["wrench_ext"][free].any()
+    slope = np.polyfit(log["t"][free], log["xi"][free, 0], 1)[0]
+    assert slope == pytest.approx(-APPROACH / DAMPING, rel=0.02)
+
+
+def test_it_touches_down_and_presses(log, out):
+    """Contact results of Drake against the reference of the controller."""
+    late = log["t"] > 1.3
+    assert np.abs(log["normal_force"][late] - FORCE).max() < 0.5
+    assert log["manifold_force"][late, 2].mean() == pytest.approx(FORCE, abs=0.1)  # with noise
+    metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["touch_down_overshoot"]["value"] < 0.3
+    assert metrics["contact_losses"]["value"] == 0.0
+    assert metrics["max_force_error"]["value"] < 2.0
+
+
+def test_it_stands_as_far_off_the_taught_surface_as_the_workpiece(log):
+    """2 mm up, 1 deg of a place 80 mm from the middle, and the ball's depth under 20 N."""
+    theta = np.array([-0.08, -0.06])
+    up = 0.002 + np.deg2rad(1.0) * 0.08 / np.cos(np.arctan(2.0 * np.linalg.norm(theta)))
+    depth = np.sqrt(FORCE / (np.pi * 4e6))  # of a ball in a plane, pressure over depth
+    assert log["xi"][-1, 0] == pytest.approx(up - depth, abs=4e-4)
+
+
+def test_position_control_presses_harder_and_takes_no_notice(tmp_path):
+    bare = ("--no-figures", "--no-recording", "--duration", "0.8")
+    assert main(["run", "sfc_polish_stiff", "--out", str(tmp_path), *bare]) == 0
+    metrics = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["peak_force"]["value"] > 4.0 * FORCE
+    assert "max_force_error" not in metrics
+    with h5py.File(tmp_path / "log.h5") as file:
+        assert abs(file["xi"][-1, 0]) < 1e-4
