@@ -30,6 +30,12 @@ BASES = {
         "pushes=[{link: link_3, way: [0, 0.1, 0]}]",
         "targets={}",
     ),
+    "surface": ("sfc_viscoelastic_3r", "hand={frame: manifold}"),
+    "scan": (
+        "sfc_viscoelastic_3r",
+        "surface.shape=!Fitted {file: surfaces/scanned_panel.csv, unit: mm, origin: [0.7, 0, 1.1]}",
+        "reference={places: [[0, 0], [0.1, 0.05]]}",
+    ),
 }
 ROWS = ["0.0,0.8,0.2,1.0,0,0.1,0", "0.3,0.75,0.1,1.05,0,0.2,0", "0.6,0.8,0,1.1,0,0.1,0.1"]
 

@@ -124,6 +124,51 @@ def test_scattered_points_are_placed_and_as_smooth_as_the_law_needs(tmp_path, la
     assert np.cross(first, second) @ [1.0, 0.0, 0.0] > 0.0
 
 
+def mesh():
+    """Return vertices and triangles of z = 0.5 (x^2 - y^2) on a grid, shapes (n, 3), (k, 3)."""
+    x, y = np.meshgrid(np.linspace(-0.1, 0.1, 12), np.linspace(-0.2, 0.2, 16), indexing="ij")
+    vertices = np.stack([x, y, 0.5 * (x**2 - y**2)], axis=-1).reshape(-1, 3)
+    corners = np.arange(12 * 16).reshape(12, 16)[:-1, :-1].reshape(-1, 1)
+    return vertices, np.vstack(
+        [corners + np.array(offsets) for offsets in ([0, 16, 17], [0, 17, 1])]
+    )
+
+
+def write_obj(file):
+    vertices, faces = mesh()
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*v) for v in vertices]
+    lines += ["f {} {} {}".format(*f) for f in faces + 1]
+    file.write_text("\n".join(lines), encoding="utf-8")
+
+
+def write_ply(file):
+    vertices, faces = mesh()
+    head = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    rows = ["{:.9g} {:.9g} {:.9g}".format(*v) for v in vertices]
+    rows += ["3 {} {} {}".format(*f) for f in faces]
+    file.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+
+
+def write_stl(file):
+    vertices, faces = mesh()
+    data = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    data["corners"] = vertices[faces]
+    file.write_bytes(bytes(80) + np.uint32(len(faces)).tobytes() + data.tobytes())
+
+
+@pytest.mark.parametrize("write", [write_obj, write_ply, write_stl])
+def test_vertices_of_meshes(tmp_path, write):
+    file = tmp_path / f"part.{write.__name__[-3:]}"
+    write(file)
+    surface = make(Fitted(file=file.name), "elastic", tmp_path)
+    points = surface.partials(places(surface), 0)[:, 0]
+    np.testing.assert_allclose(
+        points[:, 2], 0.5 * (points[:, 0] ** 2 - points[:, 1] ** 2), atol=1e-5
+    )
+
+
 @pytest.mark.parametrize("more", [{"interpolate": True}, {}, {"tolerance": 5e-4}])
 def test_grids_of_points(tmp_path, more):
     a, h = np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0.0, 0.3, 12), indexing="ij")

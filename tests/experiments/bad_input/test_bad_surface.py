@@ -204,3 +204,15 @@ def test_starts_and_ways(wrong, tmp_path):
 def test_no_surface_and_joints_too_few(wrong, tmp_path):
     wrong("surface: {shape:", changes=["surface=null"])
     wrong("3 joints for 6 outputs", changes=["surface.orientation.kind=normal"])
+
+
+def test_a_start_between_two_sheets(wrong, tmp_path):
+    """Of a pleat whose walls are 0.1 m apart."""
+    up = np.linspace(0.0, 0.3, 15)
+    around = np.linspace(0.0, np.pi, 12)[1:-1]
+    left, right = np.stack([0 * up + 0.65, up + 1.0]), np.stack([0 * up + 0.75, up + 1.0])
+    bottom = np.stack([0.7 - 0.05 * np.cos(around), 1.0 - 0.05 * np.sin(around)])
+    x, z = np.hstack([left[:, ::-1], bottom, right])
+    csv(tmp_path, np.column_stack([x, 0 * x, z]))
+    pleat = ["surface.shape=!Extruded {file: points.csv, direction: [0, 1, 0], length: 0.3}"]
+    wrong("start", "nearer to one", changes=[*pleat, "start.position=[0.701, 0.15, 1.2]"])
