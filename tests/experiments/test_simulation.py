@@ -9,7 +9,8 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments import simulation
 from experiments.catalog.scenario_catalog import find_scenario
-from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.recorded_motion import collect_motion
+from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.yaml.typed import load_file
 
@@ -101,7 +102,7 @@ def test_an_integrator_that_gives_up_is_a_fault(settings, run, monkeypatch):
 def test_motion_at_the_frames(settings, run):
     settings.controller.law = "rigid"
     station, result, log, _ = run(0.1)
-    motion = collect_motion(station, result.root, 0.032)
+    motion = collect_motion(station, result.root, 0.032, log, 0.0)
     np.testing.assert_allclose(motion.times, [0.0, 0.032, 0.064, 0.096], atol=1e-9)
     context = station.part.plant.CreateDefaultContext()
     tool = station.part.plant.GetFrameByName("tool_point")
@@ -117,8 +118,8 @@ def test_motion_ends_where_the_state_is_unknown(settings, run, time, frames):
     settings.controller.law = "rigid"
     settings.simulation.sensor_failure.time = time
     settings.simulation.sensor_failure.component = 6  # a motor, on which this law acts
-    station, result, _, _ = run(0.1)
-    motion = collect_motion(station, result.root, 0.032)
+    station, result, log, _ = run(0.1)
+    motion = collect_motion(station, result.root, 0.032, log, 0.0)
     assert motion.times.shape == (frames,)
     assert motion.positions.shape == (frames, 6)
     assert motion.tool_pose.shape == (frames, 12)

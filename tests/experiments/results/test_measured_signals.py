@@ -8,7 +8,8 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions, GainParameters, LawGains, Scenario
 from experiments.catalog.scenario_catalog import find_scenario
-from experiments.results.run_signals import collect_log, collect_motion
+from experiments.results.recorded_motion import collect_motion
+from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.yaml.typed import load_file
 
@@ -76,7 +77,7 @@ def test_path_coordinates_are_those_of_the_true_tool(settings):
 def test_the_recording_shows_the_truth(settings):
     settings.encoders = EncoderOptions(link_increments=[COARSE], motor_increments=[COARSE])
     station, root, log = run(settings)
-    motion = collect_motion(station, root, 0.05)
+    motion = collect_motion(station, root, 0.05, log, 0.0)
     ticks = np.round(motion.times / 1e-3).astype(int)
     np.testing.assert_allclose(motion.positions, log["q_J"].values[ticks], atol=1e-12)
 
