@@ -112,7 +112,18 @@ def link_parameters(mass: float, p_LC: np.ndarray, I_L: np.ndarray) -> np.ndarra
         p_LC: Centre of mass in the link frame [m], shape (3,).
         I_L: Inertia about the origin of the link frame [kg m^2], shape (3, 3).
     """
-    return np.concatenate([[mass], mass * np.asarray(p_LC), np.asarray(I_L)[_ROWS, _COLUMNS]])
+    return from_moments(mass, mass * np.asarray(p_LC), np.asarray(I_L))
+
+
+def from_moments(mass: float, moment: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Return the ten parameters of a link, shape (10,); the inverse of :func:`link_moments`.
+
+    Args:
+        mass: [kg].
+        moment: Mass times centre of mass in the link frame [kg m], shape (3,).
+        inertia: About the origin of the link frame [kg m^2], shape (3, 3).
+    """
+    return np.concatenate([[mass], moment, inertia[_ROWS, _COLUMNS]])
 
 
 def link_moments(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
