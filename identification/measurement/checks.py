@@ -143,8 +143,8 @@ def _check_torques(record: Record, robot: MeasuredRobot) -> None:
         unit = "Nm" if robot.joint_units[j] == "rad" else "N"
         if not np.ptp(tau) > 0.0:
             raise InputError(
-                f"{record.source}: tau of {name} is {tau[0] + 0.0:g} {unit} throughout; a torque that "
-                "was measured is required"
+                f"{record.source}: tau of {name} is {tau[0] + 0.0:g} {unit} throughout; a torque "
+                "that was measured is required"
             )
         largest = float(np.abs(tau).max())
         if largest > _OTHER_UNIT * limit:
