@@ -1,0 +1,1 @@
+"""From a robot to its model: excitation, measurement, estimation, consistency."""
