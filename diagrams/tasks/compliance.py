@@ -88,7 +88,7 @@ def add_compliance(
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
-    signals = _add_press(builder, scenario, linearization, force, end)
+    signals = _add_press(builder, scenario, linearization, force, ports[ready], end)
     builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
     builder.Connect(ports[ready], impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
@@ -107,6 +107,7 @@ def _add_press(
     scenario: Scenario,
     linearization: Linearization,
     force: OutputPort,
+    ready: OutputPort,
     end: float,
 ) -> dict[str, OutputPort]:
     """Return ``press`` and ``pressed_force``, see :class:`Pressing`, if there is a reference."""
@@ -119,8 +120,14 @@ def _add_press(
             "compliance.press: must be null unless controller.manifold is surface, which has one "
             "transversal coordinate"
         )
-    system = builder.AddNamedSystem(
-        "pressing", Pressing(press.over_time(end), across.start, len(coordinates))
+    pressing = Pressing(
+        press.over_time(end),
+        press.touching,
+        across.start,
+        len(coordinates),
+        scenario.controller.sampling_time,
     )
+    system = builder.AddNamedSystem("pressing", pressing)
     builder.Connect(force, system.GetInputPort("manifold_force"))
+    builder.Connect(ready, system.GetInputPort("ready"))
     return {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}

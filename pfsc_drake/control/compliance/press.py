@@ -1,5 +1,6 @@
 """A force with which a tool is to press on a surface, over time."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,14 +15,16 @@ class PressParameters:
     With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
     ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
     workpiece with little, to be slow without much damping, which would turn a slope of the
-    workpiece into a force; then with all of it; in the end the other way, off the workpiece.
+    workpiece into a force; from touch-down with all of it; in the end the other way, off the
+    workpiece.
 
     Attributes:
         force: With which it presses against the normal [N].
-        approach: The same until ``contact`` [N].
+        approach: The same until touch-down [N].
         retreat: With which it is taken off along the normal [N].
         begin: When it sets off [s].
-        contact: By when it surely touches the workpiece, and the full force begins [s].
+        touching: From which measured force on the tool is on the workpiece [N]; the approach
+            must reach it.
         retreat_time: How long before the end of the reference it is taken off [s].
         ramp: Time of every change, which is C^4 [s].
     """
@@ -30,7 +33,7 @@ class PressParameters:
     approach: float = 6.0
     retreat: float = 6.0
     begin: float = 0.1
-    contact: float = 1.0
+    touching: float = 3.0
     retreat_time: float = 0.5
     ramp: float = 0.1
 
@@ -38,25 +41,35 @@ class PressParameters:
         for key in ("force", "approach", "retreat", "begin", "retreat_time"):
             self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
         self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
-        latest = self.begin + self.ramp
-        self._require("contact", latest <= self.contact <= 1e6, f"{latest:g} s or later")
+        if self.force > 0.0:
+            reached = 0.0 < self.touching < self.approach
+            allowed = f"a positive number below approach = {self.approach:g} N"
+            self._require("touching", reached, allowed)
 
     def _require(self, key: str, good: bool, allowed: str) -> None:
         if not good:
             raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
 
-    def over_time(self, end: float) -> Callable[[float], float]:
-        """Return the force along the inward normal that the workpiece is to bear, [s] -> [N].
+    def over_time(self, end: float) -> Callable[[float, float], float]:
+        """Return the force along the inward normal that the workpiece is to bear.
 
         Args:
             end: When the reference ends [s].
+
+        Returns:
+            Function of the time and of the time of touch-down, infinite before it, [s] -> [N].
         """
         rest = Transition(self.ramp, 0)
-        changes = [
-            (self.begin, self.approach),
-            (self.contact, self.force - self.approach),
-            (end - self.retreat_time, -self.force - self.retreat),
-        ]
-        return lambda time: sum(
-            size * float(1.0 - rest.at(time - begin)[0]) for begin, size in changes
-        )
+        off = end - self.retreat_time
+
+        def change(time: float, begin: float) -> float:
+            return float(1.0 - rest.at(time - begin)[0])
+
+        def force(time: float, touch_down: float) -> float:
+            pressed = self.approach * change(time, self.begin)
+            if touch_down < math.inf:
+                pressed += (self.force - self.approach) * change(time, touch_down)
+            share_off = change(time, off)
+            return (1.0 - share_off) * pressed - share_off * self.retreat
+
+        return force

@@ -6,81 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from pfsc_drake.geometry.curves.curve import Curve, Sampler, check_order
+from pfsc_drake.geometry.curves.curve import Curve, Sampler
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.run_out import RunOut, straightening_length
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.turned_frame import Frame, TurnedFrame
 
 # Of the domain of the path: the longest run-out.
 _LONGEST = 0.1
-# How much a term of the Taylor series may change the tangent, relative to it, ...
-_BEND = 0.5
-# ... and turn the quaternion, relative to its length, or the frame, rad.
+# How much a term of the Taylor series may turn the quaternion, relative to its length, or the
+# frame, rad.
 _TURN = 0.15
-
-
-class RunOut(Curve):
-    """A curve that goes on smoothly from the end of another one to a constant derivative.
-
-    With the distance u from the end, outwards, and its length L::
-
-        sigma'(u) = (1 - w(u / L)) T(u) + w(u / L) g
-
-    T is the Taylor polynomial of the curve's derivative at the end, w rises from 0 to 1 with
-    k - 1 vanishing derivatives at both ends, so that the curve is of class C^k there and goes
-    on with the constant derivative g in class C^k.
-
-    Args:
-        derivatives: Of the curve at its end by theta, orders 0..k, [k + 1, dimension].
-        final: The derivative g by theta, [dimension].
-        theta: Parameter of the end.
-        length: L, positive if theta grows outwards, else negative.
-    """
-
-    def __init__(
-        self, derivatives: np.ndarray, final: np.ndarray, theta: float, length: float
-    ) -> None:
-        breakpoints = sorted((theta, theta + length))
-        super().__init__(derivatives.shape[1], breakpoints, closed=False, smoothness=math.inf)
-        k = len(derivatives) - 1
-        self._theta, self._length = theta, length
-        rise = _smooth_step(k)
-        components = []
-        for column, slope in zip(derivatives.T, final, strict=True):
-            # in x = u / L, of which theta is a linear function
-            taylor = [column[j] * length**j / math.factorial(j - 1) for j in range(1, k + 1)]
-            rate = (1.0 - rise) * Polynomial(taylor) + rise * (slope * length)
-            components.append(rate.integ() + column[0])
-        self._degree = max(p.degree() for p in components)
-        self._coefficients = np.zeros((self.dimension, self._degree + 1))
-        for row, polynomial in zip(self._coefficients, components, strict=True):
-            row[: polynomial.degree() + 1] = polynomial.coef
-
-    def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
-        x = (self._checked(theta) - self._theta) / self._length
-        powers = x[..., None] ** np.arange(self._degree + 1)
-        return np.einsum("kdj,...j->...kd", self._table(order), powers)
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
-        matrix = self._table(order).reshape(-1, self._degree + 1)
-        exponents = np.arange(self._degree + 1)
-        theta_0, length = self._theta, self._length
-        return lambda theta: matrix.dot(((theta - theta_0) / length) ** exponents)
-
-    def _table(self, order: int) -> np.ndarray:
-        """Map from powers of x to derivatives by theta, [order + 1, dimension, degree + 1]."""
-        table = np.zeros((check_order(order) + 1, *self._coefficients.shape))
-        for k in range(min(order, self._degree) + 1):
-            for j in range(k, self._degree + 1):
-                factor = math.perm(j, k) / self._length**k
-                table[k, :, j - k] = factor * self._coefficients[:, j]
-        return table
 
 
 class JoinedCurve(Curve):
@@ -183,11 +122,7 @@ def continuations(
 
 def _run_out_length(p: np.ndarray, q: np.ndarray | None, psi: np.ndarray, longest: float) -> float:
     """Length in which no term of the Taylor series takes the curve far from its tangent."""
-    lengths, speed = [longest], float(np.linalg.norm(p[1]))
-    for j in range(2, len(p)):
-        size = float(np.linalg.norm(p[j]))
-        if size > 0.0:
-            lengths.append((_BEND * speed * math.factorial(j - 1) / size) ** (1.0 / (j - 1)))
+    lengths = [straightening_length(p, longest)]
     turns = [] if q is None else [(q, _TURN * float(np.linalg.norm(q[0])))]
     for derivatives, allowed in (*turns, (psi, _TURN)):
         for j in range(1, len(derivatives)):
@@ -208,11 +143,3 @@ def _frame_through(curve: RunOut, normal: np.ndarray, theta: float) -> ParallelT
     start, across = trial.normals(begin)
     cosine, sine = float(normal @ e_perp), float(normal @ e_cross)
     return ParallelTransportFrame(curve, cosine * start + sine * across)
-
-
-def _smooth_step(k: int) -> Polynomial:
-    """Polynomial from 0 at 0 to 1 at 1 with k - 1 vanishing derivatives at both."""
-    x = Polynomial([0.0, 1.0])
-    slope = (x * (1.0 - x)) ** (k - 1)
-    rise = slope.integ()
-    return rise / rise(1.0)

@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.projection_status import ProjectionStatus
+from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
 from pfsc_drake.geometry.surfaces.length import TangentialLength, panel
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
+from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.geometry.surfaces.projection import (
     SurfaceProjection,
     SurfaceProjector,
@@ -44,7 +46,9 @@ class SurfaceEvaluator:
     It has no memory: the same input gives the same output. From the last tick's parameters plain
     Newton steps (4.48) find the foot in a few scalar operations; whatever is not quick and plain (a
     far guess, a border, a point near the centre of curvature) is left to the
-    `SurfaceProjector`, and what that does not find to a search of the whole surface.
+    `SurfaceProjector`, and what that does not find to a search of the whole surface. Beyond an end
+    of an open direction a sum of products goes on as `ExtendedSurface`, and the status tells; where
+    that ends too, and with surfaces of other kinds, the border's closest point is the foot.
 
     Args:
         surface: Surface of class C^(order + 1), at least C^2.
@@ -69,9 +73,12 @@ class SurfaceEvaluator:
             )
         self.surface = surface
         self._global = GlobalProjector(surface)
-        self._project = SurfaceProjector(surface).project
-        self._sample = surface.flat_sampler(order + 1)
-        self._length = TangentialLength(surface)
+        whole = surface
+        if isinstance(surface, ProductSurface):
+            whole = ExtendedSurface(surface, order + 1)
+        self._project = SurfaceProjector(whole).project
+        self._sample = whole.flat_sampler(order + 1)
+        self._length = TangentialLength(whole)
         self._blank = np.zeros(self.layout.size)
         if orientation is not None:
             begin = self.layout.quaternion.start
@@ -82,7 +89,7 @@ class SurfaceEvaluator:
         self._lengths = (first.length, second.length)
         self._bounds = tuple(
             (-math.inf, math.inf) if closed else tuple(ends)
-            for ends, closed in zip(surface.domain, surface.closed, strict=True)
+            for ends, closed in zip(whole.domain, whole.closed, strict=True)
         )
 
     def __call__(
@@ -152,7 +159,7 @@ class SurfaceEvaluator:
                 if not (inside and abs(e1 + e2 + alpha) < math.inf):
                     break
                 out = self._blank.copy()
-                out[:6] = (t1, t2, e1, e2, alpha, 0.0)
+                out[:6] = (t1, t2, e1, e2, alpha, self._status(t1, t2))
                 out[6 : self._rest] = rows
                 return out
             if not size < before:
@@ -205,9 +212,18 @@ class SurfaceEvaluator:
             nearer = best.distance < foot.distance * (1.0 - _NOT_NEARER)
             if best.converged and (nearer or not foot.converged):
                 foot = best._replace(theta=self._nearest_lap(best.theta, theta_guess))
-        status = _BEYOND_END if foot.at_border else 0.0
+        status = _BEYOND_END if foot.at_border else self._status(*foot.theta)
         eta = self._length.advance(eta_last, theta_guess, foot.theta)
         return self._at(foot.theta, eta, foot.alpha, status if foot.converged else _NOT_CONVERGED)
+
+    def _status(self, theta_1: float, theta_2: float) -> float:
+        """Whether a place is beyond the end of an open direction."""
+        (begin_1, end_1), (begin_2, end_2) = self.surface.domain
+        closed_1, closed_2 = self.surface.closed
+        inside = (closed_1 or begin_1 <= theta_1 <= end_1) and (
+            closed_2 or begin_2 <= theta_2 <= end_2
+        )
+        return 0.0 if inside else _BEYOND_END
 
     def _nearest_lap(self, theta: Pair, guess: Pair) -> Pair:
         """Parameters moved by whole periods next to a guess."""

@@ -21,6 +21,10 @@ class ProductSurface(Surface):
     kind. All partial derivatives at one place are one product of a matrix, which each cell
     has, with the products of the functions.
 
+    Attributes:
+        coefficients: See below.
+        bases: Functions of either parameter.
+
     Args:
         first: Functions a_k of theta_1.
         second: Functions b_l of theta_2.
@@ -47,7 +51,7 @@ class ProductSurface(Surface):
             raise InputError("surface coefficients: not finite; finite values are required")
         table.setflags(write=False)
         self.coefficients = table
-        self._bases = (first, second)
+        self.bases = (first, second)
 
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
         """See the base class."""
@@ -63,7 +67,7 @@ class ProductSurface(Surface):
     def _partials(self, theta: np.ndarray, order: int) -> np.ndarray:
         """Derivatives up to an order in each direction, [n, order + 1, order + 1, 3]."""
         pieces, functions = [], []
-        for k, basis in enumerate(self._bases):
+        for k, basis in enumerate(self.bases):
             piece, values = basis.values(theta[:, k])
             pieces.append(piece)
             functions.append(np.einsum("ikl,nl->nik", basis.derivations(order), values))
@@ -78,9 +82,9 @@ class ProductSurface(Surface):
 
     def flat_sampler(self, order: int) -> Sampler:
         """See the base class; the matrix of a cell is made when it is first entered."""
-        first, second = (basis.sampler() for basis in self._bases)
+        first, second = (basis.sampler() for basis in self.bases)
         rows = partial_orders(check_partial_order(order))
-        powers = [basis.derivations(order) for basis in self._bases]
+        powers = [basis.derivations(order) for basis in self.bases]
         left = np.array([powers[0][i].T for i, _ in rows])[:, None]
         right = np.array([powers[1][j] for _, j in rows])[:, None]
         matrices: dict[tuple[int, int], np.ndarray] = {}

@@ -1,42 +1,70 @@
 """A force reference, added to the forces that a filter yields to."""
 
+import math
 from collections.abc import Callable
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 
 class Pressing(LeafSystem):
     """Adds a force over time to one of the forces along the virtual output.
 
+    It remembers when the tool first met the workpiece: the first tick at which the force along the
+    coordinate is measured, tared, and at least ``touching``.
+
     Ports:
         manifold_force (input): Forces along the coordinates, shape (m,) [N, Nm].
+        ready (input): Whether these are to be trusted, shape (1,): 1 once the sensor is tared.
         press (output): The force with which the tool is to press against the coordinate,
             shape (1,) [N].
         pressed_force (output): The input less ``press`` in its coordinate, shape (m,).
 
     Args:
-        press: Force over time [s] -> [N].
+        press: Force over time and time of touch-down [s], which is infinite before -> [N].
+        touching: Force of touch-down [N].
         coordinate: Which coordinate it acts along.
         num_outputs: m.
+        period: Between looks at the force [s].
     """
 
-    def __init__(self, press: Callable[[float], float], coordinate: int, num_outputs: int) -> None:
+    def __init__(
+        self,
+        press: Callable[[float, float], float],
+        touching: float,
+        coordinate: int,
+        num_outputs: int,
+        period: float,
+    ) -> None:
         super().__init__()
-        self._press, self._coordinate = press, coordinate
+        self._press, self._touching, self._coordinate = press, touching, coordinate
         self._force = self.DeclareVectorInputPort("manifold_force", num_outputs)
-        time = self.time_ticket()
-        self.DeclareVectorOutputPort("press", 1, self._calc_press, prerequisites_of_calc={time})
+        self._ready = self.DeclareVectorInputPort("ready", 1)
+        self.DeclareDiscreteState([math.inf])
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
+        reference = {self.time_ticket(), self.xd_ticket()}
+        self.DeclareVectorOutputPort("press", 1, self._calc_press, prerequisites_of_calc=reference)
         self.DeclareVectorOutputPort(
             "pressed_force",
             num_outputs,
             self._calc_pressed_force,
-            prerequisites_of_calc={time, self._force.ticket()},
+            prerequisites_of_calc=reference | {self._force.ticket()},
         )
 
+    def _look(self, context: Context, memory: DiscreteValues) -> None:
+        if context.get_discrete_state_vector().value()[0] < math.inf:
+            return
+        met = self._force.Eval(context)[self._coordinate] >= self._touching
+        if met and self._ready.Eval(context)[0] > 0.5:
+            memory.set_value([context.get_time()])
+
+    def _pressed(self, context: Context) -> float:
+        touch_down = context.get_discrete_state_vector().value()[0]
+        return self._press(context.get_time(), touch_down)
+
     def _calc_press(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([self._press(context.get_time())])
+        output.SetFromVector([self._pressed(context)])
 
     def _calc_pressed_force(self, context: Context, output: BasicVector) -> None:
         force = self._force.Eval(context).copy()
-        force[self._coordinate] -= self._press(context.get_time())
+        force[self._coordinate] -= self._pressed(context)
         output.SetFromVector(force)

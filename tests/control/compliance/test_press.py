@@ -1,5 +1,7 @@
 """The force with which a tool is to press, over time."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -11,19 +13,29 @@ END = 5.0
 
 def test_it_approaches_presses_and_retreats():
     press = PressParameters(
-        force=20.0, approach=6.0, retreat=4.0, begin=0.1, contact=1.0, retreat_time=0.5, ramp=0.2
+        force=20.0, approach=6.0, retreat=4.0, begin=0.1, touching=3.0, retreat_time=0.5, ramp=0.2
     )
-    times = [0.0, 0.1, 0.3, 1.0, 1.1, 1.2, 4.5, 4.7, 6.0]
-    expected = [0.0, 0.0, 6.0, 6.0, 13.0, 20.0, 20.0, -4.0, -4.0]
-    assert [*map(press.over_time(END), times)] == pytest.approx(expected)
+    force = press.over_time(END)
+    times = [0.0, 0.1, 0.3, 1.0, 1.1, 1.2, 4.5, 4.6, 4.7, 6.0]
+    expected = [0.0, 0.0, 6.0, 6.0, 13.0, 20.0, 20.0, 8.0, -4.0, -4.0]
+    assert [force(time, 1.0) for time in times] == pytest.approx(expected)
 
 
-def test_it_is_smooth():
+def test_nothing_met_is_approached_for_ever_and_left_again():
+    force = PressParameters(approach=6.0, retreat=4.0).over_time(END)
+    assert force(4.0, math.inf) == pytest.approx(6.0)
+    assert force(END, math.inf) == pytest.approx(-4.0)
+
+
+@pytest.mark.parametrize("touch_down", [0.15, 1.0, 4.52])
+def test_it_is_smooth(touch_down):
     press, step = PressParameters(), 1e-4
-    force = np.array([*map(press.over_time(END), np.arange(0.0, END, step))])
-    slope = np.diff(force) / step
-    assert np.abs(slope).max() < 2.5 * 26.0 / press.ramp  # of a step that is C^4: 315 / 128
-    assert np.abs(np.diff(slope)).max() < 10.0 * step * 26.0 / press.ramp**2
+    force = press.over_time(END)
+    forces = np.array([force(time, touch_down) for time in np.arange(0.0, END, step)])
+    slope = np.diff(forces) / step
+    # of a step that is C^4: 315 / 128; two of them at once
+    assert np.abs(slope).max() < 2.0 * 2.5 * 26.0 / press.ramp
+    assert np.abs(np.diff(slope)).max() < 20.0 * step * 26.0 / press.ramp**2
 
 
 @pytest.mark.parametrize(
@@ -31,7 +43,7 @@ def test_it_is_smooth():
     [
         ({"force": -1.0}, "force = -1.0: must be zero or a positive number"),
         ({"ramp": 0.0}, "ramp = 0.0: must be a positive"),
-        ({"contact": 0.1}, "contact = 0.1: must be 0.2 s or later"),
+        ({"touching": 6.0}, "touching = 6.0: must be a positive number below approach = 6 N"),
         ({"retreat": float("nan")}, "retreat = nan"),
     ],
 )

@@ -167,19 +167,19 @@ def test_at_the_centre_of_curvature():
 
 
 def test_border_and_back():
-    """Beyond a border theta is clamped, the other parameter goes on, and so does eta."""
+    """Beyond a border the surface goes on; where it ends the other parameter goes on alone."""
     evaluator = SurfaceEvaluator(cylinder(0.09, (-0.1, 0.1)), 3)
     s = np.linspace(0.0, math.pi, 500)
-    height, angle = 0.15 * np.sin(s), 1.2 * s / math.pi
+    height, angle = 0.18 * np.sin(s), 1.2 * s / math.pi
     points = np.column_stack([0.1 * np.cos(angle), 0.1 * np.sin(angle), height])
     rows = _follow(evaluator, points)
     beyond = height > 0.1 + 1e-9
     assert np.all(np.isfinite(rows))
     assert np.array_equal(rows[:, 5] == ProjectionStatus.BEYOND_END, beyond)
     np.testing.assert_allclose(rows[:, 0], angle, atol=1e-11)
-    np.testing.assert_allclose(rows[:, 1], np.minimum(height, 0.1), atol=1e-12)
+    np.testing.assert_allclose(rows[:, 1], np.minimum(height, 0.15), atol=1e-12)
     np.testing.assert_allclose(rows[:, 2], 0.09 * angle, atol=1e-12)
-    np.testing.assert_allclose(rows[:, 3], np.minimum(height, 0.1), atol=1e-12)
+    np.testing.assert_allclose(rows[:, 3], np.minimum(height, 0.15), atol=1e-12)
 
 
 def test_a_far_guess_finds_the_nearest_place():

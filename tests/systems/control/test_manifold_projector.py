@@ -123,10 +123,13 @@ def test_a_tool_that_is_nowhere_does_not_make_the_place_forgotten(pipe):
     np.testing.assert_allclose(pipe.point("theta"), [1.1, 0.0], atol=1e-9)
 
 
-def test_beyond_the_end_of_an_open_direction(pipe):
+def test_beyond_the_end_of_an_open_direction_the_surface_goes_on_for_a_quarter_of_it(pipe):
     pipe.move_to(around(1.0, 0.9))
     pipe.start()
     pipe.move_to(around(1.0, 1.2))
     assert pipe.point("status") == [ProjectionStatus.BEYOND_END]
-    np.testing.assert_allclose(pipe.point("theta"), [1.0, 1.0], atol=1e-9)
-    np.testing.assert_allclose(pipe.point("eta"), [0.0, 0.1], atol=1e-9)
+    np.testing.assert_allclose(pipe.point("theta"), [1.0, 1.2], atol=1e-9)
+    np.testing.assert_allclose(pipe.point("eta"), [0.0, 0.3], atol=1e-9)
+    pipe.move_to(around(1.0, 1.6))
+    assert pipe.point("status") == [ProjectionStatus.BEYOND_END]
+    np.testing.assert_allclose(pipe.point("theta"), [1.0, 1.5], atol=1e-9)

@@ -1,0 +1,159 @@
+"""A surface that goes on beyond the ends of its open directions, so that a tool may leave it."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pfsc_drake.geometry.curves.run_out import RunOut, straightening_length
+from pfsc_drake.geometry.surfaces.basis import Basis, TrigonometricBasis
+from pfsc_drake.geometry.surfaces.partials import partial_orders
+from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.surface import Sampler, Surface, check_partial_order
+
+# Of the domain: how far the surface goes on, and the longest way on which it gets straight.
+_REACH, _LONGEST = 0.25, 0.2
+# Of what is open of a turn.
+_OPEN_SHARE = 0.4
+# Of the area per parameters at the border, what is left of it everywhere beyond.
+_AREA = 0.3
+# Samples along a border, and from there outwards.
+_SAMPLES, _STEPS = 9, 24
+
+
+class ExtendedSurface(Surface):
+    """A surface of class C^k on a larger domain.
+
+    It reaches a quarter of the domain's length beyond each end; less where it would meet itself or
+    get narrow, as before a pole or an apex. What is a circle goes on as a circle. Other directions
+    go over to straight lines: each function of that parameter as :class:`RunOut`, so that the
+    surface stays a sum of products.
+
+    Args:
+        surface: The surface.
+        smoothness: k.
+    """
+
+    def __init__(self, surface: ProductSurface, smoothness: int) -> None:
+        self._inner = surface
+        self._directions = [
+            _Direction(surface, axis, basis, smoothness) for axis, basis in enumerate(surface.bases)
+        ]
+        for axis, direction in enumerate(self._directions):
+            for side in (0, 1):
+                direction.limits[side] = self._regular_up_to(axis, direction.limits[side])
+        super().__init__(
+            (self._directions[0].breakpoints, self._directions[1].breakpoints),
+            closed=surface.closed,
+            smoothness=min(surface.smoothness, smoothness),
+        )
+
+    def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """See the base class."""
+        values = self.checked(theta)
+        sample = self.flat_sampler(order)
+        flat = [sample(*pair) for pair in values.reshape(-1, 2).tolist()]
+        return np.array(flat).reshape(*values.shape[:-1], -1, 3)
+
+    def flat_sampler(self, order: int) -> Sampler:
+        """See the base class; within the surface's own domain it is the surface's own."""
+        inside = self._inner.flat_sampler(check_partial_order(order))
+        rows = np.array(partial_orders(order))
+        first, second = self._directions
+        table = self._inner.coefficients
+
+        def sample(theta_1: float, theta_2: float) -> np.ndarray:
+            if first.holds(theta_1) and second.holds(theta_2):
+                return inside(theta_1, theta_2)
+            p, along = first.derivatives(theta_1, order)
+            q, across = second.derivatives(theta_2, order)
+            every = np.einsum("ik,klc,jl->ijc", along, table[p, q], across)
+            return every[rows[:, 0], rows[:, 1]].ravel()
+
+        return sample
+
+    def _regular_up_to(self, axis: int, limit: float) -> float:
+        """How far the surface keeps its area beyond a border, where it should reach a limit."""
+        border = self._inner.domain[axis][limit > self._inner.domain[axis].begin]
+        areas = self.flat_sampler(1)
+        first, last = self._directions[1 - axis].limits
+        across = np.linspace(first, last, _SAMPLES).tolist()
+        least, reached = None, border
+        for theta in np.linspace(border, limit, _STEPS + 1).tolist():
+            places = [(theta, t) if axis == 0 else (t, theta) for t in across]
+            tangents = np.array([areas(*place)[3:] for place in places]).reshape(-1, 2, 3)
+            area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=-1)
+            least = _AREA * area if least is None else least
+            if np.any(area < least):
+                break
+            reached = theta
+        return reached
+
+
+class _Direction:
+    """The functions of one parameter, continued.
+
+    Attributes:
+        limits: First and last parameter of the larger domain.
+    """
+
+    def __init__(self, surface: ProductSurface, axis: int, basis: Basis, smoothness: int) -> None:
+        self._basis, self._sample = basis, basis.sampler()
+        begin, end = map(float, surface.domain[axis])
+        self._begin, self._end = begin, end
+        self._powers = basis.derivations(6)
+        self._run_outs: list[RunOut] = []
+        reach = 0.0 if basis.closed else _REACH * (end - begin)
+        if isinstance(basis, TrigonometricBasis):
+            reach = min(reach, _OPEN_SHARE * max(2.0 * math.pi - (end - begin), 0.0))
+        elif not basis.closed:
+            for theta, sign in ((begin, -1.0), (end, 1.0)):
+                functions = self._own(theta, smoothness)[1]
+                length = _straightening(surface, axis, theta, smoothness, _LONGEST * (end - begin))
+                self._run_outs.append(RunOut(functions, functions[1], theta, sign * length))
+        self.limits = [begin - reach, end + reach]
+
+    @property
+    def breakpoints(self) -> list[float]:
+        """Ends of the pieces, those beyond the ends of the surface included."""
+        first, last = self.limits
+        inner = self._basis.breakpoints.tolist()
+        return [*[first] * (first < inner[0]), *inner, *[last] * (last > inner[-1])]
+
+    def holds(self, theta: float) -> bool:
+        """Whether a parameter is in the surface's own domain."""
+        return self._basis.closed or self._begin <= theta <= self._end
+
+    def derivatives(self, theta: float, order: int) -> tuple[int, np.ndarray]:
+        """Return the piece and the functions with derivatives 0..order, [order + 1, size]."""
+        if self.holds(theta) or not self._run_outs:
+            return self._own(theta, order)
+        last = bool(theta > self._end)
+        run_out = self._run_outs[last]
+        piece = self._basis.pieces - 1 if last else 0
+        if not math.isfinite(theta):
+            return piece, np.full((order + 1, run_out.dimension), math.nan)
+        inside = min(max(theta, run_out.domain[0]), run_out.domain[1])
+        functions = run_out.derivatives(inside, order)
+        if theta != inside:
+            functions[0] += (theta - inside) * run_out.derivatives(inside, 1)[1]
+            functions[2:] = 0.0
+        return piece, functions
+
+    def _own(self, theta: float, order: int) -> tuple[int, np.ndarray]:
+        piece, values = self._sample(theta)
+        return piece, self._powers[: order + 1] @ np.array(values)
+
+
+def _straightening(
+    surface: ProductSurface, axis: int, theta: float, order: int, longest: float
+) -> float:
+    """Length in which no line across a border gets far from straight."""
+    other = surface.domain[1 - axis]
+    orders = partial_orders(order)
+    rows = [orders.index((n, 0) if axis == 0 else (0, n)) for n in range(order + 1)]
+    lengths = []
+    for value in np.linspace(*other, _SAMPLES):
+        place = (theta, value) if axis == 0 else (value, theta)
+        lengths.append(straightening_length(surface.partials(place, order)[rows], longest))
+    return min(lengths)
