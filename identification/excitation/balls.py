@@ -72,7 +72,9 @@ def covering_balls(inspector: SceneGraphInspector, geometry: GeometryId) -> Ball
     if box is None:
         return join([])
     edges = 2.0 * np.asarray(box.half_width())
-    numbers = np.maximum(1, np.ceil(edges / max(_CELL * edges.min(), edges.max() / 8.0))).astype(int)
+    numbers = np.maximum(1, np.ceil(edges / max(_CELL * edges.min(), edges.max() / 8.0))).astype(
+        int
+    )
     cells = edges / numbers
     grid = np.meshgrid(*(_middles(n) * cell for n, cell in zip(numbers, cells, strict=True)))
     centers = np.column_stack([axis.ravel() for axis in grid])

@@ -156,9 +156,7 @@ class RobotScene:
             state = self._coordinates.plant_state(np.concatenate([positions, still] * 2))
             self._plant.SetPositions(plant_context, state[: self._plant.num_positions()])
             query = port.Eval(scene_context)
-            row[:] = [
-                query.ComputeSignedDistancePairClosestPoints(a, b).distance for a, b in pairs
-            ]
+            row[:] = [query.ComputeSignedDistancePairClosestPoints(a, b).distance for a, b in pairs]
         return table
 
     def _tool_body(self, subject: Subject) -> RigidBody:
