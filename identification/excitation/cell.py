@@ -34,19 +34,24 @@ class Cell:
         tool_above: Least z of the tool point in the world [m]; minus infinity for any.
         clearance: Least distance between the robot and obstacles, and between links that are not
             neighbours [m].
-        self_collision: Whether links are checked against each other.
+        self_collision: Whether links that are no neighbours are checked against each other.
+        joined: Pairs of links that are not, since joint limits keep them apart.
     """
 
     obstacles: list[Obstacle] = field(default_factory=list)
     tool_above: float = -np.inf
     clearance: float = 0.02
     self_collision: bool = True
+    joined: list[list[str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         for i, obstacle in enumerate(self.obstacles):
             check_shape(f"obstacles[{i}]", obstacle)
         if np.isnan(self.tool_above) or self.tool_above == np.inf:
             raise InputError(f"tool_above = {self.tool_above}; must be a number [m]")
+        for pair in self.joined:
+            if len(pair) != 2:
+                raise InputError(f"joined: {pair}; must be pairs of names of links")
         if not 0.0 <= self.clearance < np.inf:
             raise InputError(f"clearance = {self.clearance}; must be zero or positive [m]")
 

@@ -12,6 +12,7 @@ from pydrake.geometry import (
     Capsule,
     Cylinder,
     GeometryId,
+    GeometryInstance,
     ProximityProperties,
     Role,
     SceneGraphInspector,
@@ -32,7 +33,7 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
 
 WORLD = -1  # link of what does not move
-# shapes that touch in each of so many postures are joined by design, not by collision
+# shapes that are near in each of so many postures are so by design
 _POSTURES = 100
 _FULL_TURN = np.pi  # of joints without limits
 
@@ -125,7 +126,7 @@ class RobotScene:
                 f"{subject.name}: the model has no shapes; collisions are not checked"
             )
         self.pairs = self._pairs(cell)
-        self._drop_joined(subject.position_limits)
+        self._drop_joined(subject.position_limits, cell.clearance)
 
     @property
     def inspector(self) -> SceneGraphInspector:
@@ -169,8 +170,6 @@ class RobotScene:
         x, y, z, roll, pitch, yaw = obstacle.pose()
         pose = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, y, z])
         source, frame = self._plant.get_source_id(), self._scene.world_frame_id()
-        from pydrake.geometry import GeometryInstance
-
         instance = GeometryInstance(pose, _drake_shape(obstacle), f"cell_{obstacle.name}")
         instance.set_proximity_properties(ProximityProperties())
         return self._scene.RegisterGeometry(source, frame, instance)
@@ -207,15 +206,11 @@ class RobotScene:
         return found
 
     def _pairs(self, cell: Cell) -> list[Pair]:
-        bodies = sorted({shape.body for shape in self.shapes})
-        pairs = []
+        self._require_bodies([name for pair in cell.joined for name in pair], "joined")
+        joined = [set(pair) for pair in cell.joined]
+        pairs: list[Pair] = []
         for obstacle, identifier in self.obstacles:
-            for name in obstacle.beside:
-                if not self._plant.HasBodyNamed(name):
-                    raise InputError(
-                        f"cell: obstacle '{obstacle.name}': beside = '{name}'; must be one of "
-                        f"{', '.join(bodies)}"
-                    )
+            self._require_bodies(obstacle.beside, f"obstacle '{obstacle.name}': beside")
             pairs += [
                 Pair(shape.geometry, identifier, f"{shape.body} and {obstacle.name}")
                 for shape in self.shapes
@@ -226,17 +221,23 @@ class RobotScene:
                 Pair(a.geometry, b.geometry, f"{a.body} and {b.body}")
                 for a in self.shapes
                 for b in self.shapes
-                if b.link - a.link > 1
+                if b.link - a.link > 1 and {a.body, b.body} not in joined
             ]
         return pairs
 
-    def _drop_joined(self, position_limits: np.ndarray) -> None:
-        """Take out pairs that touch in all of some random postures."""
+    def _require_bodies(self, names: list[str], key: str) -> None:
+        for name in names:
+            if not self._plant.HasBodyNamed(name):
+                known = ", ".join(sorted({shape.body for shape in self.shapes}))
+                raise InputError(f"cell: {key} = '{name}'; must be one of {known}")
+
+    def _drop_joined(self, position_limits: np.ndarray, clearance: float) -> None:
+        """Take out pairs that are too near in all of some random postures."""
         if not self.pairs:
             return
         lower, upper = np.clip(position_limits, -_FULL_TURN, _FULL_TURN).T
         q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, self._dimension))
-        touching = np.all(self._distances(q) < 0.0, axis=0)
+        touching = np.all(self._distances(q) < clearance, axis=0)
         self.pairs = [p for p, joined in zip(self.pairs, touching, strict=True) if not joined]
 
 
