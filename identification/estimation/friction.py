@@ -15,7 +15,7 @@ Each stands for a torque against the motion; the factors are linear parameters l
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -163,10 +163,18 @@ class FrictionModel:
             [*base.full_units, *(term.unit(joint_units[term.joint]) for term in self.terms)],
         )
 
+    def has(self, term: FrictionTerm) -> bool:
+        """Return whether there is a term of that kind and joint."""
+        return term.name in self.names
+
     def with_term(self, term: FrictionTerm) -> "FrictionModel":
-        """Return the model with one more term, or with another width of one it has."""
-        return FrictionModel((*self.without(term).terms, term))
+        """Return the model with one more term."""
+        return FrictionModel((*self.terms, term))
+
+    def replaced(self, term: FrictionTerm) -> "FrictionModel":
+        """Return the model with another width of a term that it has."""
+        return FrictionModel(tuple(term if t.name == term.name else t for t in self.terms))
 
     def without(self, term: FrictionTerm) -> "FrictionModel":
         """Return the model without the term of that kind and joint."""
-        return replace(self, terms=tuple(kept for kept in self.terms if kept.name != term.name))
+        return FrictionModel(tuple(t for t in self.terms if t.name != term.name))
