@@ -11,7 +11,7 @@ from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
 # of a joint's largest velocity: below, whether it sticks or slips is not known
-SLOW = 0.01
+SLOW = 0.03
 # of a joint's velocity limit (of 1 rad/s or m/s where there is none): below, it stands still
 _STILL = 1e-3
 

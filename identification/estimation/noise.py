@@ -9,10 +9,10 @@ from identification.estimation.information import Information, MeasuredMotion
 
 # neighbours on either side that a spectrum is averaged over
 _SMOOTH = 10
-# harmonics in which robots move, and where noise that is white must be as strong as elsewhere
-_LOW = 40
-# probability to call white noise coloured, for a joint
-_ERROR = 1e-4
+# harmonics at which bands begin in all of which white noise is equally strong
+_BANDS = (1, 11, 41, 161, 641)
+# probability to call white noise coloured, for a band of a joint
+_ERROR = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,8 @@ def mean_torque_spectrum(motion: MeasuredMotion) -> NoiseSpectrum | None:
 
     What differs from period to period is noise; what all periods share is not in it, so that a
     wrong model does not spoil it. The power is that at the harmonics of the period, averaged over
-    some neighbours; over all of them in joints whose noise is as strong at low frequencies, where
-    robots move, as at all others, but for what chance explains.
+    some neighbours; over all of them in joints whose noise is equally strong in all bands of
+    frequencies, but for what chance explains.
 
     Args:
         motion: Has torques of P periods as ``tau_periods``, shape (P, K, N), or not.
@@ -49,10 +49,14 @@ def mean_torque_spectrum(motion: MeasuredMotion) -> NoiseSpectrum | None:
     power = np.sum(np.abs(noise) ** 2, axis=0) / (samples * count * (count - 1))
     flat = np.sum((periods - np.mean(periods, axis=0)) ** 2, axis=(0, 1))
     flat /= samples * count * (count - 1)
-    low = power[1 : _LOW + 1]
-    freedom = 2 * (count - 1) * len(low)
-    chance = chi2.cdf(freedom * low.mean(axis=0) / np.maximum(flat, np.finfo(float).tiny), freedom)
-    white = 2.0 * np.minimum(chance, 1.0 - chance) > _ERROR
+    white = np.ones(flat.shape, dtype=bool)
+    for begin, end in zip(_BANDS, [*_BANDS[1:], len(power)], strict=True):
+        band = power[begin:end]
+        freedom = 2 * (count - 1) * len(band)
+        if freedom:
+            value = freedom * band.mean(axis=0) / np.maximum(flat, np.finfo(float).tiny)
+            chance = np.minimum(chi2.cdf(value, freedom), chi2.sf(value, freedom))
+            white &= 2.0 * chance > _ERROR
     # even about zero frequency
     padded = np.pad(power, ((_SMOOTH, _SMOOTH), (0, 0)), mode="reflect")
     sums = np.cumsum(np.pad(padded, ((1, 0), (0, 0))), axis=0)

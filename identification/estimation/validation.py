@@ -1,6 +1,5 @@
-"""Whether an estimate is to be believed: prediction, residuals, errors where truth is known."""
+"""Whether an estimate is to be believed: prediction of motions, errors where truth is known."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,6 @@ from identification.estimation.least_squares import Estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
-
-# delays that residuals are compared with themselves at, in samples
-LAGS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,72 +114,6 @@ def _without_friction_terms(estimate: Estimate) -> BaseParameters:
 def _regular(covariance: np.ndarray) -> np.ndarray:
     """Return a covariance that rounding has not made indefinite."""
     return covariance + np.diag(np.diag(covariance)) * 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Whiteness:
-    """Test of Ljung and Box whether the residuals of N joints are white.
-
-    Attributes:
-        joint_names: N names.
-        autocorrelation: At delays of 1, 2, .. samples, shape (L, N).
-        bound: 95 % of the autocorrelations of white residuals are within +- this, shape (N,).
-        statistic: ``sum_h (n + 2) n / (n - h) r_h^2``, shape (N,); chi-squared with L degrees of
-            freedom for white residuals.
-        p_value: Probability of a larger one, shape (N,).
-    """
-
-    joint_names: tuple[str, ...]
-    autocorrelation: np.ndarray
-    bound: np.ndarray
-    statistic: np.ndarray
-    p_value: np.ndarray
-
-    def white(self, level: float = 0.01) -> np.ndarray:
-        """Return whether there is no reason to call the residuals coloured, shape (N,).
-
-        Args:
-            level: Probability to call white residuals coloured.
-        """
-        return self.p_value > level
-
-
-def whiteness(
-    residuals: np.ndarray, used: np.ndarray, joint_names: Sequence[str], lags: int = LAGS
-) -> Whiteness:
-    """Test residuals for whiteness.
-
-    Args:
-        residuals: Shape (K, N), samples at an even rate.
-        used: Which count, shape (K, N); pairs of which one does not are left out.
-        joint_names: N names.
-        lags: Largest delay [samples].
-
-    Raises:
-        InputError: If a joint has fewer than 5 times as many residuals as delays.
-    """
-    counts = used.sum(axis=0)
-    if lags < 1 or np.any(counts < 5 * lags):
-        j = int(np.argmin(counts))
-        raise InputError(
-            f"whiteness: {counts[j]} residuals of {joint_names[j]}, delays to {lags}; at least one "
-            "delay and 5 times as many residuals are required"
-        )
-    kept = np.where(used, residuals - np.mean(residuals, axis=0, where=used), 0.0)
-    power = np.sum(kept**2, axis=0) / counts
-    autocorrelation, statistic = np.empty((lags, len(joint_names))), np.zeros(len(joint_names))
-    for h in range(1, lags + 1):
-        pairs = np.sum(used[h:] & used[:-h], axis=0)
-        autocorrelation[h - 1] = np.sum(kept[h:] * kept[:-h], axis=0) / pairs / power
-        # (n + 2) n / (n - h) r^2 with r a sum over all n, without gaps
-        statistic += pairs * (counts + 2) / counts * autocorrelation[h - 1] ** 2
-    return Whiteness(
-        tuple(joint_names),
-        autocorrelation,
-        1.96 / np.sqrt(counts),
-        statistic,
-        chi2.sf(statistic, lags),
-    )
 
 
 @dataclass(frozen=True, eq=False)

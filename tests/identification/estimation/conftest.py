@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.measurement.periods import average
@@ -49,9 +50,7 @@ def other_trajectory(comau):
 def measured(motion, tau, noise, period=10.0, periods=4, seed=0, colour=0.0):
     """Return the average over periods of torques with noise, exact positions."""
     q, random = motion[0], np.random.default_rng(seed)
-    e = random.normal(size=(periods * len(q), q.shape[1]))
-    for k in range(1, len(e)):
-        e[k] += colour * e[k - 1]
+    e = lfilter([1.0], [1.0, -colour], random.normal(size=(periods * len(q), q.shape[1])), axis=0)
     record = Record(
         np.arange(len(e)) * period / len(q),
         np.tile(q, (periods, 1)),

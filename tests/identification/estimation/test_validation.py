@@ -1,14 +1,14 @@
-"""Prediction, whiteness and comparison with the truth, against numbers made up for them."""
+"""Prediction and comparison with the truth, against numbers made up for them."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, kstest
+from scipy.stats import chi2
 
 from identification.estimation.friction import FrictionModel, FrictionTerm
 from identification.estimation.least_squares import estimate
-from identification.estimation.validation import compare_with_truth, predict, whiteness
+from identification.estimation.validation import compare_with_truth, predict
 from pfsc_drake.errors import InputError
 
 
@@ -53,26 +53,6 @@ def test_prediction_with_friction_terms(comau, measure, other):
     np.testing.assert_allclose(fitted.base_parameters[-2:], 0.0, atol=1e-3)
     prediction = predict(fitted, comau.regressor, measure(5, motion=other, noise=1e-5))
     assert np.all(prediction.explained > 0.999999)
-
-
-def test_whiteness_of_white_and_coloured_residuals():
-    rng = np.random.default_rng(0)
-    names = [f"j{i}" for i in range(200)]
-    e = rng.normal(size=(800, 200))
-    used = rng.uniform(size=e.shape) > 0.1
-    white = whiteness(e, used, names)
-    assert kstest(white.p_value, "uniform").pvalue > 0.01
-    inside = np.abs(white.autocorrelation) < white.bound * 1.06  # for the gaps
-    assert 0.93 < inside.mean() < 0.98
-    coloured = e[1:] + 0.3 * e[:-1]
-    assert not whiteness(coloured, used[1:], names).white().any()
-    r = whiteness(coloured, used[1:], names).autocorrelation[0].mean()
-    assert r == pytest.approx(0.3 / 1.09, abs=0.01)
-
-
-def test_whiteness_needs_residuals(result):
-    with pytest.raises(InputError, match="100 residuals of joint_1, delays to 50"):
-        whiteness(result.residuals[:100], np.ones((100, 6), bool), result.joint_names, lags=50)
 
 
 def test_truth(comau, result):
