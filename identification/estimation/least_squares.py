@@ -71,6 +71,17 @@ class Estimate:
         return self.base.units
 
     @property
+    def robot_base(self) -> BaseParameters:
+        """Those of the robot without ``friction``: the first ones, with their covariance."""
+        rank, full = (size - len(self.friction.terms) for size in self.base.projection.shape)
+        return BaseParameters(
+            self.base.indices[:rank],
+            self.base.projection[:rank, :full],
+            self.base.full_names[:full],
+            self.base.full_units[:full],
+        )
+
+    @property
     def standard_deviation(self) -> np.ndarray:
         """Of the parameters, shape (n_b,)."""
         return np.sqrt(np.diag(self.covariance))

@@ -7,7 +7,6 @@ from scipy.stats import chi2
 
 from identification.estimation.information import SLOW, MeasuredMotion, information
 from identification.estimation.least_squares import Estimate
-from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
@@ -84,8 +83,7 @@ def predict(
     Raises:
         InputError: If the motion or the regressor do not fit the estimate.
     """
-    bare = _without_friction_terms(estimate)
-    system = information(regressor, bare, motion, estimate.friction, slow)
+    system = information(regressor, estimate.robot_base, motion, estimate.friction, slow)
     deviation = system.matrix @ np.linalg.cholesky(_regular(estimate.covariance))
     return Prediction(
         estimate.joint_names,
@@ -96,18 +94,6 @@ def predict(
         np.asarray(motion.torque_variance),
         np.asarray(motion.mean_torque_variance),
         np.sqrt(np.mean(np.sum(deviation**2, axis=2), axis=0)),
-    )
-
-
-def _without_friction_terms(estimate: Estimate) -> BaseParameters:
-    base, terms = estimate.base, len(estimate.friction.terms)
-    if not terms:
-        return base
-    return BaseParameters(
-        base.indices[:-terms],
-        base.projection[:-terms, :-terms],
-        base.full_names[:-terms],
-        base.full_units[:-terms],
     )
 
 
