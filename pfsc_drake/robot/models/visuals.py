@@ -100,7 +100,7 @@ class Appearance:
         groups |= {f"axes[{i}]": shapes for i, shapes in enumerate(self.axes)}
         for group, shapes in groups.items():
             for i, shape in enumerate(shapes):
-                _check_shape(f"{group}[{i}]", shape)
+                check_shape(f"{group}[{i}]", shape)
                 self._require_material(f"{group}[{i}].material", shape.material)
 
     def _require_material(self, key: str, material: str) -> None:
@@ -108,7 +108,16 @@ class Appearance:
             raise InputError(f"{key} = {material!r}: must be one of {', '.join(self.materials)}")
 
 
-def _check_shape(where: str, shape: Shape) -> None:
+def check_shape(where: str, shape: Shape) -> None:
+    """Refuse a shape whose kind is unknown or whose dimensions are none.
+
+    Args:
+        where: Key of the shape, for messages.
+        shape: To check; its material is not.
+
+    Raises:
+        InputError: One line that names key, value and what is allowed.
+    """
     if shape.kind not in _NEEDS:
         raise InputError(f"{where}.kind = {shape.kind!r}: must be one of {', '.join(_NEEDS)}")
     for key, size in _NEEDS[shape.kind].items():

@@ -1,0 +1,1 @@
+"""Motions that make the parameters of a robot visible in its drives' torques."""

@@ -1,0 +1,213 @@
+"""Where a robot may be, as smooth functions of its joint positions that must not be negative.
+
+A search for motions needs gradients that exist everywhere. So shapes are covered by balls, corners
+of obstacles are rounded off and the least of many distances is a soft minimum; all of it errs on
+the safe side. What has been found is checked with the shapes themselves,
+:class:`~identification.excitation.scene.RobotScene`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from identification.excitation.balls import RobotBalls, cover, without_inner
+from identification.excitation.cell import Cell, Obstacle
+from identification.excitation.scene import WORLD, RobotScene
+from identification.model.subject import Subject
+from pfsc_drake import jets
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.kinematics import rod_motion
+
+_SOFT = 0.004  # m, scale of the soft minimum
+_ROUND = 0.02  # m, by which edges of obstacles are rounded off
+_POSTURES = 2000
+# balls that never come nearer in random postures are left to the check at the end [m]
+_NEAR = 0.06
+_ABOUT = 0.01  # m, of gaps that are about the least
+_TINY = 1e-9  # m, keeps roots differentiable
+_FULL_TURN = np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class PostureLimits:
+    """What the joint positions of a robot must keep to.
+
+    Attributes:
+        function: ``g(q)``, CasADi function of a vector (N,) to (n,): zero or positive where the
+            robot may be.
+        names: What the elements are, n of them.
+        units: Theirs, n of ``m`` or ``1``.
+    """
+
+    function: ca.Function
+    names: list[str]
+    units: list[str]
+
+    def values(self, q: np.ndarray) -> np.ndarray:
+        """Return ``g`` of many samples, shape (K, n).
+
+        Args:
+            q: Joint positions [rad or m], shape (K, N).
+        """
+        return np.array(self.function.map(len(q))(q.T)).T
+
+
+def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> PostureLimits | None:
+    """Return what a serial robot must keep to in its cell; None if there is nothing.
+
+    Args:
+        subject: The robot.
+        cell: What stands around it.
+        scene: The same for Drake.
+    """
+    chain = subject.chain
+    assert chain is not None
+    balls = cover(chain, scene)
+    lower, upper = np.clip(subject.position_limits, -_FULL_TURN, _FULL_TURN).T
+    postures = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, chain.dimension))
+    sampled = balls.sample(postures)
+    near = [(o, _near_obstacle(o, balls, scene, sampled, cell.clearance)) for o in cell.obstacles]
+    pairs = _near_each_other(balls, scene, sampled, cell.clearance)
+    tips = [len(balls.radii) - 2, len(balls.radii) - 1]
+    used = {*tips, *(n for _, numbers in near for n in numbers), *(n for p in pairs for n in p)}
+    q = ca.SX.sym("q", chain.dimension)
+    at = balls.places(q, sorted(used))
+    elements: list[tuple[str, ca.SX]] = []
+    if np.isfinite(cell.tool_above):
+        # what is on the line between both, such as a flange, is above, too
+        for name, tip in zip(("last joint", "tool point"), tips, strict=True):
+            elements.append((f"height of the {name}", at[tip][2] - cell.tool_above))
+    for obstacle, numbers in near:
+        distances = [_distance(obstacle, at[n]) - balls.radii[n] for n in numbers]
+        elements.append((f"clearance of {obstacle.name}", soft_min(distances) - cell.clearance))
+    if pairs:
+        gaps = [
+            ca.sqrt(ca.sumsqr(at[a] - at[b]) + _TINY**2) - balls.radii[a] - balls.radii[b]
+            for a, b in pairs
+        ]
+        elements.append(("clearance of the links", soft_min(gaps) - cell.clearance))
+    if not elements:
+        return None
+    names = [name for name, _ in elements]
+    g = ca.densify(ca.vertcat(*[value for _, value in elements]))
+    return PostureLimits(ca.Function("g", [q], [g], ["q"], ["g"]), names, ["m"] * len(names))
+
+
+def delta_posture_limits(robot: DeltaRobot) -> PostureLimits:
+    """Return what a DELTA robot must keep to: its workspace, see ``robot.delta.workspace``.
+
+    The least singular value of the rods' directions U is bounded from below by
+    ``1 / |U^-1|_F = |det U| / |cof U|_F``, which is smooth.
+
+    Args:
+        robot: The robot.
+    """
+    geometry, least = robot.parameters.geometry, robot.parameters.workspace.min_rod_independence
+    q = ca.SX.sym("q", robot.dimension)
+    motion = rod_motion(geometry, [jets.constant(q[i], 1) for i in range(robot.dimension)])
+    rods = [w.coefficients[0] / geometry.l_BC for w in motion.rods]
+    cofactors = [ca.cross(rods[i], rods[(i + 1) % 3]) for i in range(3)]
+    bound = ca.fabs(ca.dot(rods[0], cofactors[1])) / ca.norm_2(ca.vertcat(*cofactors))
+    below = motion.y_t.coefficients[0][2] - geometry.h_P
+    g = ca.densify(ca.vertcat(bound - least, below))
+    return PostureLimits(
+        ca.Function("g", [q], [g], ["q"], ["g"]),
+        ["independence of the rods", "tool below the rails' common point"],
+        ["1", "m"],
+    )
+
+
+def soft_min(values: Sequence[ca.SX], scale: float = _SOFT) -> ca.SX:
+    """Return a smooth number that is at most the least of several, by up to scale * log(n)."""
+    return -scale * ca.logsumexp(ca.vertcat(*values) * (-1.0 / scale))
+
+
+def soft_max(x: ca.SX, y: ca.SX, width: float = _ROUND) -> ca.SX:
+    """Return a smooth number that is at most the larger of two, by up to half of a width."""
+    return (x + y + ca.sqrt((x - y) ** 2 + width**2) - width) / 2.0
+
+
+def _distance(obstacle: Obstacle, point: ca.SX) -> ca.SX:
+    """Return a lower bound of the distance to an obstacle [m], smooth outside of it."""
+    x, y, z, roll, pitch, yaw = obstacle.pose()
+    X_OW = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, y, z]).inverse()
+    R_OW = ca.SX(ca.sparsify(ca.DM(np.round(X_OW.rotation().matrix(), 12))))
+    p = R_OW @ point + X_OW.translation()
+    if obstacle.kind == "sphere":
+        return ca.sqrt(ca.sumsqr(p) + _TINY**2) - obstacle.radius
+    if obstacle.kind == "box":
+        beyond = [_magnitude(p[i]) - obstacle.size[i] / 2.0 for i in range(3)]
+        return soft_max(soft_max(beyond[0], beyond[1]), beyond[2])
+    half = float(np.linalg.norm(obstacle.end - obstacle.start)) / 2.0
+    if obstacle.kind == "capsule":
+        along = p[2] - ca.fmin(ca.fmax(p[2], -half), half)
+        return ca.sqrt(p[0] ** 2 + p[1] ** 2 + along**2 + _TINY**2) - obstacle.radius
+    aside = ca.sqrt(p[0] ** 2 + p[1] ** 2 + _TINY**2) - obstacle.radius
+    return soft_max(aside, _magnitude(p[2]) - half)
+
+
+def _magnitude(x: ca.SX) -> ca.SX:
+    return ca.sqrt(x**2 + _TINY**2)
+
+
+def _near_obstacle(
+    obstacle: Obstacle,
+    balls: RobotBalls,
+    scene: RobotScene,
+    sampled: np.ndarray,
+    clearance: float,
+) -> list[int]:
+    """Return the balls that come nearest to an obstacle, without inner ones."""
+    point = ca.SX.sym("p", 3)
+    distance = ca.Function("d", [point], [_distance(obstacle, point)])
+    count = len(balls.radii)
+    flat = np.array(distance.map(sampled[..., 0].size)(sampled.reshape(-1, 3).T))
+    gaps = flat.reshape(-1, count) - balls.radii
+    bodies = np.array([scene.shapes[k].body if k >= 0 else "" for k in balls.shapes])
+    gaps[:, (balls.links == WORLD) | np.isin(bodies, obstacle.beside)] = np.inf
+    numbers = np.flatnonzero(_nearest(gaps, clearance))
+    per_link = [[n for n in numbers if balls.links[n] == i] for i in range(balls.chain.dimension)]
+    return [int(n) for own in per_link for n in without_inner(balls, own)]
+
+
+def _near_each_other(
+    balls: RobotBalls, scene: RobotScene, sampled: np.ndarray, clearance: float
+) -> list[tuple[int, int]]:
+    """Return the pairs of balls that come nearest, of shapes that must not touch."""
+    index = {shape.geometry: k for k, shape in enumerate(scene.shapes)}
+    of_links: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for pair in scene.pairs:
+        if pair.second in index:
+            firsts = np.flatnonzero(balls.shapes == index[pair.first])
+            seconds = np.flatnonzero(balls.shapes == index[pair.second])
+            links = int(balls.links[firsts[0]]), int(balls.links[seconds[0]])
+            of_links.setdefault(links, []).extend((int(a), int(b)) for a in firsts for b in seconds)
+    nearest = []
+    for pairs in of_links.values():
+        first, second = np.array(pairs).T
+        gaps = np.linalg.norm(sampled[:, first] - sampled[:, second], axis=-1)
+        gaps -= balls.radii[first] + balls.radii[second]
+        nearest += [pairs[i] for i in np.flatnonzero(_nearest(gaps, clearance))]
+    return nearest
+
+
+def _nearest(gaps: np.ndarray, clearance: float) -> np.ndarray:
+    """Return which of some gaps are about the least ones in postures where that is small.
+
+    Gaps that are small most of the time are so by design, or because balls are larger than what
+    they cover; there the check at the end is what matters.
+
+    Args:
+        gaps: Of each posture [m], shape (K, n).
+        clearance: That is asked for [m].
+
+    Returns:
+        Shape (n,).
+    """
+    gaps = np.where(np.median(gaps, axis=0) > clearance, gaps, np.inf)
+    least = gaps.min(axis=1, keepdims=True)
+    near = least < clearance + _NEAR
+    return np.any(near & (gaps < least + _ABOUT), axis=0)

@@ -1,0 +1,201 @@
+"""How well a motion shows the base parameters, with analytic gradients.
+
+The information matrix (2.76) of a motion stacks the base regressors of its samples. Its figure is
+``log det(X^T X)`` (2.79), to be as large as possible, or the condition number ``sigma_1 / sigma_n``
+of X, to be as small as possible. Both have gradients by X alone,
+
+    d log det(X^T X) = 2 <X (X^T X)^-1, dX>,     d log(sigma_i) = <u_i v_i^T / sigma_i, dX>
+
+and CasADi carries these matrices back through the regressor to the motion.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+import scipy.linalg
+
+from identification.excitation.fourier import FourierTrajectory, fourier_basis
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.errors import InputError
+
+Criterion = Literal["determinant", "condition"]
+CRITERIA: tuple[str, ...] = get_args(Criterion)
+# of one period, for figures that are compared
+REPORTED_SAMPLES = 1000
+_SINGULAR = 1e-13
+
+
+@dataclass(frozen=True)
+class Information:
+    """Figures of the information matrix X of one period, with REPORTED_SAMPLES samples.
+
+    They depend on the choice of base parameters and on their units.
+
+    Attributes:
+        log_determinant: ``log det(X^T X)``; minus infinity where a parameter is not excited.
+        condition_number: Of X.
+        base_parameters: Their number n_b.
+    """
+
+    log_determinant: float
+    condition_number: float
+    base_parameters: int
+
+
+def information(
+    regressor: Regressor, base: BaseParameters, trajectory: FourierTrajectory
+) -> Information:
+    """Return the figures of a motion.
+
+    Args:
+        regressor: Of the robot; with the sign of the velocities itself in Coulomb friction.
+        base: Its base parameters.
+        trajectory: The motion.
+    """
+    t = np.arange(REPORTED_SAMPLES) * trajectory.period / REPORTED_SAMPLES
+    X = base.reduce(regressor.matrix(*trajectory.motion(t))).reshape(-1, base.rank)
+    values = np.linalg.svd(X, compute_uv=False)
+    if not values[-1] > _SINGULAR * values[0]:
+        return Information(-np.inf, np.inf, base.rank)
+    return Information(
+        2.0 * float(np.log(values).sum()), float(values[0] / values[-1]), base.rank
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BaseRegressorKernels:
+    """The base regressor of one sample and its transposed derivative, to be sent to workers.
+
+    Attributes:
+        forward: ``(q, v, a) -> Y_b``, vectors (N,) and a matrix (N, n_b).
+        adjoint: ``(q, v, a, S) -> d<S, Y_b> / d[q, v, a]``, shape (3N,).
+    """
+
+    forward: ca.Function
+    adjoint: ca.Function
+
+    @classmethod
+    def of(
+        cls, regressor: Regressor, base: BaseParameters, weights: np.ndarray | None = None
+    ) -> "BaseRegressorKernels":
+        """Return the kernels of a robot.
+
+        Args:
+            regressor: With a smooth sign of the velocities.
+            base: The base parameters.
+            weights: Of the rows of each sample, such as inverse standard deviations of the
+                measured torques, shape (N,); all one by default.
+        """
+        n = regressor.subject.dimension
+        q, v, a = (ca.SX.sym(name, n) for name in "qva")
+        Y = regressor.function(q, v, a)[:, base.indices.tolist()]
+        if weights is not None:
+            Y = ca.diag(ca.DM(weights)) @ Y
+        S = ca.SX.sym("S", n, base.rank)
+        gradient = ca.gradient(ca.dot(S, Y), ca.vertcat(q, v, a))
+        return cls(
+            ca.Function("forward", [q, v, a], [ca.densify(Y)], ["q", "v", "a"], ["Y"]),
+            ca.Function(
+                "adjoint", [q, v, a, S], [ca.densify(gradient)], ["q", "v", "a", "S"], ["g"]
+            ),
+        )
+
+
+class ExcitationCost:
+    """The figure of a motion that a search makes as small as possible, with its gradient.
+
+    ``-log det(X^T X)`` or ``log(sigma_1 / sigma_n)``, of as many samples as given but to the scale
+    of REPORTED_SAMPLES.
+
+    Args:
+        kernels: Of the robot, N joints and n_b base parameters.
+        period: Of the motion [s].
+        harmonics: Of it, M of them.
+        samples: Per period.
+        criterion: ``determinant`` or ``condition``.
+
+    Raises:
+        InputError: If the criterion is unknown or the samples are fewer than the parameters.
+    """
+
+    def __init__(
+        self,
+        kernels: BaseRegressorKernels,
+        period: float,
+        harmonics: tuple[int, ...],
+        samples: int,
+        criterion: str = "determinant",
+    ) -> None:
+        self._dimension, self._size = kernels.forward.size_out(0)
+        if criterion not in CRITERIA:
+            raise InputError(f"criterion = {criterion!r}; must be one of {', '.join(CRITERIA)}")
+        if samples * self._dimension < self._size:
+            raise InputError(
+                f"samples = {samples}; must be at least {-(-self._size // self._dimension)} for "
+                f"{self._size} base parameters of {self._dimension} joints"
+            )
+        self._samples, self._criterion = samples, criterion
+        self._bases = fourier_basis(np.arange(samples) * period / samples, period, harmonics)
+        self._forward = BoundFunction(kernels.forward.map(samples))
+        self._adjoint = BoundFunction(kernels.adjoint.map(samples))
+        self._shift = self._size * np.log(REPORTED_SAMPLES / samples)
+
+    def __call__(self, coefficients: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the figure and its gradient.
+
+        Args:
+            coefficients: As :attr:`FourierTrajectory.coefficients`, shape (N, 2M + 1).
+
+        Returns:
+            The figure, infinite where a parameter is not excited at all, and the gradient, of the
+            shape of the coefficients.
+        """
+        motion = [basis @ coefficients.T for basis in self._bases]
+        for name, values in zip("qva", motion, strict=True):
+            self._forward.arguments[name][:] = values.ravel()
+            self._adjoint.arguments[name][:] = values.ravel()
+        self._forward.evaluate()
+        # the matrices of the samples stand by columns, one after the other
+        Y = self._forward.results["Y"].reshape(self._samples, self._size, self._dimension)
+        X = Y.transpose(0, 2, 1).reshape(-1, self._size)
+        value, S = self._log_determinant(X) if self._by_determinant else _log_condition(X)
+        if not np.isfinite(value):
+            return np.inf, np.zeros_like(coefficients)
+        seeds = S.reshape(self._samples, self._dimension, self._size).transpose(0, 2, 1)
+        self._adjoint.arguments["S"][:] = seeds.ravel()
+        self._adjoint.evaluate()
+        by_motion = self._adjoint.results["g"].reshape(self._samples, 3, self._dimension)
+        gradient = sum(
+            by_motion[:, i].T @ basis for i, basis in enumerate(self._bases)
+        )
+        return value, np.asarray(gradient)
+
+    @property
+    def _by_determinant(self) -> bool:
+        return self._criterion == "determinant"
+
+    def _log_determinant(self, X: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return ``-log det(X^T X)`` and its gradient by X, from ``X = Q R``."""
+        scale = np.linalg.norm(X, axis=0)
+        if not np.all(scale > 0.0):
+            return np.inf, X
+        R = np.linalg.qr(X / scale, mode="r")
+        diagonal = np.abs(np.diag(R))
+        if not np.all(diagonal > _SINGULAR):
+            return np.inf, X
+        half = scipy.linalg.solve_triangular(R, np.diag(1.0 / scale), trans="T").T
+        value = 2.0 * np.log(diagonal * scale).sum() + self._shift
+        return -float(value), -2.0 * X @ (half @ half.T)
+
+
+def _log_condition(X: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return ``log(sigma_1 / sigma_n)`` of X and its gradient by X."""
+    U, values, V_T = np.linalg.svd(X, full_matrices=False)
+    if not values[-1] > _SINGULAR * values[0]:
+        return np.inf, X
+    first, last = (np.outer(U[:, i], V_T[i]) / values[i] for i in (0, -1))
+    return float(np.log(values[0] / values[-1])), first - last

@@ -1,0 +1,133 @@
+"""Limits of a robot's joints, and how much of them a motion takes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """Limits of N joints.
+
+    Attributes:
+        position: Lower and upper ones [rad or m], shape (N, 2).
+        velocity: Magnitudes [rad/s or m/s], shape (N,).
+        acceleration: Magnitudes [rad/s^2 or m/s^2], shape (N,).
+        effort: Magnitudes of the drives' torques [Nm or N], shape (N,); infinite where unknown.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    effort: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Middles of the position limits [rad or m], shape (N,)."""
+        return self.position.mean(axis=1)
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Distances from the middles to the limits [rad or m], shape (N,)."""
+        return (self.position[:, 1] - self.position[:, 0]) / 2.0
+
+    def scaled(self, share: float) -> "JointLimits":
+        """Return limits of which a share is left, about the middles of the positions."""
+        reach = share * self.reach
+        return JointLimits(
+            np.column_stack([self.middle - reach, self.middle + reach]),
+            share * self.velocity,
+            share * self.acceleration,
+            share * self.effort,
+        )
+
+
+def joint_limits(
+    subject: Subject,
+    *,
+    position: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    effort: ArrayLike | None = None,
+) -> JointLimits:
+    """Return a robot's limits, those of its model where no others are given.
+
+    Args:
+        subject: The robot.
+        position: Lower and upper limits [rad or m], shape (N, 2).
+        velocity: [rad/s or m/s], shape (N,), or one number for all joints.
+        acceleration: [rad/s^2 or m/s^2], shape (N,), or one number for all joints.
+        effort: [Nm or N], shape (N,), or one number for all joints.
+
+    Raises:
+        InputError: If one is neither in the model nor given, or is out of range. Effort alone may
+            be unknown.
+    """
+    n, names = subject.dimension, subject.joint_names
+    bounds = np.asarray(subject.position_limits if position is None else position, dtype=float)
+    if bounds.shape != (n, 2):
+        raise InputError(f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper")
+    magnitudes = {
+        "velocity": (velocity, subject.velocity_limit),
+        "acceleration": (acceleration, subject.acceleration_limit),
+        "effort": (effort, subject.effort_limit),
+    }
+    values = {"position": bounds}
+    for key, (given, own) in magnitudes.items():
+        array = np.asarray(own if given is None else given, dtype=float)
+        if array.shape not in ((), (1,), (n,)):
+            raise InputError(f"{key} limits: shape {array.shape}; must be one number or {n}")
+        values[key] = np.broadcast_to(array, n).copy()
+    for i, name in enumerate(names):
+        lower, upper = bounds[i]
+        if not (np.isfinite(lower) and np.isfinite(upper)):
+            _refuse_unknown(subject, "position", [n for n, b in zip(names, bounds, strict=True)
+                                                  if not np.isfinite(b).all()])
+        if not lower < upper:
+            raise InputError(
+                f"position limits of {name} = [{lower:g}, {upper:g}]; lower must be below upper"
+            )
+    for key in ("velocity", "acceleration"):
+        unknown = [name for name, x in zip(names, values[key], strict=True) if np.isinf(x)]
+        if unknown:
+            _refuse_unknown(subject, key, unknown)
+    for key in magnitudes:
+        for name, x in zip(names, values[key], strict=True):
+            if not x > 0.0:
+                raise InputError(f"{key} limit of {name} = {x:g}; must be positive")
+    return JointLimits(**values)
+
+
+def _refuse_unknown(subject: Subject, key: str, joints: Sequence[str]) -> None:
+    raise InputError(
+        f"{subject.name}: the model has no {key} limits of {', '.join(joints)}; give them"
+    )
+
+
+def used_shares(
+    limits: JointLimits, motion: tuple[np.ndarray, np.ndarray, np.ndarray], tau: np.ndarray
+) -> Mapping[str, np.ndarray]:
+    """Return the largest share of each limit that a motion takes, 1 being the limit.
+
+    Args:
+        limits: Of the robot.
+        motion: Positions, velocities and accelerations, each of shape (K, N).
+        tau: Predicted torques of the drives [Nm or N], shape (K, N).
+
+    Returns:
+        ``position`` (of the distance from the middle), ``velocity``, ``acceleration`` and
+        ``effort``, each of shape (N,).
+    """
+    q, v, a = motion
+    used = {
+        "position": (q - limits.middle) / limits.reach,
+        "velocity": v / limits.velocity,
+        "acceleration": a / limits.acceleration,
+        "effort": tau / limits.effort,
+    }
+    return {key: np.abs(share).max(axis=0) for key, share in used.items()}

@@ -1,0 +1,124 @@
+"""What a search for an excitation needs to know, in a form that goes to other processes."""
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from identification.excitation.cell import Cell
+from identification.excitation.clearance import (
+    PostureLimits,
+    delta_posture_limits,
+    serial_posture_limits,
+)
+from identification.excitation.criterion import CRITERIA, BaseRegressorKernels
+from identification.excitation.fourier import check_harmonics, check_period
+from identification.excitation.limits import JointLimits
+from identification.excitation.scene import RobotScene
+from identification.model.base import base_parameters
+from identification.model.parameters import true_parameters
+from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+
+# of the largest velocity; Coulomb friction passes smoothly within, so that gradients exist
+_SIGN_WIDTH = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationProblem:
+    """The optimization problem (2.79) of one robot.
+
+    Attributes:
+        period: T_f [s].
+        harmonics: Multiples of the fundamental frequency in use.
+        limits: Of the joints.
+        kernels: Of the criterion.
+        torque: ``(q, v, a) -> tau``, predicted torques of the drives.
+        posture: What the joint positions must keep to; None for nothing but the limits.
+        criterion: ``determinant`` or ``condition``.
+    """
+
+    period: float
+    harmonics: tuple[int, ...]
+    limits: JointLimits
+    kernels: BaseRegressorKernels
+    torque: ca.Function
+    posture: PostureLimits | None
+    criterion: str
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.limits.velocity.size
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Shape of the coefficients, (N, 2M + 1)."""
+        return self.dimension, 2 * len(self.harmonics) + 1
+
+
+def excitation_problem(
+    subject: Subject,
+    limits: JointLimits,
+    *,
+    period: float = 10.0,
+    harmonics: tuple[int, ...] = (1, 3, 5),
+    criterion: str = "determinant",
+    cell: Cell | None = None,
+    scene: RobotScene | None = None,
+    parameters: np.ndarray | None = None,
+    torque_noise: np.ndarray | None = None,
+) -> ExcitationProblem:
+    """Return the problem of a robot.
+
+    Args:
+        subject: The robot.
+        limits: Of its joints.
+        period: T_f [s].
+        harmonics: Multiples of the fundamental frequency in use.
+        criterion: ``determinant`` or ``condition``.
+        cell: What stands around a serial robot.
+        scene: The same for Drake; made anew if there is a cell alone.
+        parameters: Believed ones, for the torques, shape (n,); those of the model by default.
+        torque_noise: Standard deviations of the measured torques, which weight the rows of the
+            regressor, shape (N,) [Nm or N]; all one by default.
+
+    Raises:
+        InputError: If a value is out of range.
+    """
+    check_period(period)
+    check_harmonics(harmonics)
+    if criterion not in CRITERIA:
+        raise InputError(f"criterion = {criterion!r}; must be one of {', '.join(CRITERIA)}")
+    n = subject.dimension
+    weights = None
+    if torque_noise is not None:
+        noise = np.asarray(torque_noise, dtype=float)
+        if noise.shape != (n,) or not np.all((noise > 0.0) & np.isfinite(noise)):
+            raise InputError(f"torque_noise = {noise.tolist()}; must be {n} positive numbers")
+        weights = 1.0 / noise
+    smooth = Regressor(subject, sign_width=_SIGN_WIDTH * float(limits.velocity.max()))
+    base = base_parameters(Regressor(subject))
+    believed = true_parameters(subject) if parameters is None else np.asarray(parameters)
+    q, v, a = (ca.SX.sym(name, n) for name in "qva")
+    tau = ca.densify(smooth.function(q, v, a) @ ca.DM(believed))
+    posture: PostureLimits | None = None
+    if subject.delta is not None:
+        posture = delta_posture_limits(subject.delta)
+    elif cell is not None:
+        posture = serial_posture_limits(subject, cell, scene or RobotScene(subject, cell))
+    return ExcitationProblem(
+        period,
+        tuple(harmonics),
+        limits,
+        BaseRegressorKernels.of(smooth, base, weights),
+        ca.Function("torque", [q, v, a], [tau], ["q", "v", "a"], ["tau"]),
+        posture,
+        criterion,
+    )
+
+
+def without_posture_limits(problem: ExcitationProblem) -> ExcitationProblem:
+    """Return the problem of a robot that may be anywhere within its joint limits."""
+    return replace(problem, posture=None)

@@ -1,0 +1,258 @@
+"""A serial robot and its cell in Drake's geometry engine: exact distances along a motion.
+
+Collision geometry is that of the model; a link without has its visual shapes for it. Meshes count
+as their convex hulls.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Cylinder,
+    GeometryId,
+    GeometryInstance,
+    ProximityProperties,
+    Role,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.robots.model import locate_model
+from identification.excitation.cell import Cell, Obstacle
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.reading import read_model
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.serial.link_places import link_frames
+
+WORLD = -1  # link of what does not move
+# shapes that are near in each of so many postures are so by design
+_POSTURES = 100
+_FULL_TURN = np.pi  # of joints without limits
+
+
+@dataclass(frozen=True)
+class PlacedShape:
+    """A shape of the robot.
+
+    Attributes:
+        geometry: Its identifier.
+        link: Index of the chain's link that carries it, from 0; ``WORLD`` for the base.
+        body: Name of its body.
+        X_LG: Its pose in the chain's link frame, in the world for the base.
+    """
+
+    geometry: GeometryId
+    link: int
+    body: str
+    X_LG: RigidTransform
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two shapes that must not touch.
+
+    Attributes:
+        first: A shape of the robot.
+        second: Another one, or an obstacle.
+        name: Of both, for people.
+    """
+
+    first: GeometryId
+    second: GeometryId
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """Distances along a motion.
+
+    Attributes:
+        distance: Least distance of each sample [m], shape (K,); negative where shapes overlap,
+            infinite if there is nothing to touch.
+        pair: Names of what is nearest in the worst sample; empty if there is nothing.
+    """
+
+    distance: np.ndarray
+    pair: str
+
+    @property
+    def least(self) -> float:
+        """Least distance of all [m]."""
+        return float(self.distance.min(initial=np.inf))
+
+
+class RobotScene:
+    """A serial robot and its cell.
+
+    Args:
+        subject: The robot; read from its model once more, with geometry.
+        cell: What stands around it.
+
+    Attributes:
+        shapes: Those of the robot.
+        obstacles: Those of the cell, with their identifiers.
+        pairs: What must not touch.
+        warnings: What cannot be checked, one sentence each.
+
+    Raises:
+        InputError: If ``beside`` of an obstacle names no link, or the robot is no serial one.
+    """
+
+    def __init__(self, subject: Subject, cell: Cell) -> None:
+        if subject.chain is None or subject.block is None:
+            raise InputError(f"{subject.name}: collisions are checked of serial robots only")
+        builder = DiagramBuilder()
+        self._plant, self._scene = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+        file = locate_model(subject.block, subject.folder)
+        read_model(self._plant, file, subject.block.options(subject.folder))
+        self._last = self._tool_body(subject)
+        chain, self._coordinates = chain_from_plant(self._plant, self._last.body_frame())
+        self._dimension = chain.dimension
+        self.obstacles = [(obstacle, self._add(obstacle)) for obstacle in cell.obstacles]
+        self.shapes = self._find_shapes(subject)
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+        self.warnings: list[str] = []
+        if not any(shape.link != WORLD for shape in self.shapes):
+            self.warnings.append(
+                f"{subject.name}: the model has no shapes; collisions are not checked"
+            )
+        self.pairs = self._pairs(cell)
+        self._drop_joined(subject.position_limits, cell.clearance)
+
+    @property
+    def inspector(self) -> SceneGraphInspector:
+        """What the scene graph knows of the shapes."""
+        return self._scene.model_inspector()
+
+    def clearance(self, q: np.ndarray) -> Clearance:
+        """Return the least distances of a motion, as Drake computes them.
+
+        Args:
+            q: Joint positions [rad or m], shape (K, N).
+        """
+        table = self._distances(q)
+        if not self.pairs:
+            return Clearance(np.full(len(q), np.inf), "")
+        worst = int(np.argmin(table.min(axis=0)))
+        return Clearance(table.min(axis=1), self.pairs[worst].name)
+
+    def _distances(self, q: np.ndarray) -> np.ndarray:
+        """Return the distances of all pairs [m], shape (K, pairs)."""
+        plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
+        scene_context = self._scene.GetMyMutableContextFromRoot(self._context)
+        port = self._scene.get_query_output_port()
+        pairs = [(pair.first, pair.second) for pair in self.pairs]
+        table = np.empty((len(q), len(pairs)))
+        still = np.zeros(self._dimension)
+        for row, positions in zip(table, q, strict=True):
+            state = self._coordinates.plant_state(np.concatenate([positions, still] * 2))
+            self._plant.SetPositions(plant_context, state[: self._plant.num_positions()])
+            query = port.Eval(scene_context)
+            row[:] = [query.ComputeSignedDistancePairClosestPoints(a, b).distance for a, b in pairs]
+        return table
+
+    def _tool_body(self, subject: Subject) -> RigidBody:
+        name = subject.block.tool_frame if subject.block is not None else ""
+        if self._plant.HasFrameNamed(name):
+            return self._plant.GetFrameByName(name).body()
+        return self._plant.get_body(BodyIndex(self._plant.num_bodies() - 1))
+
+    def _add(self, obstacle: Obstacle) -> GeometryId:
+        x, y, z, roll, pitch, yaw = obstacle.pose()
+        pose = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, y, z])
+        source, frame = self._plant.get_source_id(), self._scene.world_frame_id()
+        instance = GeometryInstance(pose, _drake_shape(obstacle), f"cell_{obstacle.name}")
+        instance.set_proximity_properties(ProximityProperties())
+        return self._scene.RegisterGeometry(source, frame, instance)
+
+    def _find_shapes(self, subject: Subject) -> list[PlacedShape]:
+        """Collect the shapes of the chain's links and give proximity to visual ones."""
+        plant, inspector = self._plant, self.inspector
+        plain = plant.CreateDefaultContext()
+        groups = [(WORLD, plant.world_frame())]
+        groups += list(enumerate(link_frames(plant, self._coordinates)))
+        left_out = _tool_of_parameters(subject)
+        found = []
+        for link, frame in groups:
+            by_role: dict[Role, list[PlacedShape]] = {Role.kProximity: [], Role.kIllustration: []}
+            for body in plant.GetBodiesWeldedTo(frame.body()):
+                if body.name() == left_out:
+                    continue
+                frame_id = plant.GetBodyFrameIdOrThrow(body.index())
+                X_LB = plant.CalcRelativeTransform(plain, frame, body.body_frame())
+                for role, shapes in by_role.items():
+                    for g in inspector.GetGeometries(frame_id, role):
+                        if inspector.GetName(g).startswith("cell_"):
+                            continue
+                        X_LG = X_LB @ inspector.GetPoseInFrame(g)
+                        shapes.append(PlacedShape(g, link, body.name(), X_LG))
+            shapes = by_role[Role.kProximity]
+            if not shapes:
+                shapes = by_role[Role.kIllustration]
+                for shape in shapes:
+                    self._scene.AssignRole(
+                        plant.get_source_id(), shape.geometry, ProximityProperties()
+                    )
+            found += shapes
+        return found
+
+    def _pairs(self, cell: Cell) -> list[Pair]:
+        self._require_bodies([name for pair in cell.joined for name in pair], "joined")
+        joined = [set(pair) for pair in cell.joined]
+        pairs: list[Pair] = []
+        for obstacle, identifier in self.obstacles:
+            self._require_bodies(obstacle.beside, f"obstacle '{obstacle.name}': beside")
+            pairs += [
+                Pair(shape.geometry, identifier, f"{shape.body} and {obstacle.name}")
+                for shape in self.shapes
+                if shape.link != WORLD and shape.body not in obstacle.beside
+            ]
+        if cell.self_collision:
+            pairs += [
+                Pair(a.geometry, b.geometry, f"{a.body} and {b.body}")
+                for a in self.shapes
+                for b in self.shapes
+                if b.link - a.link > 1 and {a.body, b.body} not in joined
+            ]
+        return pairs
+
+    def _require_bodies(self, names: list[str], key: str) -> None:
+        for name in names:
+            if not self._plant.HasBodyNamed(name):
+                known = ", ".join(sorted({shape.body for shape in self.shapes}))
+                raise InputError(f"cell: {key} = '{name}'; must be one of {known}")
+
+    def _drop_joined(self, position_limits: np.ndarray, clearance: float) -> None:
+        """Take out pairs that are too near in all of some random postures."""
+        if not self.pairs:
+            return
+        lower, upper = np.clip(position_limits, -_FULL_TURN, _FULL_TURN).T
+        q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, self._dimension))
+        touching = np.all(self._distances(q) < clearance, axis=0)
+        self.pairs = [p for p, joined in zip(self.pairs, touching, strict=True) if not joined]
+
+
+def _drake_shape(obstacle: Obstacle) -> Shape:
+    if obstacle.kind == "box":
+        return Box(*obstacle.size)
+    if obstacle.kind == "sphere":
+        return Sphere(obstacle.radius)
+    length = float(np.linalg.norm(obstacle.end - obstacle.start))
+    kind = Capsule if obstacle.kind == "capsule" else Cylinder
+    return kind(obstacle.radius, length)
+
+
+def _tool_of_parameters(subject: Subject) -> str:
+    """Return the name of the body that the subject is without."""
+    if subject.tool or subject.parameters is None:
+        return ""
+    return subject.parameters.tool.name

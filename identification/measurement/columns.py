@@ -1,0 +1,208 @@
+"""From named signals with units, whatever file they are from, to a record."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, MeasuredRobot, Record
+from identification.measurement.units import to_si
+from pfsc_drake.errors import InputError, shortened
+
+TIME = "t"
+# q_motor before q
+_NAME = re.compile(rf"({'|'.join(sorted(SIGNALS, key=len, reverse=True))})(?:_(.+))?", re.ASCII)
+_MOST_NAMES = 12
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a person says about a file that it does not say itself.
+
+    Signals are named as in :mod:`~identification.measurement.files`: ``q`` for all joints,
+    ``q_2`` or ``q_<joint name>`` for one.
+
+    Attributes:
+        names: Signal by name in the file, for files that use other names; whatever else
+            is in such a file is left out.
+        units: Unit by signal, for files that state none.
+        scale: SI units per unit of the file by signal, for units like ``counts`` or ``A``.
+    """
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    scale: Mapping[str, float] = field(default_factory=dict)
+
+
+class RawSignal(NamedTuple):
+    """A signal as a file has it.
+
+    Attributes:
+        name: In the file.
+        values: Shape (K,), or (K, m) for several joints.
+        units: One for each of its columns; empty where the file states none.
+        joints: Whose they are, by name or number; empty where the file does not say.
+    """
+
+    name: str
+    values: np.ndarray
+    units: Sequence[str] = ()
+    joints: Sequence[str] = ()
+
+
+def parse_name(name: str) -> tuple[str, str] | None:
+    """Return signal and joint, empty for all joints, that a name stands for; None if nothing."""
+    if name == TIME:
+        return TIME, ""
+    found = _NAME.fullmatch(name)
+    return None if found is None else (found[1], found[2] or "")
+
+
+def make_record(
+    signals: Sequence[RawSignal],
+    robot: MeasuredRobot,
+    period: float | None,
+    reading: Reading,
+    source: str,
+) -> Record:
+    """Return the record that signals of a file make.
+
+    Args:
+        signals: What is in the file.
+        robot: Whose signals they are.
+        period: Of the motion [s], or None.
+        reading: What the file does not say.
+        source: Name of the file.
+
+    Raises:
+        InputError: If a signal is unknown, missing, there twice, or of another robot, or its
+            unit is not stated or not one of its own.
+    """
+    table = _Table(robot, reading, source)
+    for signal in signals:
+        table.add(signal)
+    return table.record(period)
+
+
+class _Table:
+    """Columns of a record, by signal and joint."""
+
+    def __init__(self, robot: MeasuredRobot, reading: Reading, source: str) -> None:
+        self._robot, self._reading, self._source = robot, reading, source
+        self._columns: dict[tuple[str, int], np.ndarray] = {}
+        self._unused = {
+            option: set(getattr(reading, option)) for option in ("names", "units", "scale")
+        }
+
+    def add(self, raw: RawSignal) -> None:
+        """Add what is in a signal of the file."""
+        self._unused["names"].discard(raw.name)
+        name = self._reading.names.get(raw.name, raw.name)
+        parsed = parse_name(name)
+        if parsed is None:
+            if self._reading.names and raw.name not in self._reading.names:
+                return
+            raise InputError(
+                f"{self._source}: '{shortened(name)}' is unknown; allowed: t, "
+                f"{', '.join(f'{signal}_1' for signal in SIGNALS)} and so on, or names that are "
+                "said to mean these"
+            )
+        signal, joint = parsed
+        columns = raw.values[:, None] if raw.values.ndim == 1 else raw.values
+        for i, column in enumerate(columns.T):
+            index = 0 if signal == TIME else self._joint(raw, name, joint, i, columns.shape[1])
+            key = (signal, index)
+            label = self._label(signal, index)
+            if key in self._columns:
+                raise InputError(f"{self._source}: {label} twice; once is allowed")
+            unit = raw.units[min(i, len(raw.units) - 1)] if raw.units else ""
+            self._columns[key] = column * self._factor(signal, index, unit)
+
+    def _joint(self, raw: RawSignal, name: str, joint: str, column: int, width: int) -> int:
+        """Return whose column it is, from 0."""
+        names, n = list(self._robot.joint_names), len(self._robot.joint_names)
+        if not joint:
+            if raw.joints:
+                joint = raw.joints[column] if column < len(raw.joints) else "?"
+                joint = joint.removeprefix(f"{raw.name}_")
+            elif width == n:
+                return column
+            else:
+                raise InputError(
+                    f"{self._source}: {name} has {width} columns; {self._robot.name} has the {n} "
+                    f"joints {', '.join(names[:_MOST_NAMES])}"
+                )
+        if joint in names:
+            return names.index(joint)
+        if joint.isdecimal() and 1 <= int(joint) <= n:
+            return int(joint) - 1
+        raise InputError(
+            f"{self._source}: {name} is of joint '{shortened(joint)}'; {self._robot.name} has the "
+            f"joints 1 to {n}: {', '.join(names[:_MOST_NAMES])}"
+        )
+
+    def _label(self, signal: str, index: int) -> str:
+        return TIME if signal == TIME else f"{signal}_{index + 1}"
+
+    def _option(self, option: str, signal: str, index: int) -> str | float | None:
+        """Return what a person says of a column."""
+        values: Mapping[str, str | float] = getattr(self._reading, option)
+        own = f"{signal}_{self._robot.joint_names[index]}"
+        for key in (self._label(signal, index), own, signal):
+            if key in values:
+                self._unused[option].discard(key)
+                return values[key]
+        return None
+
+    def _factor(self, signal: str, index: int, stated: str) -> float:
+        where = f"{self._source}, {self._label(signal, index)}"
+        given = self._option("units", signal, index)
+        if stated and given and stated != given:
+            raise InputError(f"{where}: the file says [{stated}]; a unit of [{given}] was given")
+        unit = str(given or stated)
+        scale = self._option("scale", signal, index)
+        if not unit and scale is None:
+            raise InputError(f"{where}: no unit is stated; it must be, as in 'tau_1 [Nm]'")
+        joint_unit = self._robot.joint_units[index]
+        return to_si(signal, joint_unit, unit, None if scale is None else float(scale), where)
+
+    def record(self, period: float | None) -> Record:
+        """Return the record."""
+        self._refuse_unused()
+        names = tuple(self._robot.joint_names)
+        if (TIME, 0) not in self._columns:
+            raise InputError(f"{self._source}: no time; 't [s]' is required")
+        values: dict[str, np.ndarray] = {}
+        for signal in SIGNALS:
+            there = [j for j in range(len(names)) if (signal, j) in self._columns]
+            if not there and signal not in REQUIRED_SIGNALS:
+                continue
+            missing = [j for j in range(len(names)) if j not in there]
+            if missing:
+                labels = ", ".join(f"{signal}_{j + 1} ({names[j]})" for j in missing)
+                raise InputError(
+                    f"{self._source}: no {labels}; {signal} of all {len(names)} joints of "
+                    f"{self._robot.name} is required"
+                )
+            values[signal] = np.column_stack([self._columns[signal, j] for j in there])
+        return Record(
+            self._columns[TIME, 0],
+            values["q"],
+            values["tau"],
+            names,
+            period,
+            values.get("v"),
+            values.get("a"),
+            values.get("q_motor"),
+            self._source,
+        )
+
+    def _refuse_unused(self) -> None:
+        for option, keys in self._unused.items():
+            if keys:
+                raise InputError(
+                    f"{self._source}: {option} of '{shortened(sorted(keys)[0])}' given, which the "
+                    "file does not have; must be of something in it"
+                )

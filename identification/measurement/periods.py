@@ -1,0 +1,181 @@
+"""Averages over the periods of a motion, and its derivatives without error, Sec. 2.5.2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.measurement.checks import check_sampling
+from identification.measurement.record import Record
+from pfsc_drake.errors import InputError
+
+HARMONICS_KEPT = 20  # f_g = 20 / T_f, Sec. C.2
+_WHOLE = 1e-6  # of a sampling time, by which a period may miss a whole number of them
+_FEWEST_PERIODS = 2  # after those that are skipped, so that they have a spread
+_REPEATS = 0.02  # of the travel, by which periods of the positions may differ
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class AveragedMotion:
+    """One period of a motion, averaged over P periods, at K instants; N joints.
+
+    Attributes:
+        t: From the start of a period [s], shape (K,).
+        q: Positions without what is above the bandwidth [rad or m], shape (K, N).
+        v: Their derivatives, shape (K, N).
+        a: Their second derivatives, shape (K, N).
+        tau: Mean torques, not filtered [Nm or N], shape (K, N).
+        torque_variance: Of one measured torque, from the spread over the periods, shape (N,)
+            [(Nm)^2 or N^2]: the diagonal of the covariance of the torques in (2.80).
+        position_variance: The same of one measured position, shape (N,).
+        tau_periods: The torques that were averaged, shape (P, K, N).
+        period: ``T_f`` [s].
+        bandwidth_hz: ``f_g`` [Hz].
+        joint_names: N names.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    torque_variance: np.ndarray
+    position_variance: np.ndarray
+    tau_periods: np.ndarray
+    period: float
+    bandwidth_hz: float
+    joint_names: tuple[str, ...]
+
+    @property
+    def periods(self) -> int:
+        """Number P of periods that were averaged."""
+        return len(self.tau_periods)
+
+    @property
+    def mean_torque_variance(self) -> np.ndarray:
+        """Variance of ``tau``, P times below that of one measurement, shape (N,)."""
+        return self.torque_variance / self.periods
+
+
+def average(
+    record: Record,
+    period: float | None = None,
+    skip: int = 1,
+    bandwidth_hz: float | None = None,
+) -> AveragedMotion:
+    """Average a record over its periods, and differentiate its positions.
+
+    Incomplete periods at the end are left out. The spread over the periods, whose sum of
+    squares has (P - 1) K degrees of freedom, tells the variance of one measurement whatever
+    the mean is.
+
+    Args:
+        record: Signals at an even rate that divides the period.
+        period: ``T_f`` [s]; by default the record's.
+        skip: Periods at the start that are left out, in which the motion is still settling.
+        bandwidth_hz: ``f_g``, above which the positions are taken for noise [Hz]; by default
+            ``20 / T_f``.
+
+    Raises:
+        InputError: If the period is not known or no multiple of the sampling time, fewer than
+            two periods are left, the motion does not repeat itself with this period, or
+            the bandwidth is not between that of the period and half the sampling rate.
+    """
+    check_sampling(record)
+    period, count = _samples_per_period(record, period)
+    whole = record.t.size // count
+    if skip < 0 or whole - skip < _FEWEST_PERIODS:
+        raise InputError(
+            f"{record.source}: {record.duration:.6g} s are {whole} whole periods of {period:g} s; "
+            f"at least {_FEWEST_PERIODS} beside the first {max(skip, 0)}, which are left out, are "
+            "required"
+        )
+    used = slice(skip * count, whole * count)
+    q = record.q[used].reshape(whole - skip, count, record.dimension)
+    tau = record.tau[used].reshape(q.shape)
+    _check_repetition(record, q, period)
+    bandwidth = HARMONICS_KEPT / period if bandwidth_hz is None else bandwidth_hz
+    positions, velocities, accelerations = differentiate(q.mean(axis=0), period, bandwidth)
+    return AveragedMotion(
+        np.arange(count) * period / count,
+        positions,
+        velocities,
+        accelerations,
+        tau.mean(axis=0),
+        _spread(tau),
+        _spread(q),
+        tau,
+        period,
+        bandwidth,
+        record.joint_names,
+    )
+
+
+def differentiate(
+    q: np.ndarray, period: float, bandwidth_hz: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a periodic signal below a bandwidth, and its first two derivatives.
+
+    The discrete Fourier transform is multiplied by ``i omega`` and ``-omega^2`` and set to zero
+    above the bandwidth, which is exact for signals that have nothing there, Sec. 2.5.2.
+
+    Args:
+        q: One period, evenly sampled, shape (K, N).
+        period: ``T_f`` [s].
+        bandwidth_hz: ``f_g``, the highest frequency that is kept [Hz].
+
+    Returns:
+        Three arrays of shape (K, N).
+
+    Raises:
+        InputError: If the bandwidth is not between ``1 / T_f`` and half the sampling rate.
+    """
+    count = len(q)
+    highest = 0.5 * count / period
+    if not 1.0 / period * (1.0 - _ROUNDING) <= bandwidth_hz < highest:
+        raise InputError(
+            f"bandwidth = {bandwidth_hz:g} Hz; must be from {1.0 / period:g} Hz, that of the "
+            f"period, to below {highest:g} Hz, half the sampling rate"
+        )
+    frequencies = np.arange(count // 2 + 1) / period
+    keep = frequencies <= bandwidth_hz * (1.0 + _ROUNDING)
+    spectrum = np.fft.rfft(q, axis=0) * keep[:, None]
+    rate = 2j * np.pi * frequencies[:, None]
+    signals = [np.fft.irfft(rate**order * spectrum, count, axis=0) for order in range(3)]
+    return signals[0], signals[1], signals[2]
+
+
+def _samples_per_period(record: Record, period: float | None) -> tuple[float, int]:
+    given = record.period if period is None else period
+    if given is None:
+        raise InputError(f"{record.source}: the period of the motion is not known; give one in s")
+    if not 0.0 < given < np.inf:
+        raise InputError(f"{record.source}: period = {given} s; must be positive and finite")
+    samples = given / record.sampling_time
+    count = round(samples)
+    # rounding of the times in a file adds up over no more than the record
+    if count < 1 or abs(samples - count) > max(_WHOLE * samples, _WHOLE):
+        raise InputError(
+            f"{record.source}: period = {given:g} s is {samples:.6g} sampling times of "
+            f"{record.sampling_time:.6g} s; must be a whole number of them"
+        )
+    return float(given), count
+
+
+def _check_repetition(record: Record, q: np.ndarray, period: float) -> None:
+    travel = np.ptp(q, axis=(0, 1))
+    deviation = np.sqrt(np.mean((q - q.mean(axis=0)) ** 2, axis=1)).max(axis=0)
+    j = int(np.argmax(deviation - _REPEATS * travel))
+    if deviation[j] > _REPEATS * travel[j]:
+        raise InputError(
+            f"{record.source}: q of {record.joint_names[j]} differs from period to period by "
+            f"{deviation[j] / travel[j]:.3g} of its travel (RMS); {_REPEATS:g} is allowed: "
+            f"the period is not {period:g} s, or the motion had not settled"
+        )
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """Return the variance about the mean of the periods, shape (N,)."""
+    periods, count, _ = values.shape
+    squares: np.ndarray = np.sum((values - values.mean(axis=0)) ** 2, axis=(0, 1))
+    return squares / ((periods - 1) * count)

@@ -1,0 +1,124 @@
+"""The controller that moves a robot along an excitation: PD with feed-forward, at 1 kHz."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.serial.rigid_rotors import rigid_mass_matrix, rigid_torque_function
+
+# postures along a motion in which the inertias are looked at
+_POSTURES = 50
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A position controller for each joint, as robots have it.
+
+    ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` at the ticks, held in between, with
+    ``K_p = J omega^2``, ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and
+    the torque ``tau_ff`` of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The
+    velocity is the difference quotient of the encoder's positions.
+
+    Friction that is not fed forward holds the robot back at every reversal until the deviation has
+    grown by ``2 f_c / K_p``. The motion then has edges, which the bandwidth of
+    :func:`~identification.measurement.periods.average` takes away, and parameters of light
+    joints with much friction are biased.
+
+    Attributes:
+        bandwidth: ``omega`` [rad/s].
+        damping: ``zeta``.
+        feedforward: Weight of the rigid robot's torque: 1 for the robot's own, 0 for none.
+        friction: Weight of the friction's: 1 for what it usually is, 0 for none.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If a value is out of range.
+    """
+
+    bandwidth: float = 150.0
+    damping: float = 0.8
+    feedforward: float = 1.0
+    friction: float = 1.0
+    period: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("bandwidth", "damping", "period"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InputError(f"servo: {name} = {getattr(self, name)}; must be positive")
+        for name in ("feedforward", "friction"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InputError(f"servo: {name} = {getattr(self, name)}; must be 0 or positive")
+        if 2.0 * self.damping * self.bandwidth * self.period > 0.5:
+            raise InputError(
+                f"servo: bandwidth = {self.bandwidth:g} rad/s; must be at most "
+                f"{0.25 / (self.damping * self.period):g} rad/s at a period of {self.period:g} s"
+            )
+
+    def gains(self, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``K_p`` and ``K_d``, each (N,).
+
+        Args:
+            inertia: ``J`` [kg m^2 or kg], shape (N,).
+        """
+        return inertia * self.bandwidth**2, 2.0 * self.damping * inertia * self.bandwidth
+
+    def known_torque(
+        self,
+        subject: Subject,
+        motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+        friction: tuple[np.ndarray, np.ndarray],
+    ) -> np.ndarray:
+        """Return ``tau_ff`` along a motion, shape (K, N) [Nm or N].
+
+        Args:
+            subject: The robot.
+            motion: Positions, velocities and accelerations, each (K, N).
+            friction: ``f_c`` and ``f_v`` as they usually are, each (N,).
+        """
+        v = motion[1]
+        resistance = friction[0] * np.sign(v) + friction[1] * v
+        return self.feedforward * rigid_torques(subject, *motion) + self.friction * resistance
+
+
+def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
+    """Return the least inertia that each drive feels along a motion, shape (N,) [kg m^2 or kg].
+
+    That is with all other joints free, ``1 / (D^-1)_ii``.
+
+    Args:
+        subject: The robot.
+        q: Joint coordinates along the motion, shape (K, N).
+    """
+    x = ca.SX.sym("q", subject.dimension)
+    if subject.chain is None:
+        D = subject.robot.mass_matrix(x)
+    else:
+        D = rigid_mass_matrix(subject.chain, subject.mounts, x)
+    function = ca.Function("D", [x], [ca.densify(D)])
+    postures = q[:: max(1, len(q) // _POSTURES)]
+    compliance = [np.diag(np.linalg.inv(np.array(function(posture)))) for posture in postures]
+    return 1.0 / np.max(compliance, axis=0)
+
+
+def rigid_torques(subject: Subject, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Return the drive torques of the robot without friction, shape (K, N) [Nm or N].
+
+    Args:
+        subject: The robot.
+        q: Joint coordinates, shape (K, N).
+        v: Their velocities, shape (K, N).
+        a: Their accelerations, shape (K, N).
+    """
+    if subject.chain is None:
+        n = subject.dimension
+        x = [ca.SX.sym(name, n) for name in "qva"]
+        jets = [Jet.from_derivatives([d[i] for d in x]) for i in range(n)]
+        tau = ca.vertcat(*[t.coefficients[0] for t in subject.robot.inverse_dynamics(jets)])
+        function = ca.Function("torque", x, [ca.densify(tau)])
+    else:
+        function = rigid_torque_function(subject.chain, subject.mounts)
+    return np.array(function(q.T, v.T, a.T)).T

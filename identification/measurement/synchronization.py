@@ -1,0 +1,170 @@
+"""Whether signals of a record were sampled at the same instants."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from scipy.optimize import minimize_scalar
+
+from identification.measurement.periods import AveragedMotion
+from identification.measurement.record import Record
+from pfsc_drake.errors import InputError
+
+LONGEST_LAG = 0.1  # s, up to which lags are looked for
+TOLERATED = 2.0  # sampling times
+_SURE = 3.0  # standard deviations
+_RANK = 1e-10
+_ENOUGH = 20_000  # samples that tell the lag of a measured velocity
+_SCALE = 0.1  # by which a measured velocity may differ from the derivative of the position
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much one signal comes later than another.
+
+    Attributes:
+        time: Positive if it is late [s].
+        standard_deviation: Of that [s].
+    """
+
+    time: float
+    standard_deviation: float
+
+    def is_beyond(self, tolerance: float) -> bool:
+        """Return whether it certainly exceeds a tolerance [s]."""
+        return abs(self.time) > tolerance + _SURE * self.standard_deviation
+
+
+def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = LONGEST_LAG) -> Lag:
+    """Return how late the torques are, as the lag with which a model explains them best.
+
+    For each lag the parameters of the model are estimated anew, so that none have to be known:
+    with an orthonormal basis of the weighted regressor's columns the residual is what the
+    circular correlation of the basis with the torques leaves over.
+
+    Args:
+        motion: One period.
+        regressor: ``Y(q, v, a)`` along the motion, of full or base parameters, with friction,
+            shape (K, N, n).
+        longest: Lag up to which is looked [s].
+
+    Raises:
+        InputError: If the regressor is not of this motion.
+    """
+    count, joints = motion.tau.shape
+    if regressor.shape[:2] != (count, joints):
+        raise InputError(
+            f"regressor of shape {regressor.shape}; must be ({count}, {joints}, n) as the motion"
+        )
+    weight = 1.0 / np.sqrt(motion.mean_torque_variance)
+    if not np.isfinite(weight).all():
+        weight = np.ones(joints)
+    basis = _basis((regressor * weight[:, None]).reshape(count * joints, -1))
+    torques = np.fft.fft(motion.tau * weight, axis=0)
+    # sum over the joints of the correlations with each basis vector, over the frequencies
+    spectra = np.fft.fft(basis.reshape(count, joints, -1), axis=0)
+    cross = np.einsum("fj,fjn->nf", torques, spectra.conj()) / count
+    step = motion.period / count
+    frequencies = 2.0 * np.pi * np.fft.fftfreq(count, step)
+
+    def explained(lag: float) -> float:
+        values = (cross @ np.exp(1j * frequencies * lag)).real
+        return float(values @ values)
+
+    table = np.sum(np.fft.ifft(cross * count, axis=1).real ** 2, axis=0)
+    reach = min(max(2, round(longest / step)), count // 2 - 1)
+    lags = np.arange(-reach, reach + 1)
+    best = lags[np.argmax(table[lags])] * step
+    found = minimize_scalar(
+        lambda lag: -explained(lag), bounds=(best - step, best + step), method="bounded"
+    )
+    time, most = float(found.x), -float(found.fun)
+    left = max(float(np.sum((motion.tau * weight) ** 2)) - most, 0.0)
+    variance = left / (count * joints - basis.shape[1])
+    curvature = (2.0 * most - explained(time - step) - explained(time + step)) / step**2
+    deviation = np.sqrt(2.0 * variance / curvature) if curvature > 0.0 else np.inf
+    return Lag(time, float(deviation))
+
+
+def check_torque_lag(
+    motion: AveragedMotion, regressor: np.ndarray, tolerance: float | None = None
+) -> Lag:
+    """Refuse torques that lag the motion, or lead it.
+
+    Args:
+        motion: One period.
+        regressor: See :func:`torque_lag`.
+        tolerance: What is allowed [s]; by default two sampling times.
+
+    Returns:
+        The lag that was found and is tolerated.
+
+    Raises:
+        InputError: If they are off by more, with certainty.
+    """
+    lag = torque_lag(motion, regressor)
+    allowed = TOLERATED * motion.period / len(motion.t) if tolerance is None else tolerance
+    if lag.is_beyond(allowed):
+        raise InputError(
+            f"tau {_late(lag.time)} the motion by {abs(lag.time) * 1e3:.3g} ms (standard "
+            f"deviation {lag.standard_deviation * 1e3:.2g} ms); allowed: {allowed * 1e3:.3g} ms, "
+            "shift it"
+        )
+    return lag
+
+
+def check_velocities(record: Record, tolerance: float | None = None) -> None:
+    """Refuse measured velocities that are not those of the positions: late, scaled or turned.
+
+    Args:
+        record: With velocities, or nothing is checked.
+        tolerance: Lag that is allowed [s]; by default two sampling times.
+
+    Raises:
+        InputError: With joint and lag, or factor.
+    """
+    if record.v is None:
+        return
+    allowed = TOLERATED * record.sampling_time if tolerance is None else tolerance
+    rates = np.gradient(record.q, record.sampling_time, axis=0)
+    for j, name in enumerate(record.joint_names):
+        if not (rates[:, j].any() and record.v[:, j].any()):
+            continue
+        rate, v = rates[:_ENOUGH, j], record.v[:_ENOUGH, j]
+        lag, factor = _delay(rate, v, record.sampling_time)
+        if not abs(factor - 1.0) <= _SCALE:
+            raise InputError(
+                f"{record.source}: v of {name} is {factor:.4g} times the derivative of q; must be "
+                "1 (unit, sign or order of the joints)"
+            )
+        if abs(lag) > allowed:
+            raise InputError(
+                f"{record.source}: v of {name} {_late(lag)} the derivative of q by "
+                f"{abs(lag) * 1e3:.3g} ms; allowed: {allowed * 1e3:.3g} ms (leave v out, or shift "
+                "what is late)"
+            )
+
+
+def _late(lag: float) -> str:
+    return "lags" if lag > 0.0 else "leads"
+
+
+def _basis(matrix: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of a matrix' columns."""
+    Q, R, _ = scipy.linalg.qr(matrix, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    return Q[:, : int(np.sum(sizes > _RANK * sizes[0]))]
+
+
+def _delay(first: np.ndarray, second: np.ndarray, step: float) -> tuple[float, float]:
+    """Return how late the second signal is [s], and its factor at that lag."""
+    reach = min(max(2, round(LONGEST_LAG / step)), first.size // 4)
+    middle = slice(reach, first.size - reach)
+    window = np.lib.stride_tricks.sliding_window_view(first, first.size - 2 * reach)
+    factors = window @ second[middle] / np.maximum(np.sum(window**2, axis=1), 1e-300)
+    errors = np.sum(second[middle] ** 2) - factors**2 * np.sum(window**2, axis=1)
+    k = int(np.clip(np.argmin(errors), 1, 2 * reach - 1))
+    before, at, after = errors[k - 1 : k + 2]
+    bend = before - 2.0 * at + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return (reach - k - shift) * step, float(factors[k])

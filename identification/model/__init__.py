@@ -1,0 +1,1 @@
+"""What the torques depend on: parameters, regressor, base parameters."""

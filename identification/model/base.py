@@ -1,0 +1,187 @@
+"""Base parameters found with numbers: what of the parameters the torques depend on (2.74)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+
+# least part of a column outside the span of others for it to be independent of them
+_INDEPENDENT = 1e-8
+# of the largest column; below, it is zero but for rounding
+_ZERO = 1e-11
+# relative error of a coefficient that is a whole number or zero
+_ROUNDING = 1e-9
+# postures that the columns are compared in, per parameter
+_SAMPLES_PER_PARAMETER = 4
+# slides without limits move that far [m], turning joints half a turn to both sides
+_STROKE = 1.0
+# of the parameters, those of a group are kept before those of the next: what Mayeda et al. keep
+_PREFERENCE = (
+    ("Izz", "mx", "my", "Ixx", "Ixy", "Ixz", "Iyz", "m_q", "m_y"),
+    ("I_M", "f_c", "f_v"),
+    ("mz", "Iyy", "m"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """A smallest set of parameters, each a linear combination of all, that the torques depend on.
+
+    ``Y rho = Y_b rho_b`` with ``rho_b = K_b rho`` and the columns ``Y_b = Y[:, indices]``.
+
+    Attributes:
+        indices: Of the columns that are kept, shape (n_b,).
+        projection: ``K_b``, shape (n_b, n); has ones at ``indices``.
+        full_names: Of the n parameters.
+        full_units: Of the n parameters.
+    """
+
+    indices: np.ndarray
+    projection: np.ndarray
+    full_names: list[str]
+    full_units: list[str]
+
+    @property
+    def rank(self) -> int:
+        """Number of base parameters n_b."""
+        return len(self.indices)
+
+    @property
+    def names(self) -> list[str]:
+        """What each is a combination of, ``link_2.Izz + 0.3481 link_3.m + ...``."""
+        return [combination(row, self.full_names, first=i) for row, i in self._rows()]
+
+    @property
+    def short_names(self) -> list[str]:
+        """The names of the parameters that lead the combinations."""
+        return [self.full_names[i] for i in self.indices]
+
+    @property
+    def units(self) -> list[str]:
+        """Of the base parameters."""
+        return [self.full_units[i] for i in self.indices]
+
+    @property
+    def unidentifiable(self) -> list[str]:
+        """Names of the parameters that have no effect at all."""
+        used = np.any(self.projection != 0.0, axis=0)
+        return [
+            name for name, has_effect in zip(self.full_names, used, strict=True) if not has_effect
+        ]
+
+    @property
+    def only_combined(self) -> list[str]:
+        """Names of the parameters that have an effect in combinations with others only."""
+        alone = {i for row, i in self._rows() if np.count_nonzero(row) == 1}
+        used = np.flatnonzero(np.any(self.projection != 0.0, axis=0))
+        return [self.full_names[i] for i in used if i not in alone]
+
+    def values(self, parameters: np.ndarray) -> np.ndarray:
+        """Return ``rho_b = K_b rho``, shape (n_b,).
+
+        Args:
+            parameters: ``rho``, shape (n,).
+        """
+        return self.projection @ parameters
+
+    def reduce(self, Y: np.ndarray) -> np.ndarray:
+        """Return ``Y_b`` of (2.74), shape (..., n_b).
+
+        Args:
+            Y: Regression matrices, shape (..., n).
+        """
+        return Y[..., self.indices]
+
+    def _rows(self) -> list[tuple[np.ndarray, int]]:
+        return [(row, int(i)) for row, i in zip(self.projection, self.indices, strict=True)]
+
+
+def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
+    """Return base parameters of a robot, from the regression matrices of random motions.
+
+    Columns that depend on others are told by orthogonalization, and their parameters are added to
+    those that they depend on. Moments of inertia about the joint axis, first moments across and
+    friction are kept rather than masses, so that the combinations look like (B.4).
+
+    Args:
+        regressor: Of the robot.
+        seed: Of the random motions.
+
+    Raises:
+        InputError: If no parameter has an effect.
+    """
+    X = regressor.matrix(*random_motion(regressor, seed)).reshape(-1, regressor.size)
+    order = sorted(range(regressor.size), key=lambda i: _preference(regressor.names[i]))
+    kept = np.sort(_independent(X, order))
+    if kept.size == 0:
+        raise InputError(f"{regressor.subject.name}: no parameter has an effect on the torques")
+    projection = np.linalg.lstsq(X[:, kept], X, rcond=None)[0]
+    norms = np.linalg.norm(X, axis=0)
+    share = np.abs(projection) * norms[kept, None]
+    projection[share <= _ROUNDING * norms] = 0.0
+    projection[:, norms <= _ZERO * norms.max()] = 0.0
+    projection[:, kept] = np.eye(kept.size)
+    return BaseParameters(kept, projection, list(regressor.names), list(regressor.units))
+
+
+def random_motion(regressor: Regressor, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return positions, velocities and accelerations that have nothing to do with each other.
+
+    Args:
+        regressor: Of the robot.
+        seed: Of the random numbers.
+
+    Returns:
+        Arrays (K, N) with enough rows for all parameters, of the order of 1 in rad (m) and s.
+        Positions are within the limits of a joint where it has some.
+    """
+    subject, random = regressor.subject, np.random.default_rng(seed)
+    stroke = np.where(np.array(subject.joint_units) == "rad", np.pi, _STROKE)
+    lower, upper = np.clip(subject.position_limits.T, -stroke, stroke)
+    shape = (_SAMPLES_PER_PARAMETER * regressor.size, subject.dimension)
+    v, a = random.normal(size=(2, *shape))
+    return random.uniform(lower, upper, shape), v, a
+
+
+def combination(row: np.ndarray, names: Sequence[str], first: int | None = None) -> str:
+    """Return a linear combination in words, ``link_2.Izz + 0.3481 link_3.m``.
+
+    Args:
+        row: Coefficients, shape (n,).
+        names: Of the n parameters.
+        first: The one that is to lead; by default the first with a coefficient.
+    """
+    used = np.flatnonzero(row).tolist()
+    if first is not None:
+        used = [first, *(i for i in used if i != first)]
+    text = ""
+    for i in used:
+        size = f"{abs(row[i]):.4g} " if abs(abs(row[i]) - 1.0) > _ROUNDING else ""
+        sign = ("-" if row[i] < 0.0 else "") if not text else (" - " if row[i] < 0.0 else " + ")
+        text += f"{sign}{size}{names[i]}"
+    return text
+
+
+def _preference(name: str) -> int:
+    kind = name.split(".")[1]
+    return next(rank for rank, group in enumerate(_PREFERENCE) if kind in group)
+
+
+def _independent(X: np.ndarray, order: Sequence[int]) -> np.ndarray:
+    """Return the indices of columns that do not depend on those before them in an order."""
+    norms = np.linalg.norm(X, axis=0)
+    directions = np.empty((0, X.shape[0]))
+    kept = []
+    for i in order:
+        if norms[i] <= _ZERO * norms.max():
+            continue
+        rest = X[:, i] / norms[i]
+        for _ in range(2):  # once more, against the rounding of the first time
+            rest = rest - directions.T @ (directions @ rest)
+        if (length := np.linalg.norm(rest)) > _INDEPENDENT:
+            kept.append(i)
+            directions = np.vstack([directions, rest / length])
+    return np.array(kept, dtype=int)

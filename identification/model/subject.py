@@ -1,0 +1,218 @@
+"""The robot under test."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, Frame
+
+from diagrams.robots.delta import is_delta, load_delta_robot
+from diagrams.robots.model import locate_model, read_robot, tool_frame
+from diagrams.scenario import RobotParameters as RobotBlock
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.models.parameters import BodyParameters, RobotParameters, load_parameters
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.serial.links import ChainLink
+from pfsc_drake.robot.serial.rotor_coupling import RotorMount, mounts_from_parameters
+from pfsc_drake.yaml.reading import read_yaml
+from pfsc_drake.yaml.typed import load_typed
+
+_YAML = (".yaml", ".yml")
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A robot with N joints whose parameters are to be found.
+
+    Exactly one of ``chain`` and ``delta`` is not None.
+
+    Attributes:
+        name: Of the robot.
+        chain: A serial robot.
+        delta: A DELTA robot.
+        mounts: Where the rotors of a serial robot sit, N of them; None if unknown.
+        gear_ratio: Turns of the rotors per turn of the joints (rad per m for slides), shape (N,);
+            1 where unknown.
+        position_limits: Lower and upper ones [rad or m], shape (N, 2); infinite if unknown.
+        velocity_limit: [rad/s or m/s], shape (N,); infinite if unknown.
+        acceleration_limit: [rad/s^2 or m/s^2], shape (N,); infinite if unknown.
+        effort_limit: Of the drives at the joint side [Nm or N], shape (N,); infinite if unknown.
+        joint_names: As in the model.
+        joint_units: ``rad`` or ``m`` of each.
+        coulomb: True Coulomb friction [Nm or N], shape (N,); None if unknown.
+        viscous: True viscous friction [Nm s/rad or N s/m], shape (N,); None if unknown.
+        parameters: The file that the model of a serial robot was written from; None if unknown.
+        block: Which model a serial robot was read from, as scenarios say it; None for others.
+        folder: Where relative file names in ``block`` start.
+        tool: Whether the tool of the parameter file belongs to the last link.
+    """
+
+    name: str
+    chain: SerialChain | None
+    delta: DeltaRobot | None
+    mounts: list[RotorMount] | None
+    gear_ratio: np.ndarray
+    position_limits: np.ndarray
+    velocity_limit: np.ndarray
+    acceleration_limit: np.ndarray
+    effort_limit: np.ndarray
+    joint_names: list[str]
+    joint_units: list[str]
+    coulomb: np.ndarray | None
+    viscous: np.ndarray | None
+    parameters: RobotParameters | None = None
+    block: RobotBlock | None = None
+    folder: Path = Path()
+    tool: bool = False
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot, whichever kind it is."""
+        robot = self.delta if self.chain is None else self.chain
+        assert robot is not None
+        return robot
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.robot.dimension
+
+
+def load_subject(robot: str | Path, tool: bool = False) -> Subject:
+    """Return the robot of a name or a file.
+
+    Args:
+        robot: Name of a shipped model (``comau_racer_1_4``, ``festo_expt_45``,
+            ``franka_emika_panda``), an SDF, URDF or MJCF file, or a scenario, whose ``robot:``
+            block counts. Of a bare model file all links up to the frame ``tool_point`` are taken,
+            or up to the last body where there is no such frame.
+        tool: Whether the tool that the robot's parameter file names stays on the last link. It is
+            no part of the robot of Tab. C.3. Robots without such a file keep what they carry.
+
+    Raises:
+        InputError: If there is no such robot, its model cannot be read, or is no chain of joints.
+    """
+    path, folder = Path(robot), Path()
+    if path.suffix.lower() in _YAML:
+        block, folder = _robot_block(path), path.parent
+        name = path.stem
+    else:
+        block = RobotBlock(model=str(robot))
+        name = path.stem if path.suffix else str(robot)
+    if is_delta(block.model):
+        return _delta_subject(name, load_delta_robot(block.model, folder))
+    return _serial_subject(name, block, folder, tool)
+
+
+def _robot_block(path: Path) -> RobotBlock:
+    data = read_yaml(path)
+    if not isinstance(data.get("robot"), dict):
+        raise InputError(
+            f"{path}: no block 'robot'; allowed: a scenario with one, which names the model"
+        )
+    return load_typed(RobotBlock, data["robot"], str(path))
+
+
+def _delta_subject(name: str, robot: DeltaRobot) -> Subject:
+    n, friction = robot.dimension, robot.parameters.friction
+    return Subject(
+        name=name,
+        chain=None,
+        delta=robot,
+        mounts=None,
+        gear_ratio=np.ones(n),
+        position_limits=robot.gather("position_limits"),
+        velocity_limit=robot.gather("velocity_limit"),
+        acceleration_limit=np.full(n, np.inf),
+        effort_limit=robot.gather("effort_limit"),
+        joint_names=list(robot.names),
+        joint_units=["m"] * n,
+        coulomb=friction.coulomb.copy(),
+        viscous=friction.viscous.copy(),
+    )
+
+
+def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> Subject:
+    plant, _ = read_robot(block, folder)
+    chain, _ = chain_from_plant(plant, _tool_frame(plant, block))
+    parameters = _parameter_file(locate_model(block, folder))
+    if parameters is not None and not tool:
+        chain = without_tool(chain, parameters)
+    n, friction = chain.dimension, None if parameters is None else parameters.friction
+    actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
+    gears = {drive.joint().name(): drive.default_gear_ratio() for drive in actuators}
+    joints = [plant.GetJointByName(joint) for joint in chain.names]
+    return Subject(
+        name=name,
+        chain=chain,
+        delta=None,
+        mounts=_mounts(chain, parameters),
+        gear_ratio=np.array([gears.get(joint, 1.0) for joint in chain.names]),
+        position_limits=chain.gather("position_limits"),
+        velocity_limit=chain.gather("velocity_limit"),
+        acceleration_limit=np.array([joint.acceleration_upper_limits()[0] for joint in joints]),
+        effort_limit=chain.gather("effort_limit"),
+        joint_names=list(chain.names),
+        joint_units=["rad" if link.is_revolute else "m" for link in chain.links],
+        coulomb=None if friction is None else friction.coulomb[:n].copy(),
+        viscous=None if friction is None else friction.viscous[:n] + chain.viscous_damping,
+        parameters=parameters,
+        block=block,
+        folder=folder,
+        tool=tool,
+    )
+
+
+def _tool_frame(plant: MultibodyPlant, block: RobotBlock) -> Frame:
+    """Return the frame that the block names, of a model without it the last body's."""
+    if block.tool_frame == RobotBlock().tool_frame and not plant.HasFrameNamed(block.tool_frame):
+        return plant.get_body(BodyIndex(plant.num_bodies() - 1)).body_frame()
+    return tool_frame(plant, block)
+
+
+def _parameter_file(model: Path) -> RobotParameters | None:
+    """Return the parameters that a model was written from, which lie next to it."""
+    file = model.with_name("parameters.yaml")
+    if model.suffix.lower() != ".sdf" or not file.is_file():
+        return None
+    parameters = load_parameters(file)
+    written = [parameters.name, *(variant.name for variant in parameters.variants)]
+    return parameters if model.stem in written else None
+
+
+def _mounts(chain: SerialChain, parameters: RobotParameters | None) -> list[RotorMount] | None:
+    if parameters is None or not parameters.rotors.fixed_to_link:
+        return None
+    # where the base stands is the scenario's business and has no effect on rotors
+    upright = (replace(chain.links[0], R_PF=np.eye(3)), *chain.links[1:])
+    return mounts_from_parameters(replace(chain, links=upright), parameters)
+
+
+def without_tool(chain: SerialChain, parameters: RobotParameters) -> SerialChain:
+    """Return a chain whose last link has lost the tool.
+
+    Args:
+        chain: The robot with the tool; its tool point is that of the parameters.
+        parameters: Of the robot and its tool.
+    """
+    tool = parameters.tool
+    p_LB = chain.p_LT - chain.R_LT @ tool.tool_point
+    bare = _taken_off(chain.links[-1], tool, chain.R_LT, p_LB)
+    return replace(chain, links=(*chain.links[:-1], bare))
+
+
+def _taken_off(link: ChainLink, body: BodyParameters, R_LB: np.ndarray, p: np.ndarray) -> ChainLink:
+    """Return a link without one of the bodies that it is made of, whose frame is at R_LB, p."""
+    p_LC = p + R_LB @ body.center_of_mass
+    I_C = R_LB @ body.inertia_matrix() @ R_LB.T
+    other = replace(link, mass=body.mass, p_LC=p_LC, I_C=I_C)
+    # moments of mass of order 0, 1, 2 about the link's origin add up
+    mass = link.mass - body.mass
+    center = (link.mass * link.p_LC - body.mass * p_LC) / mass
+    about_origin = link.inertia_about_origin - other.inertia_about_origin
+    point = replace(link, mass=mass, p_LC=center, I_C=np.zeros((3, 3)))
+    return replace(point, I_C=about_origin - point.inertia_about_origin)
