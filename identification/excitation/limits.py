@@ -71,7 +71,9 @@ def joint_limits(
     n, names = subject.dimension, subject.joint_names
     bounds = np.asarray(subject.position_limits if position is None else position, dtype=float)
     if bounds.shape != (n, 2):
-        raise InputError(f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper")
+        raise InputError(
+            f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper"
+        )
     magnitudes = {
         "velocity": (velocity, subject.velocity_limit),
         "acceleration": (acceleration, subject.acceleration_limit),
@@ -86,8 +88,11 @@ def joint_limits(
     for i, name in enumerate(names):
         lower, upper = bounds[i]
         if not (np.isfinite(lower) and np.isfinite(upper)):
-            _refuse_unknown(subject, "position", [n for n, b in zip(names, bounds, strict=True)
-                                                  if not np.isfinite(b).all()])
+            _refuse_unknown(
+                subject,
+                "position",
+                [n for n, b in zip(names, bounds, strict=True) if not np.isfinite(b).all()],
+            )
         if not lower < upper:
             raise InputError(
                 f"position limits of {name} = [{lower:g}, {upper:g}]; lower must be below upper"
