@@ -22,7 +22,7 @@ from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
-Criterion = Literal["determinant", "condition"]
+Criterion = Literal["D", "condition"]
 CRITERIA: tuple[str, ...] = get_args(Criterion)
 # of one period, for figures that are compared
 REPORTED_SAMPLES = 1000
@@ -114,7 +114,7 @@ class ExcitationCost:
         period: Of the motion [s].
         harmonics: Of it, M of them.
         samples: Per period.
-        criterion: ``determinant`` or ``condition``.
+        criterion: ``D`` or ``condition``.
 
     Raises:
         InputError: If the criterion is unknown or the samples are fewer than the parameters.
@@ -126,7 +126,7 @@ class ExcitationCost:
         period: float,
         harmonics: tuple[int, ...],
         samples: int,
-        criterion: str = "determinant",
+        criterion: str = "D",
     ) -> None:
         self._dimension, self._size = kernels.forward.size_out(0)
         if criterion not in CRITERIA:
@@ -168,7 +168,7 @@ class ExcitationCost:
 
     @property
     def _by_determinant(self) -> bool:
-        return self._criterion == "determinant"
+        return self._criterion == "D"
 
     def _log_determinant(self, X: np.ndarray) -> tuple[float, np.ndarray]:
         """Return ``-log det(X^T X)`` and its gradient by X, from ``X = Q R``."""

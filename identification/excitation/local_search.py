@@ -16,6 +16,7 @@ from identification.excitation.program import ExcitationProgram
 _COARSE_JOINTS, _COARSE_POSTURES, _FINE = 10, 12, 100
 _SAMPLES = 20  # of the criterion per period of the highest harmonic
 _MOST_ROUNDS = 8
+
 _START_SHARE = 0.7  # of the joint limits that a random motion takes
 _START_OFFSET = 0.4  # of the reach, largest distance of its middle from that of the limits
 _POSTURES = 500
@@ -137,7 +138,7 @@ def random_motion_about(
     Args:
         problem: Of the robot.
         random: Source of the numbers.
-        posture: Its middle [rad or m], shape (N,); by default a random one that the robot may be in.
+        posture: Its middle [rad or m], shape (N,); by default a random one that is allowed.
     """
     limits = problem.limits
     middle = _random_posture(problem, random) if posture is None else posture

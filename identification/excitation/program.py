@@ -4,7 +4,7 @@ Limits hold at given instants only: those of the joints are linear in the coeffi
 postures are not. What happens in between is the business of who chooses the instants.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,6 +16,8 @@ from identification.excitation.criterion import ExcitationCost
 from identification.excitation.fourier import fourier_basis
 from identification.excitation.problem import ExcitationProblem
 from identification.excitation.sampled import SampledFunction
+
+Evaluated = Callable[[np.ndarray], np.ndarray]
 
 # a motion that shows a parameter not at all: worse than all others, but a number
 _WORST = 1e6
@@ -109,9 +111,9 @@ class ExcitationProgram:
         position, *rates = fourier_basis(times, problem.period, problem.harmonics)
         ones = np.ones(len(times))
         for i, scale in enumerate(self._scale):
-            reach, lower, upper = limits.reach[i], *limits.position[i]
-            A = position * scale / reach
-            program.AddLinearConstraint(A, lower / reach * ones, upper / reach * ones, x[i])
+            lower, upper = limits.position[i] / limits.reach[i]
+            A = position * scale / limits.reach[i]
+            program.AddLinearConstraint(A, lower * ones, upper * ones, x[i])
             for basis, largest in zip(rates, (limits.velocity, limits.acceleration), strict=True):
                 A = basis[:, 1:] * scale[1:] / largest[i]
                 program.AddLinearConstraint(A, -ones, ones, x[i, 1:])
@@ -136,7 +138,7 @@ class _Constraint:
     lower: float
     upper: float
 
-    def at(self, problem: ExcitationProblem, times: np.ndarray, scale: np.ndarray):  # noqa: ANN201
+    def at(self, problem: ExcitationProblem, times: np.ndarray, scale: np.ndarray) -> Evaluated:
         """Return the function of the scaled coefficients that a solver evaluates."""
         bases = np.array(fourier_basis(times, problem.period, problem.harmonics))[self.orders]
         sampled = SampledFunction(self.function, len(times))

@@ -139,18 +139,24 @@ class RobotScene:
         Args:
             q: Joint positions [rad or m], shape (K, N).
         """
-        table = self._distances(q)
+        table = self.distances(q)
         if not self.pairs:
             return Clearance(np.full(len(q), np.inf), "")
         worst = int(np.argmin(table.min(axis=0)))
         return Clearance(table.min(axis=1), self.pairs[worst].name)
 
-    def _distances(self, q: np.ndarray) -> np.ndarray:
-        """Return the distances of all pairs [m], shape (K, pairs)."""
+    def distances(self, q: np.ndarray, numbers: np.ndarray | None = None) -> np.ndarray:
+        """Return the distances of pairs [m], shape (K, n).
+
+        Args:
+            q: Joint positions [rad or m], shape (K, N).
+            numbers: Which of the pairs, n of them; all by default.
+        """
         plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
         scene_context = self._scene.GetMyMutableContextFromRoot(self._context)
         port = self._scene.get_query_output_port()
-        pairs = [(pair.first, pair.second) for pair in self.pairs]
+        chosen = self.pairs if numbers is None else [self.pairs[i] for i in numbers]
+        pairs = [(pair.first, pair.second) for pair in chosen]
         table = np.empty((len(q), len(pairs)))
         still = np.zeros(self._dimension)
         for row, positions in zip(table, q, strict=True):
@@ -237,7 +243,7 @@ class RobotScene:
             return
         lower, upper = np.clip(position_limits, -_FULL_TURN, _FULL_TURN).T
         q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, self._dimension))
-        touching = np.all(self._distances(q) < clearance, axis=0)
+        touching = np.all(self.distances(q) < clearance, axis=0)
         self.pairs = [p for p, joined in zip(self.pairs, touching, strict=True) if not joined]
 
 
