@@ -9,7 +9,7 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun, rest_to_rest
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.record import Record
-from identification.measurement.servo import Servo
+from identification.measurement.servo import Servo, friction_torques, rigid_torques
 from identification.measurement.station import Station, build_station
 from identification.model.subject import Subject
 from pfsc_drake.compiled.bound_function import compiled_when_bound
@@ -95,8 +95,8 @@ def run_experiment(
 
     Raises:
         InputError: If friction or noise are not known, the trajectory is of another robot or
-            beyond its limits, its period is no multiple of the sampling time, or the motion
-            cannot be simulated.
+            beyond its limits or those of the drives, its period is no multiple of the sampling
+            time, or the motion cannot be simulated.
     """
     servo, random = servo or Servo(), np.random.default_rng(seed)
     faults = shipped_imperfections(subject.name) if imperfections is None else imperfections
@@ -105,7 +105,10 @@ def run_experiment(
     coulomb, viscous = faults.friction(*usual, random)
     run = _checked_run(subject, trajectory, periods, servo)
     with compiled_when_bound():
-        tau_ff = servo.known_torque(subject, run.sample(1.0 / servo.period)[1:], usual)
+        _, *motion = run.sample(1.0 / servo.period)
+        rigid, resistance = rigid_torques(subject, *motion), friction_torques(motion[1], *usual)
+        _check_effort(subject, rigid + resistance)
+        tau_ff = servo.fed_forward(rigid, resistance)
         station = build_station(subject, run, faults, servo, (coulomb, viscous), tau_ff, random)
     t, signals = _simulate(station, run, servo, progress)
     # what acts up to a tick and what acts from it on
@@ -162,6 +165,18 @@ def _checked_run(
         periods=periods,
         rate=1.0 / servo.period,
     )
+
+
+def _check_effort(subject: Subject, tau: np.ndarray) -> None:
+    """Refuse a motion whose torques a drive does not have: clipped, they tell nothing."""
+    largest = np.abs(tau).max(axis=0)
+    j = int(np.argmax(largest - subject.effort_limit))
+    if largest[j] > subject.effort_limit[j]:
+        unit = "Nm" if subject.joint_units[j] == "rad" else "N"
+        raise InputError(
+            f"excitation: asks {subject.joint_names[j]} for {largest[j]:.4g} {unit}; must stay "
+            f"within the drive's {subject.effort_limit[j]:.4g} {unit}"
+        )
 
 
 def _simulate(
