@@ -4,16 +4,17 @@ The motor of a visco-elastic joint obeys (2.65b), (2.66) on the joint side::
 
     tau_d = I a_M + K (q_M - q_J) + D (v_M - v_J) + f_c sign(v_M) + f_v v_M + c
 
-with a constant ``c`` for zeros of encoders and torques. The equation is linear in its parameters;
+with a constant ``c`` for zeros of encoders and torques. Friction turns over a little later than the
+velocity; where the motor reverses often, ``f_c sign(v_M) - l d/dt sign(v_M)`` with the lag
+``l / f_c`` stands for it to first order. The equation is linear in its parameters;
 in the weak form of :mod:`~identification.elastic.weak_form` no signal is differentiated. The noise
 of the positions, which would make the torsion look larger and the joint softer than it is, is
 measured and taken out of the normal equations.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from identification.elastic.joint_estimate import JointEstimate, check_estimate
 from identification.elastic.signals import (
     JointSignals,
     check_locked,
@@ -30,73 +31,18 @@ from identification.measurement.record import Record
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
-PARAMETERS = ("stiffness", "damping", "inertia", "coulomb", "viscous", "offset")
 KNOTS = 3e-3  # s, distance in the test function, which passes what is below about 100 Hz
 _MEMORY = 0.1  # s, after which what the equation leaves over no longer correlates
 _SLOW = 0.03  # of the largest velocity, below which friction is anything between both signs
-_UNSURE = 0.2  # of a test function that may lie where it is
+_NOISE = 4.0  # standard deviations of the measured velocity, likewise
+_WIDTHS = (1, 3, 5, 9)  # samples, over which velocities are taken
+_CLEAR = 0.1  # of the largest velocity, that its noise may be
+_UNSURE = 0.1  # of a test function that may lie where it is
+_TURNING = 0.9  # of its full size, that friction has where the motor reverses
+_OFTEN = 0.2  # of the samples at which it does, for a lag of friction to tell
 _LOST = 0.2  # of the torsion's variance that may be noise
 _SINGULAR = 1e-9
-_VAGUE = 0.2  # relative standard deviation of a stiffness that tells nothing
-_SURE = 4.0  # standard deviations
 _FEWEST = 200  # samples
-
-
-@dataclass(frozen=True, eq=False)
-class JointEstimate:
-    """What was found of one joint, on the joint side; units of a slide in brackets.
-
-    Attributes:
-        name: Of the joint.
-        unit: ``rad`` or ``m``.
-        locked: Whether the link was.
-        values: Of ``parameters``, shape (n,).
-        covariance: Of ``values``, shape (n, n).
-        parameters: Which were estimated: ``stiffness`` [Nm/rad (N/m)], ``damping``
-            [Nm s/rad (N s/m)], ``inertia`` of the motor [kg m^2 (kg)], ``coulomb`` [Nm (N)],
-            ``viscous`` [Nm s/rad (N s/m)], ``offset`` [Nm (N)]. For a locked joint ``damping``
-            has lost the viscous friction that was given.
-        residual: RMS of what the equation leaves over of the torque, smoothed [Nm or N].
-        samples: That were used.
-    """
-
-    name: str
-    unit: str
-    locked: bool
-    values: np.ndarray
-    covariance: np.ndarray
-    parameters: tuple[str, ...]
-    residual: float
-    samples: int
-
-    def value(self, parameter: str) -> float:
-        """Return the value of a parameter."""
-        return float(self.values[self.parameters.index(parameter)])
-
-    def deviation(self, parameter: str) -> float:
-        """Return the standard deviation of a parameter."""
-        i = self.parameters.index(parameter)
-        return float(np.sqrt(self.covariance[i, i]))
-
-    @property
-    def stiffness(self) -> float:
-        """``K_s``."""
-        return self.value("stiffness")
-
-    @property
-    def damping(self) -> float:
-        """``K_d``."""
-        return self.value("damping")
-
-    @property
-    def inertia(self) -> float:
-        """Entry of ``D_M``."""
-        return self.value("inertia")
-
-    @property
-    def resonance(self) -> float:
-        """Of the motor against a held link [Hz]."""
-        return float(np.sqrt(self.stiffness / self.inertia) / (2.0 * np.pi))
 
 
 def estimate_joints(
@@ -185,19 +131,22 @@ def estimate_joint(
     inertia = a
     if signals.spin is not None:
         inertia = a + function.derivative(signals.spin, 1)
-    sign = _sign(signals)
+    sign, slow = _friction_side(signals)
     columns = {
         "stiffness": function.derivative(torsion),
         "damping": function.derivative(torsion, 1),
         "inertia": inertia,
         "coulomb": function.derivative(sign),
+        "lag": -function.derivative(sign, 1),
         "viscous": v,
         "offset": np.full(v.size, function.kernels[0].sum()),
     }
+    used = function.derivative(slow.astype(float)) < _UNSURE
     if locked:
         del columns["viscous"]
-    slow = np.pad(np.abs(v) < _SLOW * np.abs(v).max(), function.half, mode="edge")
-    used = function.derivative(slow.astype(float)) < _UNSURE
+    turning = np.abs(columns["coulomb"]) < _TURNING * function.kernels[0].sum()
+    if np.count_nonzero(turning & used) < _OFTEN * np.count_nonzero(used):
+        del columns["lag"]
     Y = np.column_stack(list(columns.values())) * used[:, None]
     tau = function.derivative(signals.tau) * used
     noise = _position_noise(signals, function, tuple(columns), locked) * used.sum()
@@ -222,16 +171,23 @@ def estimate_joint(
         float(np.sqrt(np.sum(left**2) / used.sum())),
         int(used.sum()),
     )
-    _check_sense(where, estimate)
+    check_estimate(where, estimate)
     return estimate
 
 
-def _sign(signals: JointSignals) -> np.ndarray:
-    """Return the sign of the motor's velocity about each sample, shape (K,)."""
-    # as short as can be: what smooths the velocity shifts its reversals
-    short = TestFunction.of_knots(signals.step, signals.step)
-    v, a = (short.derivative(signals.q_motor, order) for order in (1, 2))
-    return np.pad(mean_sign(v, a, signals.step), short.half, mode="edge")
+def _friction_side(signals: JointSignals) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean sign of the motor's velocity about each sample, and where it is not sure."""
+    # as short as the noise allows: what smooths the velocity shifts reversals and hides rests
+    for width in _WIDTHS:
+        v = (signals.q_motor[width:] - signals.q_motor[:-width]) / (width * signals.step)
+        noise = _NOISE * white_noise(signals.q_motor) * np.sqrt(2.0) / (width * signals.step)
+        fast = float(np.quantile(np.abs(v), 0.99))
+        if noise < _CLEAR * fast:
+            break
+    v = np.pad(v, width // 2, mode="edge")
+    slow = np.abs(v) < max(_SLOW * fast, noise)
+    before, after = np.append(True, slow), np.append(slow, True)
+    return mean_sign(v), before & after
 
 
 def _position_noise(
@@ -253,14 +209,14 @@ def _check_torsion(where: str, unit: str, Y: np.ndarray, noise: np.ndarray) -> N
     count = np.count_nonzero(Y[:, -1])
     if count < _FEWEST:
         raise InputError(
-            f"{where}: {count} samples at which the motor moves steadily; at least {_FEWEST} are "
-            "required"
+            f"{where}: not excited as an elastic joint: {count} samples at which the motor moves "
+            f"beyond the noise of its position; at least {_FEWEST} are required"
         )
     torsion = Y[Y[:, -1] != 0.0, 0]
     if noise[0, 0] / count > _LOST * np.var(torsion):
         raise InputError(
-            f"{where}: not excited as an elastic joint: torsion of {np.std(torsion):.3g} {unit} RMS "
-            f"is lost in noise of {np.sqrt(noise[0, 0] / count):.3g} {unit} of the positions; "
+            f"{where}: not excited as an elastic joint: torsion of {np.std(torsion):.3g} {unit} "
+            f"RMS is lost in noise of {np.sqrt(noise[0, 0] / count):.3g} {unit} of the positions; "
             "torques that twist the joint are required"
         )
 
@@ -280,24 +236,3 @@ def _solve(
             "frequencies and reversals is required"
         )
     return np.linalg.solve(normal, Y.T @ tau), normal
-
-
-def _check_sense(where: str, estimate: JointEstimate) -> None:
-    for name, unit in (("stiffness", f"N{'m' * (estimate.unit == 'rad')}/{estimate.unit}"),):
-        value, deviation = estimate.value(name), estimate.deviation(name)
-        if not deviation < _VAGUE * abs(value):
-            raise InputError(
-                f"{where}: not excited as an elastic joint: stiffness {value:.3g} {unit} with a "
-                f"standard deviation of {deviation:.3g}; must be below {_VAGUE:g} of it, "
-                "torques that twist the joint more are required"
-            )
-    for name in ("stiffness", "inertia", "viscous", "damping"):
-        if name not in estimate.parameters:
-            continue
-        value, deviation = estimate.value(name), estimate.deviation(name)
-        if value < -_SURE * deviation:
-            hint = "sign of the torque?" if name == "stiffness" else "signals at other instants?"
-            raise InputError(
-                f"{where}: {name} = {value:.4g} (standard deviation {deviation:.2g}); must not be "
-                f"negative ({hint})"
-            )

@@ -12,7 +12,10 @@ from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.rotor_coupling import rotor_momentum
 
-_SAME = 0.05  # by which the motor's travel may differ from the link's
+_SAME = 0.02  # by which the motor's travel may differ from the link's, beside
+_TWIST = 0.02  # rad or m
+_MOST = 0.5
+_STILL = 0.05  # of the motor's travel, by which a locked link may move
 _NOISE = 6.0  # standard deviations within which a joint stands still
 
 
@@ -108,8 +111,10 @@ def check_same_travel(signals: JointSignals) -> None:
             f"{signals.source}: {signals.name}: q is constant; a joint that moves is required, or "
             "that it is locked has to be said"
         )
-    factor = float(link @ signals.q_motor / (link @ link))
-    if abs(factor - 1.0) > _SAME:
+    size = link @ link - link.size * white_noise(signals.q) ** 2
+    factor = float(link @ signals.q_motor / max(size, 0.1 * (link @ link)))
+    # links that are shaken beyond their resonance move otherwise than motors, by a little
+    if abs(factor - 1.0) > min(_SAME + _TWIST / float(np.std(link)), _MOST):
         raise InputError(
             f"{signals.source}: q_motor of {signals.name} moves by {factor:.4g} times q; must be 1 "
             "(on the joint side: divided by the gear ratio; sign, unit)"
@@ -125,7 +130,7 @@ def check_locked(signals: JointSignals) -> None:
     travel = np.ptp(signals.q)
     allowed = 2.0 * _NOISE * white_noise(signals.q)
     windup = float(np.ptp(signals.q_motor))
-    if travel > max(allowed, _SAME * windup):
+    if travel > max(allowed, _STILL * windup):
         raise InputError(
             f"{signals.source}: q of {signals.name} moves by {travel:.3g} {signals.unit} while "
             f"q_motor does by {windup:.3g}; a locked joint must stand still"

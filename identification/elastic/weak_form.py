@@ -5,9 +5,9 @@ length. The derivatives then fall on ``phi``::
 
     phi * tau = I (phi'' * q) + K (phi * q) + ...
 
-which holds exactly, whatever the motion was before and after, and for signals that are not periodic.
-Here ``phi`` is the B-spline of degree 5, sampled; sums stand for integrals, with errors that fall
-with the sixth power of its knots' distance.
+which holds exactly, whatever the motion was before and after, periodic or not. Here ``phi`` is the
+B-spline of degree 5, sampled; sums stand for integrals, with errors that fall with the sixth power
+of its knots' distance.
 """
 
 from dataclasses import dataclass
@@ -75,16 +75,18 @@ def white_noise(signal: np.ndarray) -> float:
     return float(np.sqrt(np.mean(left**2) / comb(2 * _ORDER, _ORDER)))
 
 
-def mean_sign(v: np.ndarray, a: np.ndarray, step: float) -> np.ndarray:
+def mean_sign(v: np.ndarray) -> np.ndarray:
     """Return the mean of a velocity's sign over the sampling time about each sample, shape (K,).
 
+    The velocity changes evenly between ``v_1`` and ``v_2`` in the middles before and after the
+    sample: ``(v_1 + v_2) / (|v_1| + |v_2|)``.
+
     Args:
-        v: Velocity, shape (K,).
-        a: Acceleration, shape (K,).
-        step: Sampling time [s].
+        v: In the middles between K samples, shape (K - 1,).
     """
-    change = np.maximum(0.5 * step * np.abs(a), np.finfo(float).tiny)
-    return np.asarray(np.clip(v / change, -1.0, 1.0))
+    before, after = np.append(v[0], v), np.append(v, v[-1])
+    size = np.maximum(np.abs(before) + np.abs(after), np.finfo(float).tiny)
+    return np.asarray((before + after) / size)
 
 
 def long_run_covariance(scores: np.ndarray, length: int) -> np.ndarray:

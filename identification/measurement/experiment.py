@@ -107,7 +107,7 @@ def run_experiment(
     with compiled_when_bound():
         _, *motion = run.sample(1.0 / servo.period)
         rigid, resistance = rigid_torques(subject, *motion), friction_torques(motion[1], *usual)
-        _check_effort(subject, rigid + resistance)
+        check_effort(subject, rigid + resistance)
         tau_ff = servo.fed_forward(rigid, resistance)
         station = build_station(subject, run, faults, servo, (coulomb, viscous), tau_ff, random)
     t, signals = _simulate(station, run, servo, progress)
@@ -167,8 +167,16 @@ def _checked_run(
     )
 
 
-def _check_effort(subject: Subject, tau: np.ndarray) -> None:
-    """Refuse a motion whose torques a drive does not have: clipped, they tell nothing."""
+def check_effort(subject: Subject, tau: np.ndarray) -> None:
+    """Refuse a motion whose torques a drive does not have: clipped, they tell nothing.
+
+    Args:
+        subject: The robot.
+        tau: Torques that the motion takes [Nm or N], shape (K, N).
+
+    Raises:
+        InputError: If a drive is asked for more than it has.
+    """
     largest = np.abs(tau).max(axis=0)
     j = int(np.argmax(largest - subject.effort_limit))
     if largest[j] > subject.effort_limit[j]:

@@ -6,20 +6,18 @@ import numpy as np
 from pydrake.systems.controllers import PidController
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
-    Adder,
     Demultiplexer,
     MatrixGain,
     Saturation,
-    TrajectorySource,
     ZeroOrderHold,
 )
-from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.robots.plant_wiring import joint_state_of
 from diagrams.signal_log import SignalLog, add_log
 from identification.excitation.run_in import ExcitationRun
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.servo import Servo, drive_inertia
+from identification.measurement.sources import add_samples, add_sum
 from identification.model.subject import Subject
 from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
@@ -73,14 +71,14 @@ def build_station(
     plant = builder.AddNamedSystem("plant", _plant(subject))
     state = plant.GetOutputPort("state")
     measured = _add_encoders(builder, subject, faults, servo, state)
-    reference = _add_samples(builder, "reference", t, np.hstack([q, v, tau_ff]))
+    reference = add_samples(builder, "reference", t, np.hstack([q, v, tau_ff]))
     parts = builder.AddNamedSystem("reference_parts", Demultiplexer([2 * n, n]))
     builder.Connect(reference, parts.get_input_port())
     K_p, K_d = servo.gains(inertia)
     control = builder.AddNamedSystem("servo", PidController(K_p, np.zeros(n), K_d))
     builder.Connect(measured, control.get_input_port_estimated_state())
     builder.Connect(parts.get_output_port(0), control.get_input_port_desired_state())
-    wanted = _add_sum(
+    wanted = add_sum(
         builder, "drive_torque", control.get_output_port_control(), parts.get_output_port(1)
     )
     limits = builder.AddNamedSystem(
@@ -93,8 +91,8 @@ def build_station(
     resistance = _add_friction(builder, faults, friction, inertia, servo, state)
     if faults.disturbance > 0.0:
         torque = faults.coloured_torque(len(t), servo.period, random)
-        ripple = _add_samples(builder, "disturbance", t, torque)
-        resistance = _add_sum(builder, "all_resistances", resistance, ripple)
+        ripple = add_samples(builder, "disturbance", t, torque)
+        resistance = add_sum(builder, "all_resistances", resistance, ripple)
     builder.Connect(resistance, plant.GetInputPort("resistance"))
     position = builder.AddNamedSystem("measured_position", MatrixGain(np.eye(n, 2 * n)))
     builder.Connect(measured, position.get_input_port())
@@ -157,22 +155,3 @@ def _add_friction(
     builder.Connect(state, velocity.get_input_port())
     builder.Connect(velocity.get_output_port(), system.GetInputPort("velocity"))
     return system.GetOutputPort("resistance")
-
-
-def _add_samples(
-    builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray
-) -> OutputPort:
-    """Return values that hold from their instants on."""
-    # the last value of such a trajectory only ends it
-    ends = np.append(t, 2.0 * t[-1] - t[-2])
-    held = PiecewisePolynomial.ZeroOrderHold(ends, np.vstack([values, values[-1]]).T)
-    return builder.AddNamedSystem(name, TrajectorySource(held)).get_output_port()
-
-
-def _add_sum(
-    builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort
-) -> OutputPort:
-    adder = builder.AddNamedSystem(name, Adder(2, first.size()))
-    builder.Connect(first, adder.get_input_port(0))
-    builder.Connect(second, adder.get_input_port(1))
-    return adder.get_output_port()
