@@ -137,6 +137,7 @@ def simulate_excited(
     )
     t, q, v, a = run.sample(RATE)
     rigid, friction = rigid_torques(subject, q, v, a), friction_torques(v, coulomb, viscous)
+    check_effort(subject, rigid + friction)
     tau_ff = servo.fed_forward(rigid, friction)
     mounts = subject.mounts or [RotorMount(0, np.eye(3)[2], np.inf)] * n
     builder = DiagramBuilder()
