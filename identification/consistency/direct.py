@@ -81,7 +81,8 @@ def estimate_consistent(
     Y_b = base.reduce(regressor.matrix(motion.q, motion.v, motion.a))
     weights = 1.0 / np.sqrt(variance)
     rows = (weights[:, None] * Y_b).reshape(-1, base.rank)
-    system = np.linalg.qr(np.column_stack([rows, (weights * tau).ravel()]), mode="r")
+    equations = np.column_stack([rows, (weights * tau).ravel()])
+    system = np.asarray(np.linalg.qr(equations, mode="r"))
     R, c = system[: base.rank, : base.rank], system[: base.rank, -1]
     _require_excited(base, R)
     inverse = np.linalg.inv(R)
