@@ -195,6 +195,7 @@ def test_a_scenario_believes_what_was_identified(name, identified, comau):
     """The plant stays the true robot, with rigid as with elastic joints."""
     file = find_scenario(name)
     scenario = load_file(Scenario, file)
+    scenario.model_error = Scenario().model_error
     true = build_station(scenario, file.parent)
     scenario.controller.model = str(identified.parameters)
     scenario.controller.friction.source = "model"
@@ -215,6 +216,7 @@ def test_a_scenario_believes_what_was_identified(name, identified, comau):
 def test_a_scenario_takes_the_written_robot(identified):
     file = find_scenario("pfc_comau_6r")
     scenario = load_file(Scenario, file)
+    scenario.model_error = Scenario().model_error
     scenario.robot.model = str(identified.parameters.with_name("comau_racer_1_4_elastic.sdf"))
     station = build_station(scenario, file.parent)
     masses = [link.mass for link in load_parameters(identified.parameters).links]
@@ -226,6 +228,7 @@ def test_a_scenario_believes_an_identified_delta_robot(delta, tmp_path):
     written = write_model(delta, parameters, tmp_path)
     file = find_scenario("pfc_delta")
     scenario = load_file(Scenario, file)
+    scenario.model_error = Scenario().model_error
     scenario.controller.model = str(written.parameters)
     station = build_station(scenario, file.parent)
     masses = station.part.belief.robot.parameters.masses
