@@ -26,7 +26,7 @@ class ConsistentEstimate(ConsistentParameters):
     Attributes:
         free_values: Base parameters that fit best without being consistent, shape (n_b,).
         covariance: Of those, from the variance of the torques, shape (n_b, n_b).
-        weighted_squares: Sum of squares of the residuals over their standard deviations.
+        weighted_squares: Sum of squares of the residuals that count over their standard deviations.
         residuals: Measured less predicted torques [Nm or N], shape (K, N).
     """
 
@@ -44,6 +44,7 @@ def estimate_consistent(
     prior: np.ndarray | None = None,
     prior_weight: float = PRIOR_WEIGHT,
     variance: np.ndarray | None = None,
+    used: np.ndarray | None = None,
 ) -> ConsistentEstimate:
     """Return the consistent parameters with the least weighted squares (2.80) of the residuals.
 
@@ -61,6 +62,8 @@ def estimate_consistent(
         prior_weight: Weight of the distance from the prior beside the weighted squares.
         variance: Of the torques [Nm^2 or N^2], shape (N,); by default from the spread over the
             periods of the motion.
+        used: Which torques count, shape (K, N), such as those of joints that move, since dry
+            friction about standstill has no sign; by default all.
 
     Raises:
         InputError: If shapes do not fit, a variance is not positive, the motion does not excite a
@@ -78,9 +81,12 @@ def estimate_consistent(
     tau = np.asarray(motion.tau, dtype=float)
     if tau.shape != np.shape(motion.q) or not np.all(np.isfinite(tau)):
         raise InputError(f"tau: shape {tau.shape}; must be finite numbers, as many as positions")
+    used = np.ones(tau.shape, dtype=bool) if used is None else np.asarray(used, dtype=bool)
+    if used.shape != tau.shape:
+        raise InputError(f"used: shape {used.shape}; must be {tau.shape}, as the torques")
     Y_b = base.reduce(regressor.matrix(motion.q, motion.v, motion.a))
-    weights = 1.0 / np.sqrt(variance)
-    rows = (weights[:, None] * Y_b).reshape(-1, base.rank)
+    weights = used / np.sqrt(variance)
+    rows = (weights[:, :, None] * Y_b).reshape(-1, base.rank)
     equations = np.column_stack([rows, (weights * tau).ravel()])
     system = np.asarray(np.linalg.qr(equations, mode="r"))
     R, c = system[: base.rank, : base.rank], system[: base.rank, -1]
