@@ -66,22 +66,14 @@ class Servo:
         """
         return inertia * self.bandwidth**2, 2.0 * self.damping * inertia * self.bandwidth
 
-    def known_torque(
-        self,
-        subject: Subject,
-        motion: tuple[np.ndarray, np.ndarray, np.ndarray],
-        friction: tuple[np.ndarray, np.ndarray],
-    ) -> np.ndarray:
-        """Return ``tau_ff`` along a motion, shape (K, N) [Nm or N].
+    def fed_forward(self, rigid: np.ndarray, resistance: np.ndarray) -> np.ndarray:
+        """Return ``tau_ff``, shape (K, N) [Nm or N].
 
         Args:
-            subject: The robot.
-            motion: Positions, velocities and accelerations, each (K, N).
-            friction: ``f_c`` and ``f_v`` as they usually are, each (N,).
+            rigid: What the robot's motion takes without friction, see :func:`rigid_torques`.
+            resistance: What friction takes beside, see :func:`friction_torques`.
         """
-        v = motion[1]
-        resistance = friction[0] * np.sign(v) + friction[1] * v
-        return self.feedforward * rigid_torques(subject, *motion) + self.friction * resistance
+        return self.feedforward * rigid + self.friction * resistance
 
 
 def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
@@ -102,6 +94,17 @@ def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
     postures = q[:: max(1, len(q) // _POSTURES)]
     compliance = [np.diag(np.linalg.inv(np.array(function(posture)))) for posture in postures]
     return 1.0 / np.max(compliance, axis=0)
+
+
+def friction_torques(v: np.ndarray, coulomb: np.ndarray, viscous: np.ndarray) -> np.ndarray:
+    """Return the torques ``f_c sign(v) + f_v v`` against friction, shape (K, N) [Nm or N].
+
+    Args:
+        v: Velocities, shape (K, N).
+        coulomb: ``f_c`` [Nm or N], shape (N,).
+        viscous: ``f_v`` [Nm s/rad or N s/m], shape (N,).
+    """
+    return coulomb * np.sign(v) + viscous * v
 
 
 def rigid_torques(subject: Subject, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
