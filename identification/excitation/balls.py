@@ -1,6 +1,6 @@
 """A robot's shapes covered by balls, whose distances are smooth functions of joint positions."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -54,6 +54,17 @@ class RobotBalls:
             q: Joint positions, shape (K, N).
         """
         return np.array(self._all(q.T)).T.reshape(len(q), -1, 3)
+
+    def only_last(self, number: int) -> "RobotBalls":
+        """Return the last few of the balls."""
+        last = slice(-number, None)
+        return replace(
+            self,
+            links=self.links[last],
+            shapes=self.shapes[last],
+            centers=self.centers[last],
+            radii=self.radii[last],
+        )
 
     @cached_property
     def _all(self) -> ca.Function:

@@ -29,6 +29,8 @@ _NEAR = 0.06
 _ABOUT = 0.01  # m, of gaps that are about the least
 _TINY = 1e-9  # m, keeps roots differentiable
 _FULL_TURN = np.pi
+# what has to be above the cell's ``tool_above``: the last two balls of a robot
+TIPS = ("height of the last joint", "height of the tool point")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +80,8 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
     elements: list[tuple[str, ca.SX]] = []
     if np.isfinite(cell.tool_above):
         # what is on the line between both, such as a flange, is above, too
-        for name, tip in zip(("last joint", "tool point"), tips, strict=True):
-            elements.append((f"height of the {name}", at[tip][2] - cell.tool_above))
+        for name, tip in zip(TIPS, tips, strict=True):
+            elements.append((name, at[tip][2] - cell.tool_above))
     for obstacle, numbers in near:
         distances = [_distance(obstacle, at[n]) - balls.radii[n] for n in numbers]
         elements.append((f"clearance of {obstacle.name}", soft_min(distances) - cell.clearance))
@@ -168,9 +170,9 @@ def _near_obstacle(
     gaps = flat.reshape(-1, count) - balls.radii
     bodies = np.array([scene.shapes[k].body if k >= 0 else "" for k in balls.shapes])
     gaps[:, (balls.links == WORLD) | np.isin(bodies, obstacle.beside)] = np.inf
-    numbers = np.flatnonzero(_nearest(gaps, clearance))
+    numbers = np.flatnonzero(_nearest(gaps, clearance)).tolist()
     per_link = [[n for n in numbers if balls.links[n] == i] for i in range(balls.chain.dimension)]
-    return [int(n) for own in per_link for n in without_inner(balls, own)]
+    return [n for own in per_link for n in without_inner(balls, own)]
 
 
 def _near_each_other(

@@ -269,8 +269,8 @@ def check_harmonics(harmonics: Sequence[int]) -> None:
     fit = all(k == int(k) and 1 <= k <= _MOST_HARMONICS for k in harmonics)
     if not len(harmonics) or not fit or len(set(harmonics)) != len(harmonics):
         raise InputError(
-            f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different integers "
-            f"from 1 to {_MOST_HARMONICS}"
+            f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different "
+            f"integers from 1 to {_MOST_HARMONICS}"
         )
 
 
