@@ -5,6 +5,9 @@ motion, its width included, and judged on another one: the decrease of the squar
 summed over sections of the motion, must be larger than chance explains, whatever the number of
 candidates, and be worth a parameter. The best one stays. In the end each term goes that is no
 longer worth it, now that others are there.
+
+Friction is not the same every day, and what matters here is its form. Before errors are squared,
+the sizes of Coulomb and viscous friction are therefore adapted to the motion that is judged on.
 """
 
 from collections.abc import Callable, Sequence
@@ -172,7 +175,11 @@ class _Search:
         self.threshold = float(
             student.ppf(1.0 - _ERROR / max(len(self._candidates), 1), _SECTIONS - 1)
         )
+        self._own = [self._friction_columns(j) for j in range(training.v.shape[1])]
         self._friction = self._friction_square()
+        self._adaptable = [
+            np.linalg.qr(test.by_joint[:, j, columns])[0] for j, columns in enumerate(self._own)
+        ]
         self._errors = lru_cache(maxsize=_REMEMBERED_ERRORS)(self._errors_of)
 
     def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
@@ -260,19 +267,24 @@ class _Search:
         return solution, float(squares)
 
     def _errors_of(self, model: FrictionModel) -> np.ndarray:
-        """Return the weighted errors in the other motion, shape (K, N)."""
+        """Return the weighted errors in the other motion, with its own f_c, f_v; shape (K, N)."""
         solution, size, data = self._solve(model)[0], len(self._right), self._test
         errors = data.torques - data.by_joint @ solution[:size]
         for factor, term in zip(solution[size:], model.terms, strict=True):
             errors[:, term.joint] -= factor * data.column(term)
+        for j, friction in enumerate(self._adaptable):
+            errors[:, j] -= friction @ (friction.T @ errors[:, j])
         return errors
+
+    def _friction_columns(self, j: int) -> list[int]:
+        names = self._test.base.short_names
+        return [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
 
     def _friction_square(self) -> np.ndarray:
         """Return the weighted mean square of Coulomb and viscous friction, shape (N,)."""
         solution, _ = self._solve(FrictionModel())
-        names, data = self._test.base.short_names, self._test
         squares = []
-        for j in range(data.v.shape[1]):
-            own = [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
-            squares.append(np.mean((data.by_joint[:, j, own] @ solution[own]) ** 2))
+        for j, columns in enumerate(self._own):
+            friction = self._test.by_joint[:, j, columns] @ solution[columns]
+            squares.append(np.mean(friction**2))
         return np.array(squares)
