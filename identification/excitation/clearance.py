@@ -29,7 +29,7 @@ from pfsc_drake.robot.delta.kinematics import rod_motion
 
 _SOFT = 0.004  # m, scale of the soft minimum
 _ROUND = 0.02  # m, by which edges of obstacles are rounded off
-_POSTURES = 2000
+_POSTURES = 800
 # balls that never come nearer in random postures are left to the check at the end [m]
 _NEAR = 0.06
 _ABOUT = 0.01  # m, of gaps that are about the least
