@@ -49,17 +49,9 @@ def check_prior(names: Sequence[str], prior: np.ndarray) -> np.ndarray:
     for i, rows in enumerate(layout.links):
         if not np.all(np.isfinite(prior[rows])):
             raise InputError(f"prior: {layout.link_name(i)} has a parameter that is not finite")
-        mass = prior[rows[0]]
-        # in units of the link's mass and its size
-        size = np.sqrt(max(np.trace(pseudo_inertia(prior[rows])[:3, :3]) / mass, 0.0))
-        units = np.array([size] * 3 + [1.0]) * np.sqrt(max(mass, 0.0))
-        P = pseudo_inertia(prior[rows])
-        extended = np.all(units > 0.0) and (
-            np.linalg.eigvalsh(P / np.outer(units, units))[0] > _FLATTEST
-        )
-        if not extended:
+        if not _is_extended(prior[rows]):
             raise InputError(
-                f"prior: {layout.link_name(i)} of {mass:g} kg has no positive definite "
+                f"prior: {layout.link_name(i)} of {prior[rows[0]]:g} kg has no positive definite "
                 "pseudo-inertia; allowed: bodies that extend in all directions"
             )
     for row in layout.rotors:
@@ -76,3 +68,12 @@ def _middle(link: LinkBounds) -> np.ndarray:
     P[:3, 3] = P[3, :3] = center
     P[3, 3] = 1.0
     return from_pseudo_inertia(mass * P)
+
+
+def _is_extended(parameters: np.ndarray) -> bool:
+    P = pseudo_inertia(parameters)
+    if not np.all(np.diag(P) > 0.0):
+        return False
+    size = np.sqrt(np.trace(P[:3, :3]) / P[3, 3])
+    units = np.sqrt(P[3, 3]) * np.array([size, size, size, 1.0])
+    return bool(np.linalg.eigvalsh(P / np.outer(units, units))[0] > _FLATTEST)
