@@ -95,8 +95,8 @@ def test_a_gap_is_not_averaged_over(record):
 def test_derivatives_of_noisy_positions(robot):
     """Of a Fourier excitation, with the errors that noise leaves below the bandwidth.
 
-    White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each of the harmonics of an average over
-    P periods of K samples; a derivative multiplies it by ``w^2``.
+    White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each of the harmonics of an average
+    over P periods of K samples; a derivative multiplies it by ``w^2``.
     """
     rng = np.random.default_rng(5)
     motion = FourierTrajectory([0.2, 1.0], *rng.uniform(0.2, 1.0, (2, 2, 3)), 10.0, (1, 3, 5))
