@@ -124,6 +124,18 @@ class Repetitions:
         """Of one run, shape (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def covariance_of_mean(self) -> np.ndarray:
+        """Of ``mean``, shape (n_b, n_b).
+
+        The predicted one, larger where runs differ by more than it predicts, as friction does
+        that is another one each day.
+        """
+        predicted = self.covariance / len(self.estimates)
+        ratio = self.standard_deviation / self.predicted_standard_deviation
+        wider = np.maximum(1.0, np.nan_to_num(ratio, nan=1.0))
+        return predicted * np.outer(wider, wider)
+
     def parameter_rows(self, truth: np.ndarray | None = None) -> list[ParameterRow]:
         """Return the rows of Tab. C.3.
 
