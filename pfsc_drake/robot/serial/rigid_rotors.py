@@ -1,7 +1,8 @@
 """A serial robot with stiff joints and spinning rotors, (2.36) and (2.62).
 
-With the joints stiff the rotors turn with the links, ``q_M = q_J``. What is left of the full model's
-kinetic energy is, with ``D_E``, ``D_M`` and ``U`` of :mod:`~pfsc_drake.robot.serial.rotor_coupling`::
+With the joints stiff the rotors turn with the links, ``q_M = q_J``. What is left of the full
+model's kinetic energy is, with ``D_E``, ``D_M`` and ``U`` of
+:mod:`~pfsc_drake.robot.serial.rotor_coupling`::
 
     T = v' (D_E(q) + D_M + U(q) + U'(q)) v / 2
 """

@@ -1,0 +1,290 @@
+"""Which friction the data ask for, by prediction of a motion that was not used to estimate.
+
+Terms are added to Coulomb and viscous friction one after the other. A candidate is estimated on one
+motion, its width included, and judged on another one: the decrease of the squared weighted errors,
+summed over sections of the motion, must be larger than chance explains, whatever the number of
+candidates, and be worth a parameter. The best one stays. In the end each term goes that is no
+longer worth it, now that others are there.
+
+Friction is not the same every day, and what matters here is its form. Before errors are squared,
+the sizes of Coulomb and viscous friction are therefore adapted to the motion that is judged on.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize_scalar
+from scipy.stats import t as student
+
+from identification.estimation.friction import (
+    KINDS,
+    KINDS_WITH_WIDTH,
+    FrictionModel,
+    FrictionTerm,
+)
+from identification.estimation.information import (
+    SLOW,
+    Information,
+    MeasuredMotion,
+    information,
+)
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
+
+# sections of the motion that terms are judged on; errors that go together are shorter than one
+_SECTIONS = 40
+# probability to choose any term where none is
+_ERROR = 0.01
+# least part of the mean square of a joint's friction torque by which a term must lower the error's
+_WORTH = 1e-4
+# widths that are tried first, of a joint's largest velocity
+_WIDTHS = np.geomspace(0.02, 0.8, 8)
+_WIDTH_TOLERANCE = 1e-3  # of the logarithm
+# least part of a column outside the span of the others, squared
+_INDEPENDENT = 1e-7
+_REMEMBERED, _REMEMBERED_ERRORS = 128, 8  # terms with their products, models with theirs
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a term does to the prediction of a motion that was not used.
+
+    Attributes:
+        term: Which, with the best width.
+        improvement: Decrease of the sum of squared weighted errors.
+        share: Mean of that for a torque, as part of the weighted mean square of the joint's
+            Coulomb and viscous friction.
+        significance: Mean improvement of the sections by its standard deviation.
+        chosen: Whether the term is in the model.
+    """
+
+    term: FrictionTerm
+    improvement: float
+    share: float
+    significance: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class FrictionChoice:
+    """The friction that data ask for.
+
+    Attributes:
+        model: Terms beside Coulomb and viscous friction; none if these do.
+        judgements: On all candidates, sorted by joints; those that are chosen are judged against
+            the model without them, the others as one more term.
+        threshold: That significances must exceed.
+    """
+
+    model: FrictionModel
+    judgements: tuple[Judgement, ...]
+    threshold: float
+
+
+def choose_friction(
+    regressor: Regressor,
+    base: BaseParameters,
+    motion: MeasuredMotion,
+    other: MeasuredMotion,
+    kinds: Sequence[str] = KINDS,
+    slow: float = SLOW,
+    progress: Progress | None = None,
+) -> FrictionChoice:
+    """Return the friction terms that predict a motion better that was not used.
+
+    Args:
+        regressor: Of the robot, with friction.
+        base: Its base parameters.
+        motion: That parameters are estimated on.
+        other: That they are judged on, another trajectory.
+        kinds: Candidates for each joint.
+        slow: Part of a joint's largest velocity below which its torques do not count.
+        progress: Told the fraction done and what is done.
+
+    Raises:
+        InputError: If the regressor is without friction, a kind is unknown, or a motion does not
+            fit the robot or is not exciting enough.
+    """
+    subject = regressor.subject
+    if not regressor.friction:
+        raise InputError(
+            f"{subject.name}: regressor without friction; one with Coulomb and viscous friction is "
+            "required to choose what else there is"
+        )
+    systems = [information(regressor, base, data, None, slow) for data in (motion, other)]
+    for what, system in zip(("motion", "other motion"), systems, strict=True):
+        if system.still.any():
+            joint = subject.joint_names[int(np.argmax(system.still))]
+            raise InputError(f"{subject.name}: {joint} stands still in the {what}; all must move")
+    joints = range(subject.dimension)
+    candidates = [
+        FrictionTerm(joint, kind, 1.0 if kind in KINDS_WITH_WIDTH else None)
+        for joint in joints
+        for kind in kinds
+    ]
+    search = _Search(_Data(systems[0], motion.v), _Data(systems[1], other.v), candidates)
+    return search.run(progress or (lambda _fraction, _what: None))
+
+
+class _Data:
+    """A weighted linear system with the velocities for further columns."""
+
+    def __init__(self, system: Information, v: np.ndarray) -> None:
+        shape = system.torques.shape
+        self.X, self.b = system.weighted()
+        self.by_joint = self.X.reshape(*shape, -1)
+        self.torques = self.b.reshape(shape)
+        self.weights, self.v = system.weights, np.asarray(v)
+        self.base = system.base
+        self.products = lru_cache(maxsize=_REMEMBERED)(self._products)
+
+    def column(self, term: FrictionTerm) -> np.ndarray:
+        """Return the weighted column of a term in its joint, shape (K,)."""
+        column: np.ndarray = term.column(self.v[:, term.joint]) * self.weights[:, term.joint]
+        return column
+
+    def _products(self, term: FrictionTerm) -> "_Products":
+        column, joint = self.column(term), term.joint
+        return _Products(
+            column, self.by_joint[:, joint].T @ column, float(self.torques[:, joint] @ column)
+        )
+
+
+class _Products(NamedTuple):
+    """A weighted column (K,), and its products with the columns X (n_b,) and the torques."""
+
+    column: np.ndarray
+    columns: np.ndarray
+    torques: float
+
+
+class _Search:
+    """Estimates models with further columns, from products that are computed once."""
+
+    def __init__(self, training: _Data, test: _Data, candidates: Sequence[FrictionTerm]) -> None:
+        self._training, self._test, self._candidates = training, test, list(candidates)
+        self._normal, self._right = training.X.T @ training.X, training.X.T @ training.b
+        self._square = float(training.b @ training.b)
+        self._fastest = np.abs(training.v).max(axis=0)
+        self.threshold = float(
+            student.ppf(1.0 - _ERROR / max(len(self._candidates), 1), _SECTIONS - 1)
+        )
+        self._own = [self._friction_columns(j) for j in range(training.v.shape[1])]
+        self._friction = self._friction_square()
+        self._adaptable = [
+            np.linalg.qr(test.by_joint[:, j, columns])[0] for j, columns in enumerate(self._own)
+        ]
+        self._errors = lru_cache(maxsize=_REMEMBERED_ERRORS)(self._errors_of)
+
+    def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
+        """Return the choice."""
+        model, kept = FrictionModel(), self._candidates
+        while True:
+            progress(len(model.terms) / len(self._candidates), "choosing friction terms")
+            judged = [self._judge_added(model, term) for term in kept if not model.has(term)]
+            better = [judgement for judgement in judged if judgement.chosen]
+            if not better:
+                break
+            best = max(better, key=lambda judgement: judgement.improvement)
+            model = self._with_best_widths(model.with_term(best.term))
+            dropped = self._first_needless(model)
+            if dropped is not None:
+                # once only, so that the search ends
+                model = self._with_best_widths(model.without(dropped))
+                kept = [term for term in kept if term.name != dropped.name]
+        judged += [self._judge_present(model, term) for term in model.terms]
+        judged.sort(key=lambda judgement: judgement.term.joint)
+        return FrictionChoice(model, tuple(judged), self.threshold)
+
+    def _judge_added(self, model: FrictionModel, term: FrictionTerm) -> Judgement:
+        term = self._with_best_width(model, term)
+        return self._judge(model, model.with_term(term), term)
+
+    def _judge_present(self, model: FrictionModel, term: FrictionTerm) -> Judgement:
+        return self._judge(self._with_best_widths(model.without(term)), model, term)
+
+    def _first_needless(self, model: FrictionModel) -> FrictionTerm | None:
+        """Return the first term but the last one that the model does as well without."""
+        judged = (self._judge_present(model, term) for term in model.terms[:-1])
+        return next((judgement.term for judgement in judged if not judgement.chosen), None)
+
+    def _judge(self, less: FrictionModel, more: FrictionModel, term: FrictionTerm) -> Judgement:
+        gain = np.sum(self._errors(less) ** 2 - self._errors(more) ** 2, axis=1)
+        sections = np.array([part.sum() for part in np.array_split(gain, _SECTIONS)])
+        spread = sections.std(ddof=1) / np.sqrt(_SECTIONS)
+        significance = float(sections.mean() / spread) if spread > 0.0 else 0.0
+        share = float(gain.mean() / self._friction[term.joint])
+        chosen = significance > self.threshold and share > _WORTH
+        return Judgement(term, float(gain.sum()), share, significance, chosen)
+
+    def _with_best_widths(self, model: FrictionModel) -> FrictionModel:
+        for term in model.terms:
+            if term.has_width:
+                model = model.replaced(self._with_best_width(model.without(term), term))
+        return model
+
+    def _with_best_width(self, model: FrictionModel, term: FrictionTerm) -> FrictionTerm:
+        """Return the term with the width that explains most of the motion estimated on."""
+        if not term.has_width:
+            return term
+        largest = self._fastest[term.joint]
+
+        def squares(log_width: float) -> float:
+            width = float(np.exp(log_width)) * largest
+            return self._solve(model.with_term(replace(term, width=width)))[1]
+
+        grid = np.log(_WIDTHS)
+        best = int(np.argmin([squares(width) for width in grid]))
+        bounds = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+        found = minimize_scalar(
+            squares, bounds=bounds, method="bounded", options={"xatol": _WIDTH_TOLERANCE}
+        )
+        return replace(term, width=float(np.exp(found.x) * largest))
+
+    def _solve(self, model: FrictionModel) -> tuple[np.ndarray, float]:
+        """Return parameters and the sum of squared weighted errors of the motion estimated on."""
+        size, terms = len(self._right), model.terms
+        products = [self._training.products(term) for term in terms]
+        normal = np.zeros((size + len(terms), size + len(terms)))
+        normal[:size, :size] = self._normal
+        for i, (term, own) in enumerate(zip(terms, products, strict=True), start=size):
+            normal[i, :size] = normal[:size, i] = own.columns
+            for k, (second, other) in enumerate(zip(terms, products, strict=True), start=size):
+                normal[i, k] = own.column @ other.column if term.joint == second.joint else 0.0
+        right = np.concatenate([self._right, [own.torques for own in products]])
+        scale = np.sqrt(np.diag(normal))
+        scaled = normal / np.outer(scale, scale)
+        # columns that are hardly told apart get small factors
+        scaled[np.diag_indices_from(scaled)] += _INDEPENDENT
+        solution = cho_solve(cho_factor(scaled), right / scale) / scale
+        squares = self._square - 2.0 * right @ solution + solution @ normal @ solution
+        return solution, float(squares)
+
+    def _errors_of(self, model: FrictionModel) -> np.ndarray:
+        """Return the weighted errors in the other motion, with its own f_c, f_v; shape (K, N)."""
+        solution, size, data = self._solve(model)[0], len(self._right), self._test
+        errors = data.torques - data.by_joint @ solution[:size]
+        for factor, term in zip(solution[size:], model.terms, strict=True):
+            errors[:, term.joint] -= factor * data.column(term)
+        for j, friction in enumerate(self._adaptable):
+            errors[:, j] -= friction @ (friction.T @ errors[:, j])
+        return errors
+
+    def _friction_columns(self, j: int) -> list[int]:
+        names = self._test.base.short_names
+        return [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
+
+    def _friction_square(self) -> np.ndarray:
+        """Return the weighted mean square of Coulomb and viscous friction, shape (N,)."""
+        solution, _ = self._solve(FrictionModel())
+        squares = []
+        for j, columns in enumerate(self._own):
+            friction = self._test.by_joint[:, j, columns] @ solution[columns]
+            squares.append(np.mean(friction**2))
+        return np.array(squares)

@@ -1,0 +1,148 @@
+"""The overdetermined linear system (2.75) of a motion and the torques measured on it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from identification.estimation.friction import FrictionModel
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+
+# of a joint's largest velocity: below, whether it sticks or slips is not known
+SLOW = 0.03
+# of a joint's velocity limit (of 1 rad/s or m/s where there is none): below, it stands still
+_STILL = 1e-3
+
+
+class MeasuredMotion(Protocol):
+    """A motion of N joints at K instants, as of Sec. 2.5.2, and its torques.
+
+    :class:`~identification.measurement.periods.AveragedMotion` is one.
+
+    Attributes:
+        q: Positions [rad or m], shape (K, N).
+        v: Velocities, shape (K, N).
+        a: Accelerations, shape (K, N).
+        tau: Torques [Nm or N], shape (K, N).
+        torque_variance: Of one torque as measured, shape (N,).
+        mean_torque_variance: Of ``tau``, shape (N,); smaller if it is a mean.
+    """
+
+    @property
+    def q(self) -> np.ndarray:
+        """See above."""
+
+    @property
+    def v(self) -> np.ndarray:
+        """See above."""
+
+    @property
+    def a(self) -> np.ndarray:
+        """See above."""
+
+    @property
+    def tau(self) -> np.ndarray:
+        """See above."""
+
+    @property
+    def torque_variance(self) -> np.ndarray:
+        """See above."""
+
+    @property
+    def mean_torque_variance(self) -> np.ndarray:
+        """See above."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What a motion tells about n_b parameters; K instants, N joints.
+
+    Attributes:
+        matrix: ``Y_b`` at each instant, shape (K, N, n_b); one below the other these are the
+            information matrix X (2.76).
+        torques: ``tau_d`` at each instant (2.77) [Nm or N], shape (K, N).
+        used: Which torques count, shape (K, N): those of joints that move.
+        variance: Of the torques, the diagonal of Upsilon in (2.80), shape (N,).
+        base: What the columns stand for.
+        still: Whether a joint stands still throughout, shape (N,).
+    """
+
+    matrix: np.ndarray
+    torques: np.ndarray
+    used: np.ndarray
+    variance: np.ndarray
+    base: BaseParameters
+    still: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """What rows are multiplied by, ``Upsilon^(-1/2)``; 0 where not used; shape (K, N)."""
+        return self.used / np.sqrt(self.variance)
+
+    def weighted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return X and b_tau, weighted, shapes (K N, n_b) and (K N,)."""
+        weights = self.weights
+        X = self.matrix * weights[:, :, None]
+        return X.reshape(-1, X.shape[2]), (self.torques * weights).ravel()
+
+
+def information(
+    regressor: Regressor,
+    base: BaseParameters,
+    motion: MeasuredMotion,
+    friction: FrictionModel | None = None,
+    slow: float = SLOW,
+) -> Information:
+    """Return the linear system of a motion.
+
+    Near a reversal a joint may stick, and its friction is anything up to ``f_c``. The torques of a
+    joint therefore do not count as long as it moves slowly. A joint that stands still throughout,
+    but for noise, is taken not to move at all.
+
+    Args:
+        regressor: Of the robot.
+        base: Its base parameters, of the same columns.
+        motion: The motion.
+        friction: Terms beside Coulomb and viscous friction.
+        slow: Part of a joint's largest velocity below which its torques do not count.
+
+    Raises:
+        InputError: If the motion is of another robot, the base parameters are of another
+            regressor, a variance is not positive, or ``slow`` is not in [0, 1).
+    """
+    subject = regressor.subject
+    if list(base.full_names) != list(regressor.names):
+        raise InputError(
+            f"{subject.name}: base parameters of {len(base.full_names)} parameters, the regressor "
+            f"has {regressor.size}; both must be of the same"
+        )
+    if not 0.0 <= slow < 1.0:
+        raise InputError(f"slow = {slow!r}; must be in [0, 1)")
+    n = subject.dimension
+    torques, variance = np.asarray(motion.tau), np.asarray(motion.mean_torque_variance)
+    if torques.shape != np.shape(motion.q) or variance.shape != (n,):
+        raise InputError(
+            f"{subject.name}: tau of shape {torques.shape}, its variance of shape "
+            f"{variance.shape}; must be {np.shape(motion.q)} and ({n},)"
+        )
+    if not np.isfinite(torques).all():
+        raise InputError(f"{subject.name}: tau has values that are not finite")
+    if not np.all((variance > 0.0) & np.isfinite(variance)):
+        j = int(np.argmin((variance > 0.0) & np.isfinite(variance)))
+        raise InputError(
+            f"{subject.name}: variance of the torque of {subject.joint_names[j]} = "
+            f"{variance[j]:g}; must be positive and finite, as of measured torques"
+        )
+    limit = np.where(np.isfinite(subject.velocity_limit), subject.velocity_limit, 1.0)
+    fastest = np.abs(motion.v).max(axis=0)
+    still = fastest <= _STILL * limit
+    v, a = np.where(still, 0.0, motion.v), np.where(still, 0.0, motion.a)
+    matrix = base.reduce(regressor.matrix(motion.q, v, a))
+    if friction is not None and friction.terms:
+        friction.check_size(n)
+        matrix = np.concatenate([matrix, friction.columns(v)], axis=2)
+        base = friction.extended(base, subject.joint_units)
+    used = (np.abs(v) >= slow * fastest) & ~still
+    return Information(matrix, torques, used, variance, base, still)

@@ -1,0 +1,196 @@
+"""Weighted least squares for the base parameters (2.80), and how well they are known."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identification.estimation.friction import FrictionModel
+from identification.estimation.identifiability import (
+    Factors,
+    WeakParameter,
+    factorize,
+    weak_parameters,
+)
+from identification.estimation.information import (
+    SLOW,
+    Information,
+    MeasuredMotion,
+    information,
+)
+from identification.estimation.noise import coloured_covariance, mean_torque_spectrum
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Base parameters of a robot from one experiment; K instants, N joints, n_b parameters.
+
+    Attributes:
+        robot: Its name.
+        joint_names: N names.
+        joint_units: ``rad`` or ``m`` of each joint.
+        base: What the parameters are combinations of; those of ``friction`` are the last ones.
+        friction: Terms beside Coulomb and viscous friction.
+        base_parameters: ``rho_b`` of (2.80), shape (n_b,), SI units.
+        covariance: Of ``base_parameters``, shape (n_b, n_b).
+        coloured: In which joints the noise that the covariance stands for has the spectrum that
+            was measured, shape (N,). In the others it is white; in all of them,
+            ``(X' Upsilon^-1 X)^-1`` is the covariance.
+        motion: What it is from.
+        system: The linear system that was solved.
+        factors: Singular values of that.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
+    base: BaseParameters
+    friction: FrictionModel
+    base_parameters: np.ndarray
+    covariance: np.ndarray
+    coloured: np.ndarray
+    motion: MeasuredMotion
+    system: Information
+    factors: Factors
+
+    @property
+    def names(self) -> list[str]:
+        """What each parameter is a combination of."""
+        return self.base.names
+
+    @property
+    def short_names(self) -> list[str]:
+        """The names of the parameters that lead the combinations."""
+        return self.base.short_names
+
+    @property
+    def units(self) -> list[str]:
+        """Of the parameters."""
+        return self.base.units
+
+    @property
+    def robot_base(self) -> BaseParameters:
+        """Those of the robot without ``friction``: the first ones, with their covariance."""
+        rank, full = (size - len(self.friction.terms) for size in self.base.projection.shape)
+        return BaseParameters(
+            self.base.indices[:rank],
+            self.base.projection[:rank, :full],
+            self.base.full_names[:full],
+            self.base.full_units[:full],
+        )
+
+    @property
+    def standard_deviation(self) -> np.ndarray:
+        """Of the parameters, shape (n_b,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def relative_standard_deviation(self) -> np.ndarray:
+        """In units of the magnitudes, shape (n_b,)."""
+        return self.standard_deviation / np.abs(self.base_parameters)
+
+    @property
+    def regressor_matrix(self) -> np.ndarray:
+        """``Y_b`` at each instant (2.76), shape (K, N, n_b)."""
+        return self.system.matrix
+
+    @cached_property
+    def prediction(self) -> np.ndarray:
+        """Torques of the model on the motion [Nm or N], shape (K, N)."""
+        return self.system.matrix @ self.base_parameters
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Measured less predicted torques [Nm or N], shape (K, N)."""
+        return self.system.torques - self.prediction
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Torques that count less parameters."""
+        return int(np.count_nonzero(self.system.used)) - self.base.rank
+
+    @property
+    def variance_factor(self) -> float:
+        """Mean square of the weighted residuals; 1 if noise is all that they are."""
+        squares = np.sum((self.residuals * self.system.weights) ** 2)
+        return float(squares / self.degrees_of_freedom)
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the weighted information matrix with columns of length 1."""
+        return self.factors.condition
+
+    def weak_parameters(self) -> list[WeakParameter]:
+        """Return the parameters that are badly identifiable, and why, the worst first."""
+        return weak_parameters(
+            self.system.matrix,
+            self.system.weights,
+            np.sqrt(self.motion.torque_variance),
+            self.base_parameters,
+            self.covariance,
+            self.short_names,
+            self.joint_names,
+        )
+
+    def weak_directions(self, count: int = 3) -> list[str]:
+        """Return combinations that the torques depend on least, in words, the weakest first."""
+        return self.factors.weakest(self.short_names, count)
+
+
+def estimate(
+    regressor: Regressor,
+    base: BaseParameters,
+    motion: MeasuredMotion,
+    friction: FrictionModel | None = None,
+    slow: float = SLOW,
+    white: bool = False,
+) -> Estimate:
+    """Estimate base parameters by weighted least squares (2.80).
+
+    The torques of each joint are weighted with their variance. The covariance of white noise is
+    ``(X' Upsilon^-1 X)^-1``; where the periods of a motion show that noise has a colour, that of
+    the same estimate under noise of the spectrum that was measured is larger.
+
+    Args:
+        regressor: Of the robot.
+        base: Its base parameters.
+        motion: Positions, velocities, accelerations and torques.
+        friction: Terms beside Coulomb and viscous friction.
+        slow: Part of a joint's largest velocity below which its torques do not count, since the
+            joint may stick.
+        white: Whether to take all noise for white even if the periods show that it is not.
+
+    Raises:
+        InputError: If the motion does not fit the robot, or does not excite all parameters (says
+            which cannot be told apart).
+    """
+    system = information(regressor, base, motion, friction, slow)
+    subject = regressor.subject
+    factors = factorize(*system.weighted(), system.base.short_names, _source(system, regressor))
+    covariance = factors.inverse()
+    spectrum = None if white else mean_torque_spectrum(motion)
+    coloured = np.zeros(subject.dimension, dtype=bool)
+    if spectrum is not None and spectrum.coloured.any():
+        coloured = spectrum.coloured
+        covariance = coloured_covariance(covariance, system, spectrum)
+    return Estimate(
+        subject.name,
+        tuple(subject.joint_names),
+        tuple(subject.joint_units),
+        system.base,
+        friction or FrictionModel(),
+        factors.solution(),
+        covariance,
+        coloured,
+        motion,
+        system,
+        factors,
+    )
+
+
+def _source(system: Information, regressor: Regressor) -> str:
+    names = regressor.subject.joint_names
+    still = [name for name, stands in zip(names, system.still, strict=True) if stands]
+    return regressor.subject.name + (f", {', '.join(still)} standing still" if still else "")

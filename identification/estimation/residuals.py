@@ -1,0 +1,162 @@
+"""What is left of measured torques: noise, or something that the model lacks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+from scipy.stats import f as fisher
+
+from identification.estimation.noise import mean_torque_spectrum
+from identification.measurement.periods import AveragedMotion
+from pfsc_drake.errors import InputError
+
+# delays that residuals are compared with themselves at, in samples
+LAGS = 20
+# bandwidths of the motion that residuals are looked at in: friction has more harmonics than it
+_BANDWIDTHS = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Whiteness:
+    """Test of Ljung and Box whether the residuals of N joints are white.
+
+    Attributes:
+        joint_names: N names.
+        autocorrelation: At delays of 1, 2, .. samples, shape (L, N).
+        bound: 95 % of the autocorrelations of white residuals are within +- this, shape (N,).
+        statistic: ``sum_h (n + 2) n / (n - h) r_h^2``, shape (N,); chi-squared with L degrees of
+            freedom for white residuals.
+        p_value: Probability of a larger one, shape (N,).
+    """
+
+    joint_names: tuple[str, ...]
+    autocorrelation: np.ndarray
+    bound: np.ndarray
+    statistic: np.ndarray
+    p_value: np.ndarray
+
+    def white(self, level: float = 0.01) -> np.ndarray:
+        """Return whether there is no reason to call the residuals coloured, shape (N,).
+
+        Args:
+            level: Probability to call white residuals coloured.
+        """
+        return self.p_value > level
+
+
+def whiteness(
+    residuals: np.ndarray, used: np.ndarray, joint_names: Sequence[str], lags: int = LAGS
+) -> Whiteness:
+    """Test residuals for whiteness.
+
+    Args:
+        residuals: Shape (K, N), samples at an even rate.
+        used: Which count, shape (K, N); pairs of which one does not are left out.
+        joint_names: N names.
+        lags: Largest delay [samples].
+
+    Raises:
+        InputError: If a joint has fewer than 5 times as many residuals as delays.
+    """
+    counts = used.sum(axis=0)
+    if lags < 1 or np.any(counts < 5 * lags):
+        j = int(np.argmin(counts))
+        raise InputError(
+            f"whiteness: {counts[j]} residuals of {joint_names[j]}, delays to {lags}; at least one "
+            "delay and 5 times as many residuals are required"
+        )
+    kept = np.where(used, residuals - np.mean(residuals, axis=0, where=used), 0.0)
+    power = np.sum(kept**2, axis=0) / counts
+    autocorrelation, statistic = np.empty((lags, len(joint_names))), np.zeros(len(joint_names))
+    for h in range(1, lags + 1):
+        pairs = np.sum(used[h:] & used[:-h], axis=0)
+        autocorrelation[h - 1] = np.sum(kept[h:] * kept[:-h], axis=0) / pairs / power
+        # (n + 2) n / (n - h) r^2 with r a sum over all n, without gaps
+        statistic += pairs * (counts + 2) / counts * autocorrelation[h - 1] ** 2
+    return Whiteness(
+        tuple(joint_names),
+        autocorrelation,
+        1.96 / np.sqrt(counts),
+        statistic,
+        chi2.sf(statistic, lags),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Power of the residuals of N joints at low frequencies, by that of the noise there.
+
+    Noise is what differs from period to period, whatever its colour. A model that lacks something
+    leaves more than that: what is the same in all periods. Above the frequencies of the motion
+    that may be the robot's drives, whose torques ring without moving it.
+
+    Attributes:
+        joint_names: N names.
+        highest_hz: Of the frequencies [Hz].
+        ratio: Shape (N,); 1 if there is nothing but noise.
+        p_value: Probability of a larger ratio of noise, shape (N,).
+    """
+
+    joint_names: tuple[str, ...]
+    highest_hz: float
+    ratio: np.ndarray
+    p_value: np.ndarray
+
+    def noise_only(self, level: float = 0.01) -> np.ndarray:
+        """Return whether there is no reason to think that the model lacks something, shape (N,).
+
+        Args:
+            level: Probability to think so of noise.
+        """
+        return self.p_value > level
+
+
+def excess(
+    residuals: np.ndarray,
+    used: np.ndarray,
+    motion: AveragedMotion,
+    highest_hz: float | None = None,
+    parameters: int = 0,
+) -> Excess:
+    """Compare residuals with noise at low frequencies.
+
+    Args:
+        residuals: Of the mean torques, shape (K, N).
+        used: Which count, shape (K, N).
+        motion: Whose residuals they are.
+        highest_hz: By default 5 times the bandwidth of the motion [Hz].
+        parameters: Number that was estimated from the same torques, which takes away as many
+            degrees of freedom; 0 for another motion.
+
+    Raises:
+        InputError: If the frequency is not between that of the period and half the sampling
+            rate, or there are more parameters than frequencies tell.
+    """
+    samples, joints = residuals.shape
+    half = 0.5 * samples / motion.period
+    highest = min(_BANDWIDTHS * motion.bandwidth_hz, half) if highest_hz is None else highest_hz
+    count = int(np.floor(highest * motion.period * (1.0 + 1e-9)))
+    if not 1 <= count <= samples // 2:
+        raise InputError(
+            f"excess: highest frequency {highest:g} Hz; must be from {1.0 / motion.period:g} Hz to "
+            f"{half:g} Hz"
+        )
+    freedom = 2.0 * count - parameters / joints
+    if freedom < 1.0:
+        raise InputError(
+            f"excess: {parameters} parameters, {count} frequencies of {joints} joints to "
+            f"{highest:g} Hz; must be fewer"
+        )
+    spectrum = mean_torque_spectrum(motion)
+    assert spectrum is not None  # averages are of two periods or more
+    band = slice(1, count + 1)
+    power = np.abs(np.fft.rfft(np.where(used, residuals, 0.0), axis=0)) ** 2
+    power *= 1.0 / used.sum(axis=0)
+    ratio = np.sum(2.0 * power[band] / spectrum.power[band], axis=0) / freedom
+    return Excess(
+        tuple(motion.joint_names),
+        float(highest),
+        ratio,
+        fisher.sf(ratio, freedom, 2.0 * count * (motion.periods - 1)),
+    )

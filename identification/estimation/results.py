@@ -1,0 +1,250 @@
+"""``identification.h5``: an estimate with all that somebody needs to check it.
+
+K instants, N joints, n parameters, n_b base parameters; SI units throughout:
+
+==================== ============== ============================================================
+``regressor``        (K, N, n_b)    ``Y_b`` (2.76); times ``projection`` it is Y of all parameters
+``torques``          (K, N)         measured ``tau_d``, mean of the periods (2.77)
+``weights``          (K, N)         what rows were multiplied by, ``Upsilon^(-1/2)``; 0: not used
+``base_parameters``  (n_b,)         the estimate (2.80)
+``covariance``       (n_b, n_b)     of the estimate
+``standard_deviation`` (n_b,)       of the estimate
+``projection``       (n_b, n)       ``K_b``: base parameters of all parameters
+``indices``          (n_b,)         parameters whose columns the regressor has
+``motion/...``                      ``t, q, v, a`` that the regressor is of, shapes (K,), (K, N);
+                                    ``torque_variance``, ``mean_torque_variance`` (N,)
+``repetitions/...``                 ``base_parameters`` (R, n_b), ``covariance`` (R, n_b, n_b)
+==================== ============== ============================================================
+
+Attributes hold names and units: ``names`` (in words), ``short_names`` and ``units`` of
+``base_parameters``, ``names`` and ``units`` of ``projection`` (of all n parameters), ``labels``
+(joints) and ``units`` of signals. Those of ``friction`` tell terms beside Coulomb and viscous
+friction: ``joints`` (from 1), ``kinds``, ``widths`` (NaN without).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.identifiability import factorize
+from identification.estimation.information import Information
+from identification.estimation.least_squares import Estimate
+from identification.estimation.repetitions import Repetitions
+from identification.measurement.units import si_unit
+from identification.model.base import BaseParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.regular_file import read_regular_file
+
+FILE_NAME = "identification.h5"
+_MOTION = {"q": "q", "v": "v", "a": "a", "torque_variance": "tau", "mean_torque_variance": "tau"}
+
+
+@dataclass(frozen=True, eq=False)
+class StoredMotion:
+    """The motion of a file; see :class:`~identification.estimation.information.MeasuredMotion`.
+
+    Attributes:
+        t: Times [s], shape (K,), or None if the estimate's motion had none.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    torque_variance: np.ndarray
+    mean_torque_variance: np.ndarray
+    t: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class StoredIdentification:
+    """Content of ``identification.h5``.
+
+    Attributes:
+        estimate: The estimate.
+        repeated: Base parameters of repetitions, shape (R, n_b); R may be 0.
+        repeated_covariance: Their covariances, shape (R, n_b, n_b).
+    """
+
+    estimate: Estimate
+    repeated: np.ndarray
+    repeated_covariance: np.ndarray
+
+
+def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None = None) -> None:
+    """Write ``identification.h5``.
+
+    Args:
+        path: Of the file, which is replaced.
+        estimate: What it is to hold.
+        runs: Repetitions of the experiment.
+
+    Raises:
+        InputError: If the file cannot be written.
+    """
+    content = BytesIO()  # HDF5 itself does not say that a disk is full
+    with h5py.File(content, "w") as file:
+        _write(file, estimate)
+        if runs is not None:
+            group = file.create_group("repetitions")
+            group["base_parameters"] = runs.values
+            group["covariance"] = np.array([run.covariance for run in runs.estimates])
+    try:
+        Path(path).write_bytes(content.getvalue())
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "no name of a file"
+        raise InputError(f"{path}: cannot be written: {reason}") from None
+
+
+def load_estimate(path: str | Path) -> StoredIdentification:
+    """Read ``identification.h5``.
+
+    Args:
+        path: Of a file that :func:`save_estimate` wrote.
+
+    Raises:
+        InputError: If the file cannot be read or is not such a file.
+    """
+    content = BytesIO(read_regular_file(path, "HDF5"))
+    try:
+        with h5py.File(content, "r") as file:
+            return _read(file)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: no readable {FILE_NAME}: {reason}") from None
+
+
+def _write(file: h5py.File, estimate: Estimate) -> None:
+    system, base, motion = estimate.system, estimate.base, estimate.motion
+    file.attrs["robot"] = estimate.robot
+    joints = {"labels": list(estimate.joint_names)}
+    torque = [si_unit("tau", unit) for unit in estimate.joint_units]
+    squared = [f"({unit})^2" for unit in torque]
+    _add(file, "regressor", system.matrix, labels=joints["labels"], names=estimate.short_names)
+    _add(file, "torques", system.torques, units=torque, **joints)
+    _add(file, "weights", system.weights, units=[f"1/({unit})" for unit in torque], **joints)
+    named = {"names": estimate.names, "short_names": estimate.short_names, "units": estimate.units}
+    _add(file, "base_parameters", estimate.base_parameters, **named)
+    _add(file, "standard_deviation", estimate.standard_deviation, **named)
+    _add(file, "covariance", estimate.covariance, **named)
+    file["covariance"].attrs["coloured_noise"] = estimate.coloured
+    _add(file, "projection", base.projection, names=base.full_names, units=base.full_units)
+    _add(file, "indices", base.indices)
+    group = file.create_group("motion")
+    group.attrs["joint_units"] = list(estimate.joint_units)
+    group.attrs["still"] = system.still
+    for name, signal in _MOTION.items():
+        units = [si_unit(signal, unit) for unit in estimate.joint_units]
+        units = squared if signal == "tau" else units
+        _add(group, name, np.asarray(getattr(motion, name)), units=units, **joints)
+    if getattr(motion, "t", None) is not None:
+        _add(group, "t", np.asarray(motion.t), units=["s"])  # type: ignore[attr-defined]
+    terms = file.create_group("friction").attrs
+    terms["joints"] = [term.joint + 1 for term in estimate.friction.terms]
+    _set_words(terms, "kinds", [term.kind for term in estimate.friction.terms])
+    terms["widths"] = [term.width or np.nan for term in estimate.friction.terms]
+
+
+def _add(group: h5py.Group, name: str, values: np.ndarray, **words: Sequence[str]) -> None:
+    dataset = group.create_dataset(
+        name, data=values, compression="gzip", compression_opts=1, shuffle=True
+    )
+    for key, value in words.items():
+        _set_words(dataset.attrs, key, value)
+
+
+def _set_words(attributes: h5py.AttributeManager, key: str, words: Sequence[str]) -> None:
+    attributes.create(key, list(words), shape=(len(words),), dtype=h5py.string_dtype())
+
+
+def _read(file: h5py.File) -> StoredIdentification:
+    matrix = _numbers(file, "regressor", 3)
+    samples, joints, size = matrix.shape
+    projection = _numbers(file, "projection", 2)
+    base = BaseParameters(
+        _numbers(file, "indices", 1, (size,)).astype(int),
+        projection,
+        _words(file["projection"].attrs["names"], projection.shape[1]),
+        _words(file["projection"].attrs["units"], projection.shape[1]),
+    )
+    if projection.shape[0] != size or not np.all(
+        (base.indices >= 0) & (base.indices < projection.shape[1])
+    ):
+        raise InputError(f"projection of shape {projection.shape}, {size} parameters; must fit")
+    signal, group = (samples, joints), file["motion"]
+    torques, weights = _numbers(file, "torques", 2, signal), _numbers(file, "weights", 2, signal)
+    per_joint = {name: _numbers(group, name, 1, (joints,)) for name in list(_MOTION)[3:]}
+    signals = {name: _numbers(group, name, 2, signal) for name in list(_MOTION)[:3]}
+    t = _numbers(group, "t", 1, (samples,)) if "t" in group else None
+    motion = StoredMotion(**signals, **per_joint, tau=torques, t=t)
+    system = Information(
+        matrix,
+        torques,
+        weights > 0.0,
+        per_joint["mean_torque_variance"],
+        base,
+        np.asarray(group.attrs["still"], dtype=bool),
+    )
+    robot = str(file.attrs["robot"])
+    estimate = Estimate(
+        robot,
+        tuple(_words(file["torques"].attrs["labels"], joints)),
+        tuple(_words(group.attrs["joint_units"], joints)),
+        base,
+        _friction(file["friction"].attrs),
+        _numbers(file, "base_parameters", 1, (size,)),
+        _numbers(file, "covariance", 2, (size, size)),
+        np.asarray(file["covariance"].attrs["coloured_noise"], dtype=bool),
+        motion,
+        system,
+        factorize(*system.weighted(), base.short_names, robot),
+    )
+    repeated = np.empty((0, size)), np.empty((0, size, size))
+    if "repetitions" in file:
+        runs = _numbers(file["repetitions"], "base_parameters", 2)
+        shape = (len(runs), size, size)
+        repeated = runs, _numbers(file["repetitions"], "covariance", 3, shape)
+    return StoredIdentification(estimate, *repeated)
+
+
+def _friction(attributes: h5py.AttributeManager) -> FrictionModel:
+    joints, widths = attributes["joints"], attributes["widths"]
+    kinds = _words(attributes["kinds"], len(joints))
+    return FrictionModel(
+        tuple(
+            FrictionTerm(int(joint) - 1, kind, float(width) if np.isfinite(width) else None)
+            for joint, kind, width in zip(joints, kinds, widths, strict=True)
+        )
+    )
+
+
+def _numbers(
+    group: h5py.Group, name: str, dimensions: int, shape: tuple[int, ...] | None = None
+) -> np.ndarray:
+    values = np.asarray(group[name][()])
+    if (
+        values.dtype.kind not in "fiu"
+        or values.ndim != dimensions
+        or shape not in (None, values.shape)
+    ):
+        raise InputError(
+            f"{name}: {values.dtype} of shape {values.shape}; must be numbers of shape "
+            f"{shape or f'with {dimensions} dimensions'}"
+        )
+    if not np.isfinite(values).all():
+        raise InputError(f"{name}: not finite throughout; must be")
+    return values.astype(float)
+
+
+def _words(values: Sequence[str], count: int) -> list[str]:
+    words = [str(word) for word in values]
+    if len(words) != count:
+        raise InputError(f"{len(words)} names or units; must be {count}")
+    return words

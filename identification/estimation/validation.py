@@ -1,0 +1,203 @@
+"""Whether an estimate is to be believed: prediction of motions, errors where truth is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.estimation.information import SLOW, Information, MeasuredMotion, information
+from identification.estimation.least_squares import Estimate
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Torques of a model beside measured ones; K instants, N joints.
+
+    Attributes:
+        joint_names: N names.
+        units: ``Nm`` or ``N`` of each joint.
+        measured: Mean measured torques, shape (K, N).
+        predicted: Those of the model, shape (K, N).
+        used: Whether a joint moves fast enough for its friction to be known, shape (K, N).
+        torque_variance: Of one measured torque, shape (N,).
+        mean_torque_variance: Of ``measured``, shape (N,).
+        uncertainty: Standard deviation of ``predicted`` from that of the parameters, RMS of each
+            joint, shape (N,).
+    """
+
+    joint_names: tuple[str, ...]
+    units: tuple[str, ...]
+    measured: np.ndarray
+    predicted: np.ndarray
+    used: np.ndarray
+    torque_variance: np.ndarray
+    mean_torque_variance: np.ndarray
+    uncertainty: np.ndarray
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Measured less predicted, shape (K, N)."""
+        return self.measured - self.predicted
+
+    @property
+    def rms(self) -> np.ndarray:
+        """Of ``residuals``, all instants, shape (N,)."""
+        return np.sqrt(np.mean(self.residuals**2, axis=0))
+
+    @property
+    def error_rms(self) -> np.ndarray:
+        """RMS of single measured torques less predicted ones, shape (N,), as in Tab. C.4."""
+        return np.sqrt(self.rms**2 + self.torque_variance - self.mean_torque_variance)
+
+    @property
+    def noise_level(self) -> np.ndarray:
+        """Standard deviation of one measured torque, shape (N,), as in Tab. C.4."""
+        return np.sqrt(self.torque_variance)
+
+    @property
+    def explained(self) -> np.ndarray:
+        """Share of the measured torques' variance that the model explains, shape (N,)."""
+        return 1.0 - np.var(self.residuals, axis=0) / np.var(self.measured, axis=0)
+
+    @property
+    def variance_factor(self) -> np.ndarray:
+        """Mean square of residuals in units of that of noise, where used, shape (N,)."""
+        squares = np.sum(np.where(self.used, self.residuals, 0.0) ** 2, axis=0)
+        return squares / np.maximum(self.used.sum(axis=0), 1) / self.mean_torque_variance
+
+
+def predict(
+    estimate: Estimate,
+    regressor: Regressor,
+    motion: MeasuredMotion,
+    slow: float = SLOW,
+    adapt_friction: bool = False,
+) -> Prediction:
+    """Return what an estimate predicts of another motion.
+
+    Args:
+        estimate: Of the robot.
+        regressor: That the estimate was made with, or one like it.
+        motion: The motion; need not excite all parameters.
+        slow: Part of a joint's largest velocity below which its torques do not count where noise
+            is compared with.
+        adapt_friction: Whether the sizes of Coulomb and viscous friction, which are not the same
+            every day, are fitted to the motion.
+
+    Raises:
+        InputError: If the motion or the regressor do not fit the estimate, or friction is to be
+            adapted and the regressor is without.
+    """
+    system = information(regressor, estimate.robot_base, motion, estimate.friction, slow)
+    predicted = system.matrix @ estimate.base_parameters
+    if adapt_friction:
+        predicted = predicted + _further_friction(system, predicted)
+    deviation = system.matrix @ np.linalg.cholesky(_regular(estimate.covariance))
+    return Prediction(
+        estimate.joint_names,
+        tuple("Nm" if unit == "rad" else "N" for unit in estimate.joint_units),
+        system.torques,
+        predicted,
+        system.used,
+        np.asarray(motion.torque_variance),
+        np.asarray(motion.mean_torque_variance),
+        np.sqrt(np.mean(np.sum(deviation**2, axis=2), axis=0)),
+    )
+
+
+def _further_friction(system: Information, predicted: np.ndarray) -> np.ndarray:
+    """Return the Coulomb and viscous friction that residuals ask for, shape (K, N)."""
+    names, further = system.base.short_names, np.zeros_like(predicted)
+    for j in range(predicted.shape[1]):
+        own = [f"joint_{j + 1}.{name}" for name in ("f_c", "f_v")]
+        if not set(own) <= set(names):
+            raise InputError(
+                "prediction: friction is to be adapted; a regressor with it is required"
+            )
+        columns = system.matrix[:, j, [names.index(name) for name in own]]
+        used = system.used[:, j]
+        residuals = system.torques[used, j] - predicted[used, j]
+        further[:, j] = columns @ np.linalg.lstsq(columns[used], residuals, rcond=None)[0]
+    return further
+
+
+def _regular(covariance: np.ndarray) -> np.ndarray:
+    """Return a covariance that rounding has not made indefinite."""
+    return covariance + np.diag(np.diag(covariance)) * 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class TruthTest:
+    """Errors of an estimate beside the covariance that was predicted for them.
+
+    Attributes:
+        names: Of the n_b parameters.
+        errors: Estimate less truth, SI units, shape (n_b,).
+        standard_errors: In units of their standard deviations, shape (n_b,).
+        chi_squared: ``e' C^-1 e``.
+        degrees_of_freedom: n_b.
+        p_value: Probability of a chi-squared at least as far from the middle, on either side.
+    """
+
+    names: list[str]
+    errors: np.ndarray
+    standard_errors: np.ndarray
+    chi_squared: float
+    degrees_of_freedom: int
+    p_value: float
+
+    def consistent(self, level: float = 0.01) -> bool:
+        """Return whether the errors are as large as predicted.
+
+        Args:
+            level: Probability to deny it though they are.
+        """
+        return self.p_value > level
+
+
+def compare_with_truth(estimate: Estimate, truth: np.ndarray) -> TruthTest:
+    """Compare an estimate with the true parameters.
+
+    Args:
+        estimate: With covariance.
+        truth: True base parameters, ``estimate.base.values(parameters)``, shape (n_b,).
+
+    Raises:
+        InputError: If the truth has another size or is not known.
+    """
+    errors = estimate.base_parameters - checked_truth(estimate, truth)
+    value = mahalanobis(errors, estimate.covariance)
+    size = len(errors)
+    below = float(chi2.cdf(value, size))
+    return TruthTest(
+        estimate.short_names,
+        errors,
+        errors / estimate.standard_deviation,
+        value,
+        size,
+        2.0 * min(below, float(chi2.sf(value, size))),
+    )
+
+
+def mahalanobis(errors: np.ndarray, covariance: np.ndarray) -> float:
+    """Return ``e' C^-1 e``, computed with the correlations, whatever the units."""
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    scaled = errors / deviation
+    return float(scaled @ np.linalg.solve(correlation, scaled))
+
+
+def checked_truth(estimate: Estimate, truth: np.ndarray) -> np.ndarray:
+    """Return true base parameters, or refuse those of another robot or unknown ones."""
+    values = np.asarray(truth, dtype=float)
+    if values.shape != estimate.base_parameters.shape:
+        raise InputError(
+            f"{estimate.robot}: truth of shape {values.shape}; must be "
+            f"{estimate.base_parameters.shape}, base parameters as the estimate has them"
+        )
+    if not np.isfinite(values).all():
+        name = estimate.short_names[int(np.argmin(np.isfinite(values)))]
+        raise InputError(f"{estimate.robot}: the true {name} is not known; all must be")
+    return values

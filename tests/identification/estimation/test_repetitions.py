@@ -1,0 +1,71 @@
+"""Tables of seven runs against the runs themselves."""
+
+import numpy as np
+import pytest
+
+from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.least_squares import estimate
+from identification.estimation.repetitions import Repetitions
+from pfsc_drake.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def runs(comau, measure):
+    return Repetitions(
+        tuple(estimate(comau.regressor, comau.base, measure(seed)) for seed in range(7))
+    )
+
+
+def test_table_of_parameters(comau, runs):
+    rows = runs.parameter_rows(comau.truth)
+    assert [row.number for row in rows] == list(range(1, 53))
+    values = np.array([run.base_parameters for run in runs.estimates])
+    for row, column, truth in zip(rows, values.T, comau.truth, strict=True):
+        assert row.mean == pytest.approx(column.mean())
+        spread = np.sqrt(np.sum((column - column.mean()) ** 2) / 6.0)
+        assert row.relative_deviation == pytest.approx(100.0 * spread / abs(column.mean()))
+        assert row.truth == truth
+    f_c = next(row for row in rows if row.name == "joint_1.f_c")
+    assert (f_c.unit, f_c.combination) == ("Nm", "joint_1.f_c")
+    assert np.isnan(runs.parameter_rows()[0].truth)
+
+
+def test_table_of_torques(comau, runs):
+    """Torques that are predicted well: the error is the noise, as printed in Tab. C.4."""
+    rows = runs.torque_rows()
+    for row, noise in zip(rows, comau.noise, strict=True):
+        assert row.noise_level == pytest.approx(noise, rel=0.03)
+        assert row.error_rms == pytest.approx(noise, rel=0.03)
+        assert row.unit == "Nm"
+        assert 0.85 < row.explained < 1.0
+
+
+def test_spread_is_as_predicted(runs):
+    test = runs.spread_test()
+    assert test.degrees_of_freedom == 6 * 52
+    assert 0.001 < test.p_value <= 1.0
+    assert test.median_ratio == pytest.approx(1.0, abs=0.15)
+
+
+def test_friction_that_is_another_in_each_run(comau, measure):
+    """Noise explains the spread of a run, not what changes between them."""
+    rng = np.random.default_rng(0)
+    sign = np.sign(comau.motion[1])
+    estimates = []
+    for seed in range(4):
+        extra = sign * 0.1 * comau.subject.coulomb * rng.normal(size=6)
+        estimates.append(estimate(comau.regressor, comau.base, measure(seed, extra=extra)))
+    assert Repetitions(tuple(estimates)).spread_test().p_value < 1e-6
+
+
+def test_what_does_not_belong_together(comau, measure, runs):
+    with pytest.raises(InputError, match="no estimate"):
+        Repetitions(())
+    terms = FrictionModel((FrictionTerm(0, "offset"),))
+    other = estimate(comau.regressor, comau.base, measure(), terms)
+    with pytest.raises(InputError, match="run 2 is of 53 parameters of comau"):
+        Repetitions((runs.estimates[0], other))
+    single = Repetitions(runs.estimates[:1])
+    assert np.isnan(single.parameter_rows()[0].relative_deviation)
+    with pytest.raises(InputError, match="one run; at least two"):
+        single.spread_test()

@@ -1,0 +1,100 @@
+"""Prediction and comparison with the truth, against numbers made up for them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.least_squares import estimate
+from identification.estimation.validation import compare_with_truth, predict
+from identification.model.base import base_parameters
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def result(comau, measure):
+    return estimate(comau.regressor, comau.base, measure())
+
+
+@pytest.fixture(scope="module")
+def other(other_trajectory):
+    return other_trajectory.motion(other_trajectory.sample_times(100.0))
+
+
+def test_prediction_of_another_motion(comau, result, measure, other):
+    prediction = predict(result, comau.regressor, measure(5, motion=other))
+    exact = comau.regressor.matrix(*other) @ comau.parameters
+    off = np.sqrt(np.mean((prediction.predicted - exact) ** 2, axis=0))
+    assert np.all(off < 3.0 * prediction.uncertainty)
+    assert np.all(off < 0.4 * comau.noise)
+    np.testing.assert_allclose(prediction.error_rms, comau.noise, rtol=0.1)
+    np.testing.assert_allclose(prediction.noise_level, comau.noise, rtol=0.05)
+    np.testing.assert_allclose(prediction.variance_factor, 1.0, atol=0.3)
+    share = 1.0 - prediction.rms**2 / np.var(prediction.measured, axis=0)
+    np.testing.assert_allclose(prediction.explained, share, atol=1e-3)
+    assert prediction.units == ("Nm",) * 6
+
+
+def test_error_of_single_torques(comau, result):
+    """From means and variances, without the single torques themselves."""
+    prediction = predict(result, comau.regressor, result.motion)
+    single = result.motion.tau_periods - prediction.predicted
+    variance = np.mean((result.motion.tau_periods - result.motion.tau) ** 2, axis=(0, 1))
+    np.testing.assert_allclose(
+        result.motion.torque_variance - result.motion.mean_torque_variance, variance
+    )
+    np.testing.assert_allclose(prediction.error_rms, np.sqrt(np.mean(single**2, axis=(0, 1))))
+
+
+def test_prediction_with_friction_terms(comau, measure, other):
+    model = FrictionModel((FrictionTerm(2, "offset"), FrictionTerm(0, "slant")))
+    fitted = estimate(comau.regressor, comau.base, measure(noise=1e-5), model)
+    np.testing.assert_allclose(fitted.base_parameters[-2:], 0.0, atol=1e-3)
+    prediction = predict(fitted, comau.regressor, measure(5, motion=other, noise=1e-5))
+    assert np.all(prediction.explained > 0.999999)
+
+
+def test_friction_of_another_day(comau, result, measure, measure_torques, other):
+    """10 % more in all joints, which a prediction that is adapted does not mind."""
+    extra = 0.1 * comau.subject.coulomb * np.sign(other[1])
+    motion = measure(5, motion=other, extra=extra)
+    plain = predict(result, comau.regressor, motion)
+    adapted = predict(result, comau.regressor, motion, adapt_friction=True)
+    assert plain.variance_factor.max() > 2.0
+    np.testing.assert_allclose(adapted.variance_factor, 1.0, atol=0.2)
+    bare = Regressor(comau.subject, friction=False)
+    stiff = measure_torques(
+        comau.motion, bare.matrix(*comau.motion) @ comau.parameters[:66], comau.noise
+    )
+    without = estimate(bare, base_parameters(bare), stiff)
+    with pytest.raises(InputError, match="friction is to be adapted"):
+        predict(without, bare, stiff, adapt_friction=True)
+
+
+def test_truth(comau, result):
+    test = compare_with_truth(result, comau.truth)
+    error = result.base_parameters - comau.truth
+    information = np.linalg.inv(result.covariance)
+    assert test.chi_squared == pytest.approx(error @ information @ error, rel=1e-6)
+    assert test.consistent()
+    assert test.degrees_of_freedom == 52
+    np.testing.assert_allclose(test.standard_errors, error / result.standard_deviation)
+    wrong = comau.truth.copy()
+    wrong[3] += 8.0 * result.standard_deviation[3]
+    assert not compare_with_truth(result, wrong).consistent()
+    cautious = replace(result, covariance=9.0 * result.covariance)
+    small = compare_with_truth(cautious, comau.truth)
+    assert small.p_value == pytest.approx(2.0 * chi2.cdf(test.chi_squared / 9.0, 52))
+    assert not small.consistent()
+
+
+def test_truth_that_is_none(comau, result):
+    with pytest.raises(InputError, match=r"truth of shape \(51,\)"):
+        compare_with_truth(result, comau.truth[1:])
+    unknown = comau.truth.copy()
+    unknown[-1] = np.nan
+    with pytest.raises(InputError, match=r"the true joint_6\.f_v is not known"):
+        compare_with_truth(result, unknown)
