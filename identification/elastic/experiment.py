@@ -22,7 +22,8 @@ from identification.measurement.servo import (
     friction_torques,
     rigid_torques,
 )
-from identification.measurement.sources import add_lines, add_sines, add_sum
+from identification.measurement.sources import add_curves, add_lines, add_sines, add_sum
+from identification.measurement.station import add_feed_forward
 from identification.model.subject import Subject
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
@@ -136,9 +137,8 @@ def simulate_excited(
         trajectory, subject.velocity_limit, subject.acceleration_limit, periods=periods, rate=RATE
     )
     t, q, v, a = run.sample(RATE)
-    rigid, friction = rigid_torques(subject, q, v, a), friction_torques(v, coulomb, viscous)
-    check_effort(subject, rigid + friction)
-    tau_ff = servo.fed_forward(rigid, friction)
+    rigid = rigid_torques(subject, q, v, a)
+    check_effort(subject, rigid + friction_torques(v, coulomb, viscous))
     mounts = subject.mounts or [RotorMount(0, np.eye(3)[2], np.inf)] * n
     builder = DiagramBuilder()
     with compiled_when_bound():
@@ -149,9 +149,9 @@ def simulate_excited(
     K_p, K_d = servo.gains(drive_inertia(subject, q))
     control = builder.AddNamedSystem("servo", PidController(K_p, np.zeros(n), K_d))
     builder.Connect(motor.get_output_port(), control.get_input_port_estimated_state())
-    reference = add_lines(builder, "reference", t, np.hstack([q, v]))
+    reference = add_curves(builder, "reference", t, np.hstack([q, v]))
     builder.Connect(reference, control.get_input_port_desired_state())
-    known = add_lines(builder, "feed_forward", t, tau_ff)
+    known = add_feed_forward(builder, servo, t, v, rigid, (coulomb, viscous))
     shaking = _add_multisine(
         builder, zippered_multisine(share * subject.effort_limit, trajectory.period, random)
     )

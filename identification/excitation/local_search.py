@@ -20,6 +20,7 @@ _MOST_ROUNDS = 8
 _START_SHARE = 0.7  # of the joint limits that a random motion takes
 _START_OFFSET = 0.4  # of the reach, largest distance of its middle from that of the limits
 _POSTURES = 500
+_FROM_NEAR = 0.4  # part of the way to a random motion
 # what may be missing of limits, relative, before an instant is added
 _ENOUGH = 1e-3
 
@@ -64,15 +65,24 @@ class LocalSearch:
         self._torque = problem.torque.map(len(self._fine))
         self._posture = None if posture is None else posture.function.map(len(self._fine))
 
-    def run(self, seed: int, iterations: int, posture: np.ndarray | None = None) -> LocalOptimum:
+    def run(
+        self,
+        seed: int,
+        iterations: int,
+        posture: np.ndarray | None = None,
+        near: np.ndarray | None = None,
+    ) -> LocalOptimum:
         """Return the optimum next to a random motion.
 
         Args:
             seed: Of the random motion.
             iterations: At most so many of the solver, in all.
             posture: That the random motion is about [rad or m], shape (N,); or random, too.
+            near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
         """
         start = random_motion_about(self.problem, np.random.default_rng(seed), posture)
+        if near is not None:
+            start = near + _FROM_NEAR * (start - near)
         return self.improve(start, seed, iterations)
 
     def improve(self, coefficients: np.ndarray, seed: int, iterations: int) -> LocalOptimum:

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from pfsc_drake.errors import InputError
 
@@ -26,37 +26,50 @@ _SETTINGS = {
 }
 
 
-def run_side_by_side(
-    function: Callable[[Common, Task], Result],
-    common: Common,
-    tasks: Iterable[Task],
-    workers: int | None = None,
-) -> Iterator[Result]:
-    """Yield results in the order in which they are ready.
+class SideBySide(Protocol):
+    """Runs tasks, each in a process of its own."""
+
+    def __call__(
+        self, function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
+    ) -> Iterator[Result]:
+        """Yield results in the order in which they are ready.
+
+        Args:
+            function: Of a module, to be called with ``common`` and each task.
+            common: Sent to every process once.
+            tasks: What to do.
+        """
+
+
+@contextmanager
+def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
+    """Give what runs tasks, until the end of the context.
 
     Args:
-        function: Of a module, to be called with ``common`` and each task.
-        common: Sent to every process once.
-        tasks: Each for one process.
         workers: Number of processes; one for each core by default, 1 for no others than this.
+        most: Number of processes that there is work for.
 
     Raises:
         InputError: If there are to be processes and Dask is not installed, or their number is
             below 1.
     """
-    tasks = list(tasks)
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers}; must be 1 or more")
     if workers == 1:
-        yield from (function(common, task) for task in tasks)
+        yield lambda function, common, tasks: (function(common, task) for task in tasks)
         return
-    with _processes(workers, len(tasks)) as client:
+    with _processes(workers, most) as client:
         from distributed import as_completed
 
-        shared = client.scatter(common, broadcast=True)
-        futures = [client.submit(function, shared, task, pure=False) for task in tasks]
-        for _, result in as_completed(futures, loop=client.loop, with_results=True):
-            yield result
+        def run(
+            function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
+        ) -> Iterator[Result]:
+            shared = client.scatter(common, broadcast=True)
+            futures = [client.submit(function, shared, task, pure=False) for task in tasks]
+            for _, result in as_completed(futures, loop=client.loop, with_results=True):
+                yield result
+
+        yield run
 
 
 @contextmanager

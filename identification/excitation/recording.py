@@ -1,5 +1,6 @@
-"""An excitation in Meshcat: the robot in its cell and the way of its tool point."""
+"""An excitation in Meshcat: the robot in its cell and the way of its end effector."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -11,6 +12,7 @@ from diagrams.drawing.delta_replay import arrange_scene
 from diagrams.drawing.replay import add_source, camera_and_target, record
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.model import read_robot
+from identification.excitation.balls import ends
 from identification.excitation.cell import Cell
 from identification.excitation.fourier import FourierTrajectory, write_text
 from identification.excitation.run_in import ExcitationRun
@@ -102,9 +104,12 @@ def _serial_robot(
 
 
 def _tool_points(subject: Subject, q: np.ndarray) -> np.ndarray:
-    """Return the tool points of many postures [m], shape (K, 3)."""
+    """Return the end effector's places in many postures [m], shape (K, 3)."""
     joints = ca.SX.sym("q", subject.dimension)
     still = [jets.constant(joints[i], 1) for i in range(subject.dimension)]
-    y_t, _ = subject.robot.tool_pose(still)
+    robot = subject.robot
+    if subject.chain is not None:
+        robot = replace(subject.chain, p_LT=list(ends(subject).values())[-1])
+    y_t, _ = robot.tool_pose(still)
     function = ca.Function("tool", [joints], [ca.densify(y_t.coefficients[0])])
     return np.array(function.map(len(q))(q.T)).T

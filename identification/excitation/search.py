@@ -1,4 +1,4 @@
-"""The best excitation of a robot that can be found: local searches from many random motions."""
+"""The best excitation of a robot that can be found: local searches from many motions."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,7 @@ from identification.excitation.problem import (
     excitation_problem,
     tightened,
 )
-from identification.excitation.processes import run_side_by_side
+from identification.excitation.processes import side_by_side
 from identification.excitation.scene import RobotScene
 from identification.excitation.verification import Verification, verify
 from identification.model.base import base_parameters
@@ -38,6 +38,7 @@ _SHARE, _MARGIN = 0.998, 0.002
 _MOST_REPAIRS = 3
 _REPAIR = 1.5  # times what was missing
 _ITERATIONS = 40  # of a repair
+_BEST = 2  # motions that others are tried near to
 _FAR = 0.02  # excess that no repair takes away
 
 
@@ -50,8 +51,8 @@ class SearchResult:
         criterion: ``D`` or ``condition``.
         information: Its figures.
         verification: How much of the limits it takes.
-        values: Figure of each local search, sorted from the best on: ``log det(X^T X)`` or the
-            condition number, of fewer samples than ``information``.
+        values: Figure of each local search from the best on, ``log det(X^T X)`` or the condition
+            number, of fewer samples than ``information``; those outside the limits come last.
         seconds: How long the search took [s].
         warnings: What was not checked, one sentence each.
     """
@@ -99,12 +100,13 @@ def search(
             condition number of X.
         harmonics: Multiples of the fundamental frequency in use.
         period: T_f [s].
-        starts: Number of random motions to start from.
+        starts: Number of motions to start from: half of them random, the others in two rounds near
+            the best ones that have been found.
         seed: Of the first of them.
         limits: Of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
         cell: What stands around a serial robot; None for what is shipped with it.
-        posture: That the random motions are about [rad or m], shape (N,); random ones by default.
+        posture: That random motions are about [rad or m], shape (N,); random ones by default.
         parameters: Believed ones, for the torques, shape (n,); those of the model by default.
         torque_noise: Standard deviations of the measured torques, which weight the rows of the
             regressor, shape (N,) [Nm or N]; all one by default.
@@ -146,13 +148,19 @@ def search(
     check_postures(subject, problem)
     check_excited(subject, problem, base)
     narrower = tightened(problem, _SHARE, {}, _MARGIN)
-    tasks = [_Start(seed + i, iterations, about) for i in range(starts)]
     found: list[LocalOptimum] = []
-    for optimum in run_side_by_side(_search_from, narrower, tasks, workers):
-        found.append(optimum)
-        best = _said(criterion, min(o.value for o in found))
-        tell(len(found) / (starts + 1), f"{len(found)} of {starts} starts, {best}")
-    found.sort(key=lambda optimum: optimum.value)
+    with side_by_side(workers, starts) as run:
+        for count in (starts - 2 * (starts // 4), starts // 4, starts // 4):
+            near: list[np.ndarray | None] = [o.coefficients for o in found[:_BEST]] or [None]
+            tasks = [
+                _Start(seed + len(found) + i, iterations, about, near[i % len(near)])
+                for i in range(count)
+            ]
+            for optimum in run(_search_from, narrower, tasks):
+                found.append(optimum)
+                best = _said(criterion, min(found, key=_rank).value)
+                tell(len(found) / (starts + 1), f"{len(found)} of {starts} starts, {best}")
+            found.sort(key=_rank)
     tell(starts / (starts + 1), "checking all limits")
     trajectory, verification = _first_that_keeps_all(
         found, narrower, lambda motion: verify(regressor, believed, joints, motion, cell, scene)
@@ -176,15 +184,21 @@ class _Start:
         seed: Of the random motion.
         iterations: Of the solver.
         posture: That the motion is about, shape (N,); or None.
+        near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or None.
     """
 
     seed: int
     iterations: int
     posture: np.ndarray | None
+    near: np.ndarray | None
 
 
 def _search_from(problem: ExcitationProblem, start: _Start) -> LocalOptimum:
-    return LocalSearch(problem).run(start.seed, start.iterations, start.posture)
+    return LocalSearch(problem).run(start.seed, start.iterations, start.posture, start.near)
+
+
+def _rank(optimum: LocalOptimum) -> tuple[bool, float, int]:
+    return optimum.excess > _FAR, optimum.value, optimum.seed
 
 
 def _first_that_keeps_all(
@@ -194,7 +208,7 @@ def _first_that_keeps_all(
 ) -> tuple[FourierTrajectory, Verification]:
     """Return the best motion that keeps all limits, if need be after some repairs."""
     complaint = "no local search came to an end"
-    for optimum in sorted(found, key=lambda optimum: (optimum.excess > _FAR, optimum.value)):
+    for optimum in found:
         if not np.isfinite(optimum.value):
             continue
         trajectory, verification = _repaired(optimum, problem, check)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.excitation.balls import cover
+from identification.excitation.balls import ends, points_of_last_link
 from identification.excitation.cell import Cell
-from identification.excitation.clearance import TIPS, delta_posture_limits
+from identification.excitation.clearance import delta_posture_limits, height_of
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits, used_shares
 from identification.excitation.scene import RobotScene
@@ -99,9 +99,10 @@ def verify(
     elif cell is not None and subject.chain is not None:
         scene = scene or RobotScene(subject, cell)
         if np.isfinite(cell.tool_above):
-            tips = cover(subject.chain, scene).only_last(len(TIPS)).sample(motion[0])
-            least = tips[..., 2].min(axis=0) - cell.tool_above
-            margins = dict(zip(TIPS, least.tolist(), strict=True))
+            tips = ends(subject)
+            places = points_of_last_link(subject.chain, list(tips.values())).sample(motion[0])
+            heights = places[..., 2].min(axis=0) - cell.tool_above
+            margins = dict(zip(map(height_of, tips), heights.tolist(), strict=True))
         clearance = swept_clearance(subject.chain, scene, trajectory, cell.clearance, _UNSURE)
         if clearance.least < asked - _ROUNDING or clearance.guaranteed < asked - _UNSURE:
             problems.append(

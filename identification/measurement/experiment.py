@@ -81,8 +81,8 @@ def run_experiment(
 
     The robot obeys (2.36) with the rotors' inertias, their coupling with the links where it is
     known how they sit, and dry and viscous friction that sticks; or (2.72). It starts at rest
-    on the excitation, gathers speed along it, and runs the periods. A torque sample is the mean
-    over one sampling time about its instant, plus noise.
+    on the excitation, gathers speed along it, and runs the periods. A torque sample is what the
+    drive gives at its instant, between the steps of the feedback their mean, plus noise.
 
     Args:
         subject: The robot; its friction has to be known.
@@ -106,14 +106,16 @@ def run_experiment(
     run = _checked_run(subject, trajectory, periods, servo)
     with compiled_when_bound():
         _, *motion = run.sample(1.0 / servo.period)
-        rigid, resistance = rigid_torques(subject, *motion), friction_torques(motion[1], *usual)
-        check_effort(subject, rigid + resistance)
-        tau_ff = servo.fed_forward(rigid, resistance)
-        station = build_station(subject, run, faults, servo, (coulomb, viscous), tau_ff, random)
+        rigid = rigid_torques(subject, *motion)
+        check_effort(subject, rigid + friction_torques(motion[1], *usual))
+        friction = (coulomb, viscous)
+        station = build_station(subject, run, faults, servo, friction, rigid, usual, random)
     t, signals = _simulate(station, run, servo, progress)
     # what acts up to a tick and what acts from it on
-    tau = signals["torque"].copy()
-    tau[1:] = 0.5 * (tau[1:] + tau[:-1])
+    feedback = signals["feedback"].copy()
+    feedback[1:] = 0.5 * (feedback[1:] + feedback[:-1])
+    limit = subject.effort_limit
+    tau = np.clip(feedback + signals["feed_forward"], -limit, limit)
     first = round(run.ramp / servo.period)
     kept = slice(first, first + round(periods * trajectory.period / servo.period))
     q, v, tau, measured = (

@@ -18,10 +18,11 @@ _POSTURES = 50
 class Servo:
     """A position controller for each joint, as robots have it.
 
-    ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` at the ticks, held in between, with
-    ``K_p = J omega^2``, ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and
-    the torque ``tau_ff`` of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The
-    velocity is the difference quotient of the encoder's positions.
+    ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` with ``K_p = J omega^2``,
+    ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and the torque ``tau_ff``
+    of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The feedback acts at the ticks
+    and is held in between, on the difference quotient of the encoder's positions; the drives
+    carry on ``tau_ff`` between the ticks.
 
     Friction that is not fed forward holds the robot back at every reversal until the deviation has
     grown by ``2 f_c / K_p``. The motion then has edges, which the bandwidth of
@@ -65,15 +66,6 @@ class Servo:
             inertia: ``J`` [kg m^2 or kg], shape (N,).
         """
         return inertia * self.bandwidth**2, 2.0 * self.damping * inertia * self.bandwidth
-
-    def fed_forward(self, rigid: np.ndarray, resistance: np.ndarray) -> np.ndarray:
-        """Return ``tau_ff``, shape (K, N) [Nm or N].
-
-        Args:
-            rigid: What the robot's motion takes without friction, see :func:`rigid_torques`.
-            resistance: What friction takes beside, see :func:`friction_torques`.
-        """
-        return self.feedforward * rigid + self.friction * resistance
 
 
 def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:

@@ -5,6 +5,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, Sine, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+_APART = 1e-9  # s, least distance of two changes
+
 
 def add_samples(
     builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray
@@ -23,6 +25,20 @@ def add_samples(
     return builder.AddNamedSystem(name, TrajectorySource(held)).get_output_port()
 
 
+def add_curves(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray) -> OutputPort:
+    """Return values that change smoothly between their instants, by cubic polynomials.
+
+    Args:
+        builder: Builder of the diagram.
+        name: Of the source.
+        t: Instants [s], shape (K,).
+        values: Shape (K, n).
+    """
+    slopes = np.gradient(values, t, axis=0)
+    curves = PiecewisePolynomial.CubicHermite(t, values.T, slopes.T)
+    return builder.AddNamedSystem(name, TrajectorySource(curves)).get_output_port()
+
+
 def add_lines(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray) -> OutputPort:
     """Return values that change evenly between their instants.
 
@@ -34,6 +50,32 @@ def add_lines(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndar
     """
     lines = PiecewisePolynomial.FirstOrderHold(t, values.T)
     return builder.AddNamedSystem(name, TrajectorySource(lines)).get_output_port()
+
+
+def add_signs(
+    builder: DiagramBuilder, name: str, t: np.ndarray, v: np.ndarray, size: np.ndarray
+) -> OutputPort:
+    """Return ``size sign(v)`` that changes where ``v`` is zero, between the instants.
+
+    Args:
+        builder: Builder of the diagram.
+        name: Of the source.
+        t: Instants [s], shape (K,).
+        v: Shape (K, n).
+        size: Shape (n,).
+    """
+    changes = [t[[0, -1]]]
+    for column in v.T:
+        k = np.flatnonzero(column[1:] * column[:-1] < 0.0)
+        part = column[k] / (column[k] - column[k + 1])
+        changes.append(t[k] + part * (t[k + 1] - t[k]))
+    breaks = np.unique(np.concatenate(changes))
+    far = np.diff(breaks, prepend=-np.inf) > _APART
+    breaks = breaks[far]
+    middles = 0.5 * (breaks[1:] + breaks[:-1])
+    signs = np.sign([np.interp(middles, t, column) for column in v.T]) * size[:, None]
+    held = PiecewisePolynomial.ZeroOrderHold(breaks, np.hstack([signs, signs[:, -1:]]))
+    return builder.AddNamedSystem(name, TrajectorySource(held)).get_output_port()
 
 
 def add_sines(

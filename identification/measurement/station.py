@@ -6,7 +6,6 @@ import numpy as np
 from pydrake.systems.controllers import PidController
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
-    Demultiplexer,
     MatrixGain,
     Saturation,
     ZeroOrderHold,
@@ -17,7 +16,7 @@ from diagrams.signal_log import SignalLog, add_log
 from identification.excitation.run_in import ExcitationRun
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.servo import Servo, drive_inertia
-from identification.measurement.sources import add_samples, add_sum
+from identification.measurement.sources import add_curves, add_samples, add_signs, add_sum
 from identification.model.subject import Subject
 from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
@@ -34,8 +33,8 @@ class Station:
     Attributes:
         diagram: Plant, servo, friction, encoders and log.
         plant: What the servo moves, with the state ``[q, v]``.
-        log: At the ticks: ``state`` ``[q, v]``, ``q`` as the encoders tell it, ``torque`` of the
-            drives that acts until the next tick.
+        log: At the ticks: ``state`` ``[q, v]``, ``q`` as the encoders tell it, ``feedback`` that
+            acts until the next tick, ``feed_forward`` at the tick [Nm or N].
         start: Positions at the start [rad or m], shape (N,).
     """
 
@@ -51,7 +50,8 @@ def build_station(
     faults: Imperfections,
     servo: Servo,
     friction: tuple[np.ndarray, np.ndarray],
-    tau_ff: np.ndarray,
+    rigid: np.ndarray,
+    usual: tuple[np.ndarray, np.ndarray],
     random: np.random.Generator,
 ) -> Station:
     """Return the station of one run.
@@ -62,7 +62,8 @@ def build_station(
         faults: Encoders, disturbance and drift of the friction.
         servo: The controller.
         friction: ``f_c`` and ``f_v`` of this run, each (N,).
-        tau_ff: What the servo feeds forward at the ticks [Nm or N], shape (K, N).
+        rigid: Torques of the robot without friction at the ticks [Nm or N], shape (K, N).
+        usual: ``f_c`` and ``f_v`` as the servo believes them, each (N,).
         random: Of the disturbance.
     """
     builder, n = DiagramBuilder(), subject.dimension
@@ -71,23 +72,21 @@ def build_station(
     plant = builder.AddNamedSystem("plant", _plant(subject))
     state = plant.GetOutputPort("state")
     measured = _add_encoders(builder, subject, faults, servo, state)
-    reference = add_samples(builder, "reference", t, np.hstack([q, v, tau_ff]))
-    parts = builder.AddNamedSystem("reference_parts", Demultiplexer([2 * n, n]))
-    builder.Connect(reference, parts.get_input_port())
+    reference = add_samples(builder, "reference", t, np.hstack([q, v]))
     K_p, K_d = servo.gains(inertia)
     control = builder.AddNamedSystem("servo", PidController(K_p, np.zeros(n), K_d))
     builder.Connect(measured, control.get_input_port_estimated_state())
-    builder.Connect(parts.get_output_port(0), control.get_input_port_desired_state())
-    wanted = add_sum(
-        builder, "drive_torque", control.get_output_port_control(), parts.get_output_port(1)
-    )
+    builder.Connect(reference, control.get_input_port_desired_state())
+    feedback = control.get_output_port_control()
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(servo.period, n))
+    builder.Connect(feedback, hold.get_input_port())
+    known = add_feed_forward(builder, servo, t, v, rigid, usual)
+    wanted = add_sum(builder, "drive_torque", hold.get_output_port(), known)
     limits = builder.AddNamedSystem(
         "drive_limits", Saturation(-subject.effort_limit, subject.effort_limit)
     )
     builder.Connect(wanted, limits.get_input_port())
-    hold = builder.AddNamedSystem("hold", ZeroOrderHold(servo.period, n))
-    builder.Connect(limits.get_output_port(), hold.get_input_port())
-    builder.Connect(hold.get_output_port(), plant.GetInputPort("actuation"))
+    builder.Connect(limits.get_output_port(), plant.GetInputPort("actuation"))
     resistance = _add_friction(builder, faults, friction, inertia, servo, state)
     if faults.disturbance > 0.0:
         torque = faults.coloured_torque(len(t), servo.period, random)
@@ -99,12 +98,41 @@ def build_station(
     signals = {
         "state": state,
         "q": position.get_output_port(),
-        "torque": limits.get_output_port(),
+        "feedback": feedback,
+        "feed_forward": known,
     }
     log = add_log(builder, signals, servo.period)
     diagram = builder.Build()
     diagram.set_name("identification_experiment")
     return Station(diagram, plant, log, q[0])
+
+
+def add_feed_forward(
+    builder: DiagramBuilder,
+    servo: Servo,
+    t: np.ndarray,
+    v: np.ndarray,
+    rigid: np.ndarray,
+    friction: tuple[np.ndarray, np.ndarray],
+) -> OutputPort:
+    """Return what a servo feeds forward, shape (N,).
+
+    Args:
+        builder: Builder of the diagram.
+        servo: The controller.
+        t: Ticks [s], shape (K,).
+        v: Reference velocities, shape (K, N).
+        rigid: Torques of the robot without friction [Nm or N], shape (K, N).
+        friction: ``f_c`` and ``f_v`` as the servo believes them, each (N,).
+    """
+    coulomb, viscous = friction
+    smooth = servo.feedforward * rigid + servo.friction * viscous * v
+    return add_sum(
+        builder,
+        "feed_forward",
+        add_curves(builder, "smooth_feed_forward", t, smooth),
+        add_signs(builder, "dry_feed_forward", t, v, servo.friction * coulomb),
+    )
 
 
 def _plant(subject: Subject) -> RigidPlant | DeltaPlant:

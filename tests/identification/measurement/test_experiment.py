@@ -14,7 +14,7 @@ from identification.measurement.experiment import run_experiment, simulate_exper
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.periods import average
-from identification.measurement.servo import Servo
+from identification.measurement.synchronization import torque_lag
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
@@ -53,12 +53,12 @@ def clean(request):
 
 
 def test_torques_are_those_of_the_parameters(clean):
-    """To what the steps of the torque at 1 kHz leave."""
+    """To what the steps of the feedback at 1 kHz leave."""
     subject, run = clean
     motion = average(run.record)
     expected = Regressor(subject).matrix(motion.q, motion.v, motion.a) @ true_parameters(subject)
     error = np.abs(motion.tau - expected).max(axis=0)
-    np.testing.assert_array_less(error, 5e-5 * np.abs(expected).max())
+    np.testing.assert_array_less(error, 5e-6 * np.abs(expected).max())
     np.testing.assert_allclose(motion.v, run.v[-2000:], atol=1e-4)
 
 
@@ -90,7 +90,7 @@ def test_torques_of_drakes_inverse_dynamics(robot):
         plant.CalcForceElementsContribution(context, forces)
         expected.append(plant.CalcInverseDynamics(context, a, forces) + subject.viscous * v)
     error = np.abs(motion.tau[::50] - expected).max()
-    assert error < 5e-5 * np.abs(expected).max()
+    assert error < 5e-6 * np.abs(expected).max()
 
 
 @pytest.fixture(scope="module")
@@ -99,13 +99,15 @@ def delta():
 
 
 def test_dry_friction(delta):
-    """Where the joints move: at reversals the torque is anywhere between both signs."""
+    """At reversals alone, within some samples, the torque is anywhere between both signs."""
     motion = average(simulate_experiment(delta, excitation(delta), perfect(delta), periods=PERIODS))
     expected = Regressor(delta).matrix(motion.q, motion.v, motion.a) @ true_parameters(delta)
     moving = np.abs(motion.v) > 0.05 * np.abs(motion.v).max()
     error = np.abs(motion.tau - expected)[moving]
     assert np.median(error) < 2e-3 * delta.coulomb.max()
-    assert np.max(error) < 0.1 * delta.coulomb.max()
+    assert np.max(error) < 0.2 * delta.coulomb.max()
+    lag = torque_lag(motion, Regressor(delta).matrix(motion.q, motion.v, motion.a))
+    assert abs(lag.time) < 2e-4
 
 
 def test_noise_and_encoders(delta):
@@ -180,13 +182,3 @@ def test_bad_input(delta):
     refused("period", delta, odd)
     weak = replace(delta, effort_limit=np.full(3, 4.0))
     refused("asks slide_. for .* N; must stay within the drive's 4 N", weak, motion)
-
-
-def test_bad_servos():
-    for name in ("bandwidth", "damping", "period"):
-        with pytest.raises(InputError, match=f"{name} = -1"):
-            Servo(**{name: -1.0})
-    with pytest.raises(InputError, match=r"friction = -0\.1"):
-        Servo(friction=-0.1)
-    with pytest.raises(InputError, match=r"bandwidth = 400 .* at most 312\.5 rad/s"):
-        Servo(bandwidth=400.0)

@@ -114,7 +114,7 @@ FAULTS = {
     ),
     "a column twice": (lambda f: f.rename("v_2", "v_1"), "v_1"),
     "no time": (lambda f: f.drop("t ["), r"no time; 't \[s\]' is required"),
-    "clipped": (clip, "tau of joint_2 is clipped at .* hardly ever just below"),
+    "clipped": (clip, "tau of joint_2 is clipped at"),
     "dead channel": (lambda f: f.scale("tau_6", 0.0), "tau of joint_6 is 0 Nm throughout"),
     "late torques": (lambda f: f.shift("tau_", 8), r"tau lags the motion by [78]\.?\d* ms"),
     "early torques": (lambda f: f.shift("tau_", -8), r"tau leads the motion by [78]\.?\d* ms"),

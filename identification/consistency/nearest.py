@@ -1,0 +1,179 @@
+"""The physically consistent set of parameters nearest to identified base parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.consistency.bounds import PhysicalBounds
+from identification.consistency.program import PRIOR_WEIGHT, least_squares
+from identification.model.base import BaseParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.parameter_checks import check_vector, require
+
+# of a covariance matrix scaled to ones on its diagonal; below, it is singular but for rounding
+_SINGULAR = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Torques that are to be predicted as by the identified base parameters.
+
+    Tables of standard deviations leave out the correlations, and with them how parameters may
+    differ together without a torque telling. A few torques beside them bring that back.
+
+    Attributes:
+        matrices: Regression matrices ``Y_b`` of a motion, shape (K, N, n_b).
+        standard_deviation: Of the torques [Nm or N], shape (N,).
+        weight: For how many measurements of each torque the motion counts.
+
+    Raises:
+        InputError: If shapes do not fit each other, or a number is out of range.
+    """
+
+    matrices: np.ndarray
+    standard_deviation: np.ndarray
+    weight: float
+
+    def __post_init__(self) -> None:
+        sigma, shape = np.asarray(self.standard_deviation), np.shape(self.matrices)
+        if len(shape) != 3 or sigma.shape != shape[1:2] or not np.all(np.isfinite(self.matrices)):
+            raise InputError(
+                f"prediction: matrices {shape}, deviations {sigma.shape}; must be (K, N, n_b) and "
+                "(N,), all finite"
+            )
+        check_vector("standard_deviation", sigma, shape[1])
+        require(bool(np.all(sigma > 0.0)), "standard_deviation", sigma, "positive")
+        require(0.0 <= self.weight < np.inf, "weight", self.weight, "finite and not negative")
+
+    def factor(self) -> np.ndarray:
+        """Return R with ``|R d|^2`` the weighted squares of torques for ``d``, shape (r, n_b)."""
+        samples, _, columns = self.matrices.shape
+        rows = self.matrices / self.standard_deviation[:, None]
+        return np.sqrt(self.weight / samples) * np.linalg.qr(rows.reshape(-1, columns), mode="r")
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentParameters:
+    """A physically consistent set of n parameters.
+
+    Attributes:
+        names: Of the parameters.
+        parameters: ``rho``, SI units, shape (n,).
+        chi_squared: ``|L^-1 (K_b rho - rho_b)|^2`` with the covariance ``L L'`` of the base
+            parameters ``rho_b``: how far it is from what was measured.
+        base_names: Of the n_b base parameters, in words.
+        base_values: ``K_b rho``, shape (n_b,).
+        deviations: ``K_b rho - rho_b`` in standard deviations of each, shape (n_b,).
+        prior_weight: Of what decides on parameters without effect.
+    """
+
+    names: list[str]
+    parameters: np.ndarray
+    chi_squared: float
+    base_names: list[str]
+    base_values: np.ndarray
+    deviations: np.ndarray
+    prior_weight: float
+
+
+def nearest_consistent(
+    base: BaseParameters,
+    values: np.ndarray,
+    covariance: np.ndarray,
+    bounds: PhysicalBounds,
+    prior: np.ndarray | None = None,
+    prior_weight: float = PRIOR_WEIGHT,
+    prediction: Prediction | None = None,
+) -> ConsistentParameters:
+    """Return the consistent parameters nearest to base parameters.
+
+    Near is meant in the metric of the covariance: the set is the most likely one among the
+    consistent ones, but for the small weight of the prior; see
+    :func:`~identification.consistency.program.least_squares`.
+
+    Args:
+        base: Of the robot, or other combinations of its parameters.
+        values: Identified base parameters ``rho_b``, shape (n_b,).
+        covariance: Of the values, shape (n_b, n_b).
+        bounds: What is known of the bodies.
+        prior: What parameters without effect tend to, shape (n,); by default the middle of the
+            bounds.
+        prior_weight: Weight of the distance from the prior beside chi squared.
+        prediction: Torques that count beside chi squared.
+
+    Raises:
+        InputError: If a shape is wrong, a number not finite, the covariance not positive definite,
+            or the bounds cannot be kept.
+    """
+    values = check_values(base, values)
+    L = factor(base, covariance)
+    A, b = np.linalg.solve(L, base.projection), np.linalg.solve(L, values)
+    if prediction is not None:
+        if prediction.matrices.shape[2] != base.rank:
+            raise InputError(
+                f"prediction: matrices {prediction.matrices.shape}; must have {base.rank} columns"
+            )
+        R = prediction.factor()
+        A, b = np.vstack([A, R @ base.projection]), np.concatenate([b, R @ values])
+    rho = least_squares(A, b, base.full_names, bounds, prior, prior_weight)
+    residual = base.projection @ rho - values
+    return ConsistentParameters(
+        names=list(base.full_names),
+        parameters=rho,
+        chi_squared=float(np.sum(np.linalg.solve(L, residual) ** 2)),
+        base_names=base.names,
+        base_values=base.projection @ rho,
+        deviations=residual / np.linalg.norm(L, axis=1),
+        prior_weight=prior_weight,
+    )
+
+
+def check_values(base: BaseParameters, values: np.ndarray) -> np.ndarray:
+    """Return base parameters as an array, shape (n_b,).
+
+    Raises:
+        InputError: If they are not as many as the base has, or one is not finite.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.shape != (base.rank,):
+        raise InputError(f"base parameters: shape {values.shape}; must be ({base.rank},)")
+    if not np.all(np.isfinite(values)):
+        first = int(np.argmin(np.isfinite(values)))
+        raise InputError(
+            f"base parameters: {base.short_names[first]} is {values[first]}; must be finite"
+        )
+    return values
+
+
+def factor(base: BaseParameters, covariance: np.ndarray) -> np.ndarray:
+    """Return the lower triangular ``L`` with the covariance ``L L'``, shape (n_b, n_b).
+
+    Args:
+        base: Whose values have the covariance.
+        covariance: Shape (n_b, n_b).
+
+    Raises:
+        InputError: If it has another shape, is not symmetric or not positive definite.
+    """
+    C, n = np.asarray(covariance, dtype=float), base.rank
+    if C.shape != (n, n):
+        raise InputError(f"covariance: shape {C.shape}; must be ({n}, {n})")
+    variances = np.diag(C)
+    if not (np.all(np.isfinite(C)) and np.all(variances > 0.0)):
+        fine = (variances > 0.0) & np.all(np.isfinite(C), axis=1)
+        first = int(np.argmin(fine))
+        raise InputError(
+            f"covariance: variance of {base.short_names[first]} is {variances[first]:g}; must be "
+            "positive, and all entries finite"
+        )
+    sigma = np.sqrt(variances)
+    R = C / np.outer(sigma, sigma)
+    asymmetry = float(np.abs(R - R.T).max())
+    if asymmetry > np.sqrt(_SINGULAR):
+        raise InputError(f"covariance: not symmetric, by {asymmetry:.3g} of the variances")
+    least = float(np.linalg.eigvalsh(R)[0])
+    if least <= _SINGULAR:
+        raise InputError(
+            f"covariance: least eigenvalue {least:.3g} of the correlation matrix; must be positive"
+        )
+    return sigma[:, None] * np.linalg.cholesky(R)

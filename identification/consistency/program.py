@@ -1,0 +1,184 @@
+"""The semidefinite program behind consistent parameters."""
+
+from collections.abc import Sequence
+from typing import NoReturn
+
+import numpy as np
+from pydrake.solvers import ClarabelSolver, MathematicalProgram
+
+from identification.consistency.bounds import Box, LinkBounds, PhysicalBounds
+from identification.consistency.constraints import (
+    Intervals,
+    check_bounds,
+    extended,
+    link_intervals,
+    other_intervals,
+)
+from identification.consistency.layout import Layout
+from identification.consistency.prior import check_prior, prior_from_bounds
+from identification.consistency.pseudo_inertia import (
+    SIZE,
+    from_pseudo_inertia,
+    linear_terms,
+    pseudo_inertia,
+)
+from identification.model.parameters import PER_LINK
+from pfsc_drake.errors import InputError
+
+# of the distance from the prior, in units of squared standard deviations
+PRIOR_WEIGHT = 0.1
+_TERMS = np.array(linear_terms())
+
+
+def least_squares(
+    A: np.ndarray,
+    b: np.ndarray,
+    names: Sequence[str],
+    bounds: PhysicalBounds,
+    prior: np.ndarray | None = None,
+    prior_weight: float = PRIOR_WEIGHT,
+) -> np.ndarray:
+    """Return the consistent parameters ``rho`` nearest to measurements, shape (n,).
+
+    They solve::
+
+        min |A rho - b|^2 + w sum_i d(P_i, P_i0) + w sum_j (I_M,j / I_M0,j - 1)^2
+        s.t. P_i - m_i r_i^2 diag(1, 1, 1, 0) >= 0          mass spreads by r_i at least
+             m_i lower <= h_i <= m_i upper                  centre of mass in its box
+             bounds of masses and rotors; I_M, f_c, f_v >= 0
+
+    with the pseudo-inertias P, their blocks Sigma, h, m and the distance d of
+    :mod:`~identification.consistency.pseudo_inertia`. The prior decides on what the torques do not
+    depend on, whatever its weight. With ``P_0 = L L'`` the unknown of each link is
+    ``L^-1 P L^-T``, of the order of one; and all are counted from a set that fits the
+    measurements without being consistent, so that the cost is of the order of chi squared.
+
+    Args:
+        A: Weighted so that b has the unit matrix for its covariance, shape (k, n).
+        b: Shape (k,).
+        names: Of the n parameters.
+        bounds: What is known beforehand.
+        prior: ``rho_0``, see :func:`~identification.consistency.prior.check_prior`; by default
+            that of the bounds.
+        prior_weight: ``w``; 1 weighs the distance like a squared standard deviation.
+
+    Raises:
+        InputError: If the bounds contradict each other (names the link) or are of another robot,
+            the prior is of no robot, the weight is negative or no solution is found.
+    """
+    if not 0.0 <= prior_weight < np.inf:
+        raise InputError(f"prior_weight = {prior_weight!r}; must be finite and not negative")
+    layout = Layout.of(names)
+    check_bounds(layout, bounds)
+    rho_0 = prior_from_bounds(names, bounds) if prior is None else check_prior(names, prior)
+    S = _units(layout, rho_0, A)
+    start = np.linalg.solve(S, np.where(np.isfinite(rho_0), rho_0, 0.0))
+    start += np.linalg.lstsq(A @ S, b - A @ S @ start, rcond=None)[0]
+    program = MathematicalProgram()
+    z = program.NewContinuousVariables(layout.size, "z")
+    program.Add2NormSquaredCost(A @ S, b - A @ S @ start, z)
+    _add(program, other_intervals(layout, bounds), S, start, z)
+    for rows, link in zip(layout.links, bounds.links, strict=True):
+        _add_link(program, link, S[np.ix_(rows, rows)], start[rows], z[rows])
+        if prior_weight > 0.0:
+            _add_distance(program, start[rows], z[rows], prior_weight)
+    for row in layout.rotors:
+        if prior_weight > 0.0 and np.isfinite(rho_0[row]):
+            # in units of the prior
+            w = np.sqrt(prior_weight)
+            program.Add2NormSquaredCost(np.array([[w]]), np.array([w - w * start[row]]), z[[row]])
+    result = ClarabelSolver().Solve(program)
+    if not result.is_success():
+        _explain(result.get_solution_result().name, layout, bounds)
+    parameters = S @ (start + result.GetSolution(z))
+    not_negative = np.concatenate([layout.rotors, layout.friction])
+    parameters[not_negative] = np.maximum(parameters[not_negative], 0.0)
+    return np.asarray(parameters)
+
+
+def _units(layout: Layout, rho_0: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """Return S of ``rho = S z`` with unknowns of the order of one, shape (n, n)."""
+    norms = np.linalg.norm(A, axis=0)
+    S = np.diag(np.divide(1.0, norms, out=np.ones(layout.size), where=norms > 0.0))
+    for rows in layout.links:
+        L = np.linalg.cholesky(pseudo_inertia(rho_0[rows]))
+        columns = [from_pseudo_inertia(L @ term @ L.T) for term in _TERMS]
+        S[np.ix_(rows, rows)] = np.transpose(columns)
+    known = layout.rotors[np.isfinite(rho_0[layout.rotors])]
+    S[known, known] = rho_0[known]
+    return S
+
+
+def _add(
+    program: MathematicalProgram,
+    intervals: Intervals,
+    S: np.ndarray,
+    start: np.ndarray,
+    z: np.ndarray,
+) -> None:
+    """Add intervals of ``rho = S (start + z)``."""
+    G = intervals.G @ S
+    sizes = np.abs(G).max(axis=1)
+    offset = G @ start
+    lower, upper = (intervals.lower - offset) / sizes, (intervals.upper - offset) / sizes
+    program.AddLinearConstraint(G / sizes[:, None], lower, upper, z)
+
+
+def _add_link(
+    program: MathematicalProgram,
+    link: LinkBounds,
+    S: np.ndarray,
+    start: np.ndarray,
+    z: np.ndarray,
+) -> None:
+    """Add what is required of a link with ``rho = S (start + z)``."""
+    _add(program, link_intervals(link), S, start, z)
+    P_0 = pseudo_inertia(S @ _identity())
+    inverse = np.linalg.inv(np.linalg.cholesky(P_0))
+    terms = inverse @ np.tensordot(S.T, extended(link), 1) @ inverse.T
+    terms = 0.5 * (terms + terms.transpose(0, 2, 1))
+    program.AddLinearMatrixInequalityConstraint([np.tensordot(start, terms, 1), *terms], z)
+
+
+def _add_distance(
+    program: MathematicalProgram, start: np.ndarray, z: np.ndarray, weight: float
+) -> None:
+    """Add that from the prior, whose pseudo-inertia is the unit matrix in the unknowns."""
+    rows = np.sqrt(0.5 * weight) * _TERMS.reshape(PER_LINK, -1).T
+    program.Add2NormSquaredCost(rows, rows @ (_identity() - start), z)
+
+
+def _identity() -> np.ndarray:
+    return from_pseudo_inertia(np.eye(SIZE))
+
+
+def _explain(outcome: str, layout: Layout, bounds: PhysicalBounds) -> NoReturn:
+    """Raise the InputError of a program that was not solved."""
+    prior = prior_from_bounds(layout.names, bounds)
+    S = _units(layout, prior, np.zeros((1, layout.size)))
+    for i, (rows, link) in enumerate(zip(layout.links, bounds.links, strict=True)):
+        program = MathematicalProgram()
+        z = program.NewContinuousVariables(PER_LINK)
+        _add_link(program, link, S[np.ix_(rows, rows)], np.zeros(PER_LINK), z)
+        if not ClarabelSolver().Solve(program).is_success():
+            body = "" if link.body is None else f", all of it {_place(link.body)}"
+            raise InputError(
+                f"bounds of {bounds.name}: {layout.link_name(i)}: no body of {link.mass} kg has "
+                f"its centre of mass {_place(link.center_of_mass)}{body} and spreads by "
+                f"{link.least_extent:g} m"
+            )
+    masses = np.sum([link.mass for link in bounds.links], axis=0)
+    total = bounds.total_mass
+    if total and (masses[0] > total[1] or masses[1] < total[0]):
+        raise InputError(
+            f"bounds of {bounds.name}: total_mass = {total}; the links have {masses[0]:g} to "
+            f"{masses[1]:g} kg together"
+        )
+    raise InputError(
+        f"bounds of {bounds.name}: no consistent parameters found ({outcome}); allowed: bounds "
+        "and measurements of one robot"
+    )
+
+
+def _place(box: Box) -> str:
+    return f"between {box.lower.tolist()} and {box.upper.tolist()} m"

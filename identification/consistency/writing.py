@@ -1,0 +1,95 @@
+"""Identified robots as the files that models and scenarios are made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+
+from diagrams.robots.model import locate_model
+from identification.consistency.check import require_consistent
+from identification.consistency.parameter_files import identified_delta, identified_robot
+from identification.consistency.urdf import urdf_text
+from identification.excitation.fourier import write_text
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.visuals import Appearance
+from pfsc_drake.robot.models.writer import write_sdf
+from pfsc_drake.yaml.typed import load_file
+
+PARAMETERS_FILE = "parameters.yaml"
+
+
+@dataclass(frozen=True)
+class WrittenModel:
+    """Files of an identified robot.
+
+    Attributes:
+        parameters: The parameter file, for ``controller.model``, for
+            ``controller.friction.believed.file`` and of a DELTA robot for ``robot.model``; None
+            for robots that were read from a bare model.
+        models: SDF files, one for each variant of the parameter file.
+        urdf: The robot with rigid joints; None for DELTA robots.
+    """
+
+    parameters: Path | None
+    models: Sequence[Path]
+    urdf: Path | None
+
+    @property
+    def files(self) -> list[Path]:
+        """All of them."""
+        return [file for file in (self.parameters, *self.models, self.urdf) if file is not None]
+
+
+def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) -> WrittenModel:
+    """Write an identified robot.
+
+    A robot with a parameter file gets another one, with the same variants as SDF files beside it
+    and the look of the robot, as ``models/<robot>/`` has them; any other one a URDF alone.
+
+    Args:
+        subject: The robot.
+        parameters: A consistent set, with or without friction, shape (n,).
+        folder: Where to write; made if it is not there. Files of the same name are replaced.
+
+    Raises:
+        InputError: If the parameters are not consistent or not as many as the robot's, the robot's
+            file cannot hold them, or a file cannot be written.
+    """
+    parameters = np.asarray(parameters, dtype=float)
+    require_consistent(subject, parameters)
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
+    file = folder / PARAMETERS_FILE
+    if subject.delta is not None:
+        write_text(file, _commented(yaml_dump_typed(identified_delta(subject, parameters))))
+        return WrittenModel(file, [], None)
+    urdf = folder / f"{subject.name}.urdf"
+    if subject.parameters is None:
+        write_text(urdf, urdf_text(subject, parameters))
+        return WrittenModel(None, [], urdf)
+    robot = identified_robot(subject, parameters)
+    urdf = folder / f"{robot.name}.urdf"
+    write_text(file, _commented(yaml_dump_typed(robot)))
+    appearance, models = _appearance(subject), []
+    for variant in robot.variants:
+        models.append(folder / f"{variant.name}.sdf")
+        write_text(models[-1], write_sdf(robot, variant, appearance))
+    write_text(urdf, urdf_text(subject, parameters))
+    return WrittenModel(file, models, urdf)
+
+
+def _appearance(subject: Subject) -> Appearance:
+    """Return the look of the robot that lies next to its model; without it none."""
+    assert subject.block is not None
+    file = locate_model(subject.block, subject.folder).with_name("appearance.yaml")
+    return load_file(Appearance, file) if file.is_file() else Appearance()
+
+
+def _commented(text: str) -> str:
+    return f"# Identified parameters of a robot, physically consistent. SI units.\n{text}"

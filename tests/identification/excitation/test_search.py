@@ -1,0 +1,134 @@
+"""Searches for excitations of small robots, and what cannot be searched for."""
+
+import numpy as np
+import pytest
+
+from identification.excitation.cell import Cell, Obstacle
+from identification.excitation.criterion import information
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.limits import chosen_limits
+from identification.excitation.local_search import LocalSearch, random_motion_about
+from identification.excitation.problem import believed_parameters
+from identification.excitation.processes import side_by_side
+from identification.excitation.search import search
+from identification.excitation.verification import verify
+from identification.model.base import base_parameters
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+
+POST = Obstacle(
+    name="post", kind="cylinder", start=np.array([0, 1, 0]), end=np.array([0, 1, 1]), radius=0.1
+)
+CELL = Cell([POST], tool_above=0.3, self_collision=False)
+QUICK = {"period": 5.0, "harmonics": (1, 2), "starts": 2, "workers": 1, "iterations": 40}
+
+
+@pytest.fixture(scope="module")
+def found_and_told(arm):
+    told = []
+    found = search(arm, cell=CELL, progress=lambda *args: told.append(args), **QUICK)
+    return found, told
+
+
+@pytest.fixture(scope="module")
+def found(found_and_told):
+    return found_and_told[0]
+
+
+def figures(arm, motion):
+    regressor = Regressor(arm)
+    return information(regressor, base_parameters(regressor), motion)
+
+
+def test_is_much_better_than_random_motions(arm, found, arm_problem):
+    motions = [random_motion_about(arm_problem, np.random.default_rng(i)) for i in range(10)]
+    others = [
+        figures(arm, FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
+        for c in motions
+    ]
+    assert found.information.log_determinant > max(others) + 20.0
+    assert found.information == figures(arm, found.trajectory)
+
+
+def test_keeps_all_limits_of_the_cell(arm, found):
+    t = np.random.default_rng(0).uniform(0.0, 5.0, 1000)
+    q, v, a = found.trajectory.motion(t)
+    assert np.all((q >= arm.position_limits[:, 0]) & (q <= arm.position_limits[:, 1]))
+    assert np.all(np.abs(v) <= arm.velocity_limit)
+    assert np.all(np.abs(a) <= arm.acceleration_limit)
+    regressor = Regressor(arm)
+    again = verify(regressor, believed_parameters(arm), chosen_limits(arm), found.trajectory, CELL)
+    assert again.problems == found.verification.problems == []
+    assert again.clearance.guaranteed >= 0.018
+
+
+def test_condition_number(arm, found):
+    by_condition = search(arm, "condition", cell=CELL, **QUICK)
+    assert by_condition.information.condition_number < found.information.condition_number
+    assert by_condition.information.log_determinant < found.information.log_determinant
+
+
+def test_delta(delta):
+    found = search(delta, limits={"acceleration": 30.0}, **QUICK)
+    assert found.information.base_parameters == 10
+    assert found.information.log_determinant > 70.0
+    assert found.verification.problems == []
+    q = found.trajectory.motion(np.linspace(0.0, 5.0, 50))[0]
+    for row in q:  # every posture is in the workspace
+        robot = delta.delta
+        np.testing.assert_allclose(
+            robot.joint_coordinates(robot.tool_position(row)), row, atol=1e-9
+        )
+
+
+def test_is_the_same_again(arm_problem):
+    ends = [LocalSearch(arm_problem).run(seed, 5).coefficients for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert not np.allclose(ends[0], ends[2])
+
+
+def test_progress(found_and_told):
+    _, told = found_and_told
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert "1 of 2 starts, best log det" in told[1][1]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"criterion": "E"}, "criterion = 'E'; must be one of D, condition"),
+        ({"starts": 0}, "starts = 0"),
+        ({"workers": 0}, "workers = 0; must be 1 or more"),
+        ({"period": 0.0}, "period = 0.0 s"),
+        ({"harmonics": ()}, "harmonics"),
+        ({"limits": {"velocity": {"elbow": 1.0}}}, "no joint 'elbow'"),
+        ({"limits": {"effort": 1.0}}, "hardest to keep is the effort limit of joint_2"),
+        (
+            {"cell": Cell(tool_above=9.0, self_collision=False)},
+            "hardest to keep is the height of the flange",
+        ),
+        ({"posture": [0.0, 9.0, 0.0]}, "posture: joint_2 = 9; must be within its limits"),
+        ({"posture": [0.0, 0.0]}, "must be 3 finite numbers"),
+        ({"torque_noise": [1.0, 0.0, 1.0]}, "torque_noise"),
+    ],
+)
+def test_refuses(arm, change, says):
+    with pytest.raises(InputError, match=says):
+        search(arm, **{"cell": CELL} | QUICK | change)
+
+
+def test_refuses_a_posture_in_collision(arm):
+    # joint 1 turns the arm towards the post
+    with pytest.raises(InputError, match=r"posture: .* and post are .* m apart; must be at least"):
+        search(arm, cell=CELL, posture=[np.pi / 2, np.pi / 4, 0.0], **QUICK)
+
+
+def add(common, task):
+    return common + task
+
+
+def test_processes():
+    with side_by_side(2, 3) as run:
+        assert sorted(run(add, 10, [1, 2, 3])) == [11, 12, 13]
+        assert list(run(add, 20, [1])) == [21]
