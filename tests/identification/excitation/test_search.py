@@ -6,12 +6,10 @@ import pytest
 from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import chosen_limits
 from identification.excitation.local_search import LocalSearch, random_motion_about
-from identification.excitation.problem import believed_parameters
 from identification.excitation.processes import side_by_side
 from identification.excitation.search import search
-from identification.excitation.verification import verify
+from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
@@ -35,19 +33,21 @@ def found(found_and_told):
     return found_and_told[0]
 
 
-def figures(arm, motion):
+@pytest.fixture(scope="module")
+def figures(arm):
     regressor = Regressor(arm)
-    return information(regressor, base_parameters(regressor), motion)
+    base = base_parameters(regressor)
+    return lambda motion: information(regressor, base, motion)
 
 
-def test_is_much_better_than_random_motions(arm, found, arm_problem):
+def test_is_much_better_than_random_motions(found, figures, arm_problem):
     motions = [random_motion_about(arm_problem, np.random.default_rng(i)) for i in range(10)]
     others = [
-        figures(arm, FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
+        figures(FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
         for c in motions
     ]
     assert found.information.log_determinant > max(others) + 20.0
-    assert found.information == figures(arm, found.trajectory)
+    assert found.information == figures(found.trajectory)
 
 
 def test_keeps_all_limits_of_the_cell(arm, found):
@@ -56,8 +56,7 @@ def test_keeps_all_limits_of_the_cell(arm, found):
     assert np.all((q >= arm.position_limits[:, 0]) & (q <= arm.position_limits[:, 1]))
     assert np.all(np.abs(v) <= arm.velocity_limit)
     assert np.all(np.abs(a) <= arm.acceleration_limit)
-    regressor = Regressor(arm)
-    again = verify(regressor, believed_parameters(arm), chosen_limits(arm), found.trajectory, CELL)
+    again = verify_excitation(arm, found.trajectory, cell=CELL)
     assert again.problems == found.verification.problems == []
     assert again.clearance.guaranteed >= 0.018
 
@@ -102,6 +101,9 @@ def test_progress(found_and_told):
         ({"workers": 0}, "workers = 0; must be 1 or more"),
         ({"period": 0.0}, "period = 0.0 s"),
         ({"harmonics": ()}, "harmonics"),
+        ({"harmonics": (1,)}, r"harmonics = \[1\]: too few to show all 22 base .* link_3.Izz"),
+        ({"parameters": np.ones(3)}, r"parameters: shape \(3,\); must be 39 finite numbers"),
+        ({"cell": "nowhere.yaml"}, "nowhere.yaml"),
         ({"limits": {"velocity": {"elbow": 1.0}}}, "no joint 'elbow'"),
         ({"limits": {"effort": 1.0}}, "hardest to keep is the effort limit of joint_2"),
         (
