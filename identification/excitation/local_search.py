@@ -77,7 +77,7 @@ class LocalSearch:
 
         Args:
             seed: Of the random motion.
-            iterations: At most so many of the solver, in all.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
             posture: That the random motion is about [rad or m], shape (N,); or random, too.
             near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
         """
@@ -98,7 +98,7 @@ class LocalSearch:
         Args:
             coefficients: Of the motion, shape (N, 2M + 1).
             seed: That it has come from.
-            iterations: At most so many of the solver, in all.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
         """
         problem = self.problem
         joint_times = _instants(problem, _COARSE_JOINTS)

@@ -110,7 +110,7 @@ def search(
         parameters: Believed ones, for the torques, shape (n,); those of the model by default.
         torque_noise: Standard deviations of the measured torques, which weight the rows of the
             regressor, shape (N,) [Nm or N]; all one by default.
-        iterations: Of the solver, at most about so many per start.
+        iterations: Of the solver per start, at most; a quarter of them whenever it goes on.
         workers: Number of processes; one for each core by default, 1 for no others than this.
         progress: Told the fraction done and the best figure so far.
 
@@ -201,7 +201,7 @@ def _unchecked(subject: Subject, cell: Cell, scene: RobotScene | None) -> list[s
     if scene is None:
         return []
     none = f"{subject.name}: no obstacles are known; links are checked against each other alone"
-    return scene.warnings + ([] if cell.obstacles else [none])
+    return scene.warnings or ([] if cell.obstacles else [none])
 
 
 def _rank(optimum: LocalOptimum) -> tuple[bool, float, int]:

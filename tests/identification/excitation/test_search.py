@@ -12,6 +12,7 @@ from identification.excitation.search import search
 from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
+from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
 
 POST = Obstacle(
@@ -78,6 +79,37 @@ def test_delta(delta):
         np.testing.assert_allclose(
             robot.joint_coordinates(robot.tool_position(row)), row, atol=1e-9
         )
+
+
+CRANE = """\
+<robot name="crane">
+  <link name="base"/>
+  <link name="beam"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="hook"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.005" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="swing" type="revolute"><parent link="base"/><child link="beam"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="2" effort="50"/></joint>
+  <joint name="lift" type="prismatic"><parent link="beam"/><child link="hook"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.5" velocity="1" effort="100"/></joint>
+</robot>
+"""
+
+
+def test_model_file_with_a_slide_and_no_shapes(tmp_path):
+    file = tmp_path / "crane.urdf"
+    file.write_text(CRANE)
+    crane = load_subject(file)
+    cell = Cell([POST], tool_above=-0.2)
+    found = search(crane, cell=cell, limits={"acceleration": 10.0}, **QUICK)
+    assert found.warnings == ["crane: the model has no shapes; collisions are not checked"]
+    assert found.verification.keeps_all
+    q, _, _ = found.trajectory.motion(np.linspace(0.0, 5.0, 500))
+    height = -0.4 * np.sin(q[:, 0]) + q[:, 1] * np.cos(q[:, 0])
+    margin = found.verification.margins["height of the tool point"]
+    assert height.min() == pytest.approx(-0.2 + margin, abs=1e-3)
+    assert height.min() >= -0.2
 
 
 def test_is_the_same_again(arm_problem):
