@@ -65,7 +65,11 @@ def test_friction_that_is_another_in_each_run(comau, measure):
     for seed in range(4):
         extra = sign * 0.1 * comau.subject.coulomb * rng.normal(size=6)
         estimates.append(estimate(comau.regressor, comau.base, measure(seed, extra=extra)))
-    assert Repetitions(tuple(estimates)).spread_test().p_value < 1e-6
+    runs = Repetitions(tuple(estimates))
+    assert runs.spread_test().p_value < 1e-6
+    bodies = runs.spread_test(friction=False)
+    assert bodies.degrees_of_freedom == 3 * 40
+    assert bodies.p_value > 0.001
 
 
 def test_what_does_not_belong_together(comau, measure, runs):
