@@ -83,5 +83,5 @@ def random_steps(
     size = np.asarray(height, dtype=float)
     if not (np.all(size > 0.0) and 0.0 < hold < np.inf):
         raise InputError(f"torque steps: height = {size.tolist()}, hold = {hold}; must be positive")
-    step = np.floor(t / hold).astype(int)
+    step = np.floor(t / hold + 1e-9).astype(int)
     return np.asarray(random.uniform(-size, size, (step.max() + 1, size.size))[step])

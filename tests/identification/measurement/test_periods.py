@@ -95,8 +95,8 @@ def test_a_gap_is_not_averaged_over(record):
 def test_derivatives_of_noisy_positions(robot):
     """Of a Fourier excitation, with the errors that noise leaves below the bandwidth.
 
-    White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each of the harmonics of an average
-    over P periods of K samples; a derivative multiplies it by ``w^2``.
+    White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each harmonic of an average over P
+    periods of K samples; a derivative multiplies it by ``w^2``.
     """
     rng = np.random.default_rng(5)
     motion = FourierTrajectory([0.2, 1.0], *rng.uniform(0.2, 1.0, (2, 2, 3)), 10.0, (1, 3, 5))
@@ -112,4 +112,4 @@ def test_derivatives_of_noisy_positions(robot):
         expected = noise * np.sqrt(2.0 / (4 * 10_000) * np.sum(omega ** (2 * order)))
         np.testing.assert_allclose(error, expected, rtol=0.5)
         scale = np.abs(clean[order]).max(axis=0)
-        assert np.all(error < 3e-5 * scale)
+        assert np.all(error < 1e-4 * scale)
