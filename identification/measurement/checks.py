@@ -19,7 +19,7 @@ _REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
 _PLATEAU, _FLAT = 5, 10.0
 
 
-def check_record(record: Record, robot: MeasuredRobot) -> None:
+def check_record(record: Record, robot: MeasuredRobot, still: bool = False) -> None:
     """Refuse a record that is not sound or cannot be of the robot.
 
     That is: gaps in time, samples that are not evenly spaced, other joints than the robot's,
@@ -30,6 +30,7 @@ def check_record(record: Record, robot: MeasuredRobot) -> None:
     Args:
         record: The record.
         robot: Whose it is said to be.
+        still: Whether the links may stand still, as those of locked joints do.
 
     Raises:
         InputError: The first that is found, with joint, time and value.
@@ -40,7 +41,7 @@ def check_record(record: Record, robot: MeasuredRobot) -> None:
             f"{robot.name}: {', '.join(robot.joint_names)}"
         )
     check_sampling(record)
-    _check_positions(record, robot)
+    _check_positions(record, robot, still)
     _check_velocities(record, robot)
     _check_torques(record, robot)
 
@@ -74,12 +75,12 @@ def check_sampling(record: Record) -> None:
         )
 
 
-def _check_positions(record: Record, robot: MeasuredRobot) -> None:
+def _check_positions(record: Record, robot: MeasuredRobot, still: bool) -> None:
     for name, positions in (("q", record.q), ("q_motor", record.q_motor)):
         if positions is None:
             continue
         travel = np.ptp(positions, axis=0)
-        if not travel.any():
+        if not travel.any() and not (still and name == "q"):
             raise InputError(
                 f"{record.source}: {name} of all joints is constant; a robot that moves is required"
             )

@@ -45,6 +45,8 @@ def read_record(
     robot: MeasuredRobot,
     period: float | None = None,
     reading: Reading | None = None,
+    *,
+    still: bool = False,
 ) -> Record:
     """Read a record and check it.
 
@@ -53,6 +55,7 @@ def read_record(
         robot: Whose record it is.
         period: Of the motion [s], if the file does not state it.
         reading: What the file says in other words or not at all.
+        still: Whether the links may stand still, as those of locked joints do.
 
     Returns:
         The record in SI units, checked by :func:`~identification.measurement.checks.check_record`
@@ -72,7 +75,7 @@ def read_record(
         raise InputError(f"{path}: period [s] = {stated:g}; one of {period:g} s was given")
     period = stated if period is None else period
     record = make_record(signals, robot, period, reading or Reading(), str(path))
-    check_record(record, robot)
+    check_record(record, robot, still)
     check_velocities(record)
     return record
 

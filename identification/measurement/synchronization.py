@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy.optimize import minimize_scalar
 
 from identification.measurement.periods import AveragedMotion
 from identification.measurement.record import Record
@@ -14,6 +13,9 @@ LONGEST_LAG = 0.1  # s, up to which lags are looked for
 TOLERATED = 2.0  # sampling times
 _SURE = 3.0  # standard deviations
 _RANK = 1e-10
+# of a joint's largest velocity, below which its torques do not count, and not fully up to twice
+_SLOW = 0.1
+_NEAR = 6  # samples on either side of the best lag, that tell how sure it is
 _ENOUGH = 20_000  # samples that tell the lag of a measured velocity
 _SCALE = 0.1  # by which a measured velocity may differ from the derivative of the position
 
@@ -40,7 +42,9 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = L
 
     For each lag the parameters of the model are estimated anew, so that none have to be known:
     with an orthonormal basis of the weighted regressor's columns the residual is what the
-    circular correlation of the basis with the torques leaves over.
+    circular correlation of the basis with the torques leaves over. Samples at which a joint
+    is slow do not count: a joint that sticks before it reverses has torques that are late
+    by themselves.
 
     Args:
         motion: One period.
@@ -56,34 +60,37 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = L
         raise InputError(
             f"regressor of shape {regressor.shape}; must be ({count}, {joints}, n) as the motion"
         )
-    weight = 1.0 / np.sqrt(motion.mean_torque_variance)
-    if not np.isfinite(weight).all():
-        weight = np.ones(joints)
-    basis = _basis((regressor * weight[:, None]).reshape(count * joints, -1))
-    torques = np.fft.fft(motion.tau * weight, axis=0)
-    # sum over the joints of the correlations with each basis vector, over the frequencies
-    spectra = np.fft.fft(basis.reshape(count, joints, -1), axis=0)
-    cross = np.einsum("fj,fjn->nf", torques, spectra.conj()) / count
+    weight = _weight(motion)
+    basis = _basis((regressor * weight[..., None]).reshape(count * joints, -1))
+    weighted = basis.reshape(count, joints, -1) * weight[..., None]
+    torques = np.fft.fft(motion.tau, axis=0)
+    cross = np.zeros((basis.shape[1], count), dtype=complex)
+    energy = np.zeros(count, dtype=complex)
+    for j in range(joints):
+        cross += (torques[:, j, None] * np.fft.fft(weighted[:, j], axis=0).conj()).T
+        energy += np.fft.fft(motion.tau[:, j] ** 2) * np.fft.fft(weight[:, j] ** 2).conj()
+    left = np.fft.ifft(energy).real - np.sum(np.fft.ifft(cross, axis=1).real ** 2, axis=0)
     step = motion.period / count
-    frequencies = 2.0 * np.pi * np.fft.fftfreq(count, step)
-
-    def explained(lag: float) -> float:
-        values = (cross @ np.exp(1j * frequencies * lag)).real
-        return float(values @ values)
-
-    table = np.sum(np.fft.ifft(cross * count, axis=1).real ** 2, axis=0)
     reach = min(max(2, round(longest / step)), count // 2 - 1)
     lags = np.arange(-reach, reach + 1)
-    best = lags[np.argmax(table[lags])] * step
-    found = minimize_scalar(
-        lambda lag: -explained(lag), bounds=(best - step, best + step), method="bounded"
-    )
-    time, most = float(found.x), -float(found.fun)
-    left = max(float(np.sum((motion.tau * weight) ** 2)) - most, 0.0)
-    variance = left / (count * joints - basis.shape[1])
-    curvature = (2.0 * most - explained(time - step) - explained(time + step)) / step**2
-    deviation = np.sqrt(2.0 * variance / curvature) if curvature > 0.0 else np.inf
-    return Lag(time, float(deviation))
+    best = int(lags[np.argmin(left[lags])])
+    near = np.arange(best - _NEAR, best + _NEAR + 1)
+    bend, slope, least = np.polyfit(near - best, left[near % count], 2)
+    if bend <= 0.0:
+        return Lag(best * step, np.inf)
+    least -= 0.25 * slope**2 / bend
+    variance = max(float(least), 0.0) / max(np.count_nonzero(weight) - basis.shape[1], 1)
+    return Lag(float(best - 0.5 * slope / bend) * step, float(np.sqrt(variance / bend)) * step)
+
+
+def _weight(motion: AveragedMotion) -> np.ndarray:
+    """Return what each torque counts, shape (K, N)."""
+    speed = np.abs(motion.v)
+    share = speed / np.maximum(speed.max(axis=0), np.finfo(float).tiny)
+    deviation = np.sqrt(motion.mean_torque_variance)
+    if not (np.isfinite(deviation).all() and deviation.all()):
+        deviation = np.ones(motion.tau.shape[1])
+    return np.asarray(np.clip(share / _SLOW - 1.0, 0.0, 1.0) / deviation)
 
 
 def check_torque_lag(

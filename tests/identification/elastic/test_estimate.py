@@ -157,3 +157,22 @@ def test_locked_or_not_must_be_said():
     refused("viscous friction given; must be not", moving, viscous=1.0)
     refused("a locked joint must stand still", moving, locked=True, viscous=1.0)
     refused("that it is locked has to be said", held)
+
+
+def test_known_noise_of_the_positions():
+    signals = noisy(steady_motion(False), 4)
+    measured = estimate_joint(signals)
+    told = estimate_joint(signals, position_noise=(POSITION_NOISE, POSITION_NOISE))
+    np.testing.assert_allclose(told.values, measured.values, rtol=1e-3, atol=1e-2)
+    ignored = estimate_joint(signals, position_noise=(0.0, 0.0))
+    assert ignored.stiffness < told.stiffness
+
+
+def test_slow_sampling():
+    """At 333 Hz the test function becomes longer."""
+    fast = noisy(steady_motion(False, lines=20), 5)
+    t = fast.t[::3]
+    slow = replace(fast, t=t, tau=fast.tau[::3], q_motor=fast.q_motor[::3], q=fast.q[::3])
+    found = estimate_joint(slow)
+    assert abs(found.stiffness - STIFFNESS) < 4.0 * found.deviation("stiffness")
+    assert abs(found.inertia - INERTIA) < 4.0 * found.deviation("inertia")

@@ -91,6 +91,22 @@ def test_through_a_file(arm, moving, tmp_path):
         np.testing.assert_allclose(first.values, second.values, rtol=1e-3, atol=1e-3)
 
 
+def test_locked_links_through_a_file(arm, faults, tmp_path):
+    """Without any noise of the links, which stand still."""
+    record = simulate_locked(arm, faults, duration=2.0)
+    record = replace(record, q=np.zeros_like(record.q))
+    path = tmp_path / "locked.h5"
+    write_record(path, record, arm)
+    with pytest.raises(InputError, match="q of all joints is constant"):
+        read_record(path, arm)
+    again = read_record(path, arm, still=True)
+    options = {"locked": True, "viscous": arm.viscous}
+    for first, second in zip(
+        estimate_joints(record, arm, **options), estimate_joints(again, arm, **options), strict=True
+    ):
+        np.testing.assert_allclose(first.values, second.values, rtol=1e-12)
+
+
 def refused(message, function, *arguments, **options):
     with pytest.raises(InputError, match=message):
         function(*arguments, **options)

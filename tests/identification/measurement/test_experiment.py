@@ -14,7 +14,8 @@ from identification.measurement.experiment import run_experiment, simulate_exper
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.periods import average
-from identification.measurement.synchronization import torque_lag
+from identification.measurement.servo import Servo
+from identification.measurement.synchronization import check_torque_lag, torque_lag
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
@@ -107,7 +108,25 @@ def test_dry_friction(delta):
     assert np.median(error) < 2e-3 * delta.coulomb.max()
     assert np.max(error) < 0.2 * delta.coulomb.max()
     lag = torque_lag(motion, Regressor(delta).matrix(motion.q, motion.v, motion.a))
-    assert abs(lag.time) < 2e-4
+    assert abs(lag.time) < 5e-4
+
+
+def test_a_servo_that_knows_nothing(delta):
+    """Its joints stick before they reverse: torques are late there, the record is not."""
+    plain = Servo(feedforward=0.0, friction=0.0)
+    record = simulate_experiment(delta, excitation(delta), periods=PERIODS, servo=plain)
+    regressor = Regressor(delta)
+    found = []
+    for shift in (0, 6):
+        motion = average(replace(record, tau=np.roll(record.tau, shift, axis=0)))
+        Y = regressor.matrix(motion.q, motion.v, motion.a)
+        found.append(torque_lag(motion, Y))
+        if shift:
+            with pytest.raises(InputError, match=r"tau lags the motion by [56]"):
+                check_torque_lag(motion, Y)
+        else:
+            check_torque_lag(motion, Y)
+    assert found[1].time - found[0].time == pytest.approx(6e-3, abs=1e-4)
 
 
 def test_noise_and_encoders(delta):
