@@ -52,12 +52,12 @@ SDF = """<sdf version="1.9"><model name="arm">
 """
 
 
-def load(folder, model, gripper=True):
+def load(folder, model, gripper=True, tool="hook"):
     """Return the robot as a scenario would have it."""
     fixed = ", fixed_joints: {grip: 0.05}" if gripper else ""
     scenario = folder / f"{Path(model).stem}_scenario.yaml"
     scenario.write_text(
-        f"robot: {{model: {model}, tool_frame: {'hook' if gripper else 'two'}{fixed}, "
+        f"robot: {{model: {model}, tool_frame: {tool}{fixed}, "
         "base_pose: {position: [0.1, 0.2, 0.3], zyx_deg: [10, 20, 30]}}\n"
     )
     return load_subject(scenario)
@@ -99,12 +99,12 @@ def test_urdf_keeps_its_names_and_its_gripper(tmp_path):
 def test_sdf(tmp_path, rotor):
     file = tmp_path / "arm.sdf"
     file.write_text(SDF.replace("</axis></joint>", f"</axis>{rotor}</joint>", 1))
-    subject = load(tmp_path, file, gripper=False)
+    subject = load(tmp_path, file, gripper=False, tool="two")
     parameters = identified(subject)
     written = write_model(subject, parameters, tmp_path / "out")
     assert [file.name for file in written.files] == ["arm.sdf", "arm.urdf"]
     for model in written.files:
-        same(subject, load(tmp_path, model, gripper=False), parameters)
+        same(subject, load(tmp_path, model, gripper=False, tool="two"), parameters)
 
 
 @pytest.mark.parametrize(
