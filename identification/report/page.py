@@ -109,7 +109,7 @@ def summary(content: PageContent) -> Metrics:
         "median_relative_deviation", float(np.median(estimate.relative_standard_deviation)), "1"
     )
     if len(runs.estimates) > 1:
-        test = runs.spread_test()
+        test = runs.spread_test(friction=False)
         metrics.add(
             "spread_ratio", test.median_ratio, "1", source="of the runs, to what is predicted"
         )
