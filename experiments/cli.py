@@ -202,12 +202,13 @@ def study_command(
         typer.Argument(
             help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
             "all laws on robots that are not their models; tracking: path following against "
-            "trajectory tracking."
+            "trajectory tracking; identify_comau: from robots to their models and back."
         ),
     ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
-    """Many runs on one page, on all cores: one minute (stiffness) to ten (robustness)."""
+    """Many runs on one page, on all cores: one minute (stiffness) to ten."""
+    from experiments.studies.identify import write_identification
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
     from experiments.studies.tracking import write_tracking
@@ -216,6 +217,7 @@ def study_command(
         "stiffness": write_study,
         "robustness": write_robustness,
         "tracking": write_tracking,
+        "identify_comau": write_identification,
     }
     if name not in studies:
         raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")

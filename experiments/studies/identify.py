@@ -138,7 +138,8 @@ def write_identification(
     """Identify robots, drive with the results, and write a page for each robot.
 
     Args:
-        out: Folder: one folder for each robot, and in it one with the files of each step.
+        out: Folder for the first robot, with a folder for the files of each step; further robots
+            have folders in it.
         progress: Told one line per step.
         circles: What to identify and to drive.
 
@@ -148,7 +149,12 @@ def write_identification(
     Raises:
         InputError: If ``out`` cannot take the results.
     """
-    return [_identify(circle, out / circle.robot, progress) for circle in circles][0]
+    first, *others = circles
+    report = _identify(first, out, progress)
+    for circle in others:
+        page = _identify(circle, out / circle.robot, progress).path
+        progress(f"{circle.robot}: open {page}")
+    return report
 
 
 def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Report:
@@ -243,9 +249,8 @@ def _content(
     for (name, drive), values in zip(circle.drives.items(), deviations, strict=True):
         ratio = values[2] / values[0]
         source = f"{drive.metric}, identified by true model"
-        metrics.add(
-            f"{name.replace(', ', '_').replace(' ', '_')}", ratio, "1", f"<= {MOST}", source
-        )
+        key = name.replace(",", "").replace(" ", "_")
+        metrics.add(f"{key}_ratio", ratio, "1", f"<= {MOST}", source)
         table.append([name, drive.metric, *(1e3 * values).tolist(), ratio])
     head = ["scenario", "metric", *(f"{belief} in mm" for belief in BELIEFS), "ratio"]
     caption = "Largest deviations with laws that believe these models; identified by true."
