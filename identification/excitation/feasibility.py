@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.excitation.cell import Cell
-from identification.excitation.criterion import BaseRegressorKernels
 from identification.excitation.fourier import fourier_basis
+from identification.excitation.limits import numbers
 from identification.excitation.local_search import random_motion_about
 from identification.excitation.problem import ExcitationProblem
 from identification.excitation.scene import RobotScene
@@ -41,7 +41,7 @@ def check_start_posture(
     Raises:
         InputError: If it has another shape, is outside the limits or in collision.
     """
-    q = np.asarray(posture, dtype=float)
+    q = numbers("posture", posture)
     if q.shape != (subject.dimension,) or not np.isfinite(q).all():
         raise InputError(f"posture = {q.tolist()}; must be {subject.dimension} finite numbers")
     for name, value, (lower, upper) in zip(
@@ -112,10 +112,9 @@ def check_excited(
     Raises:
         InputError: If some are not shown; it names them.
     """
-    kernels: BaseRegressorKernels = problem.kernels
     t = np.arange(_SAMPLES) * problem.period / _SAMPLES
     bases = fourier_basis(t, problem.period, problem.harmonics)
-    forward = kernels.forward.map(_SAMPLES)
+    forward = problem.kernels.forward.map(_SAMPLES)
     best, direction = -1.0, np.zeros(base.rank)
     for i in range(_MOTIONS):
         coefficients = random_motion_about(problem, np.random.default_rng(seed + i))

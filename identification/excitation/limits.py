@@ -72,7 +72,7 @@ def joint_limits(
             be unknown.
     """
     n, names = subject.dimension, subject.joint_names
-    bounds = np.asarray(subject.position_limits if position is None else position, dtype=float)
+    bounds = numbers("position limits", subject.position_limits if position is None else position)
     if bounds.shape != (n, 2):
         raise InputError(
             f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper"
@@ -84,7 +84,7 @@ def joint_limits(
     }
     values = {"position": bounds}
     for key, (given, own) in magnitudes.items():
-        array = np.asarray(own if given is None else given, dtype=float)
+        array = numbers(f"{key} limits", own if given is None else given)
         if array.shape not in ((), (1,), (n,)):
             raise InputError(f"{key} limits: shape {array.shape}; must be one number or {n}")
         values[key] = np.broadcast_to(array, n).copy()
@@ -139,11 +139,25 @@ def chosen_limits(
         if isinstance(value, Mapping):
             table = own[key].copy()
             for joint, entry in value.items():
-                table[_joint(subject, joint, f"{key} limits")] = entry
+                i, where = _joint(subject, joint, f"{key} limits"), f"{key} limit of {joint}"
+                given_entry = numbers(where, entry)
+                if given_entry.shape != table[i].shape:
+                    raise InputError(
+                        f"{where}: shape {given_entry.shape}; must be {table[i].shape}"
+                    )
+                table[i] = given_entry
             given[key] = table
         else:
             given[key] = value
     return joint_limits(subject, **given)
+
+
+def numbers(name: str, value: ArrayLike) -> np.ndarray:
+    """Return an array of what should be numbers; raises InputError that names it if it is not."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {shortened(repr(value))}; must be numbers") from None
 
 
 def _joint(subject: Subject, joint: str, where: str) -> int:

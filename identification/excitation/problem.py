@@ -14,7 +14,7 @@ from identification.excitation.clearance import (
 )
 from identification.excitation.criterion import CRITERIA, BaseRegressorKernels
 from identification.excitation.fourier import check_harmonics, check_period
-from identification.excitation.limits import JointLimits
+from identification.excitation.limits import JointLimits, numbers
 from identification.excitation.scene import RobotScene
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
@@ -95,7 +95,7 @@ def excitation_problem(
     n = subject.dimension
     weights = None
     if torque_noise is not None:
-        noise = np.asarray(torque_noise, dtype=float)
+        noise = numbers("torque_noise", torque_noise)
         if noise.shape != (n,) or not np.all((noise > 0.0) & np.isfinite(noise)):
             raise InputError(f"torque_noise = {noise.tolist()}; must be {n} positive numbers")
         weights = 1.0 / noise
@@ -133,7 +133,7 @@ def believed_parameters(subject: Subject, given: np.ndarray | None = None) -> np
     own = true_parameters(subject)
     if given is None:
         return np.nan_to_num(own)
-    believed = np.asarray(given, dtype=float)
+    believed = numbers("parameters", given)
     if believed.shape != own.shape or not np.isfinite(believed).all():
         raise InputError(
             f"parameters: shape {believed.shape}; must be {own.size} finite numbers for "

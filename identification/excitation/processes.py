@@ -1,10 +1,11 @@
 """Processes of this machine that search side by side."""
 
 import logging
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from pfsc_drake.errors import InputError
 
@@ -95,8 +96,16 @@ def _processes(workers: int | None, most: int) -> Iterator["Client"]:
             dashboard_address=f"{_LOOPBACK}:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=folder,
+            preload=[__name__],
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+def dask_setup(_worker: Any) -> None:
+    """Prepare a process before it takes tasks; called by Dask."""
+    # Ctrl-C reaches every process of the terminal; the one that leads ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from pydrake.geometry import Capsule, Cylinder, Sphere
 
-from identification.excitation.balls import cover
+from identification.excitation.balls import cover, ends
 from identification.excitation.clearance import (
     delta_posture_limits,
     serial_posture_limits,
     soft_max,
     soft_min,
 )
+from identification.model.subject import load_subject
 from pfsc_drake.robot.delta.workspace import rod_independence
 
 
@@ -53,6 +54,13 @@ def test_height_is_that_of_the_chain(limits, comau, postures, comau_cell):
     flange = p + R @ [0.0, 0.0, 0.1]
     value = limits.values(postures[:1])[0, limits.names.index("height of the flange")]
     assert value == pytest.approx(flange[2] - comau_cell.tool_above)
+
+
+def test_ends_of_a_robot_with_its_tool(comau):
+    assert list(ends(comau)) == ["flange"]
+    with_tool = ends(load_subject("comau_racer_1_4", tool=True))
+    np.testing.assert_allclose(with_tool["flange"], [0.0, 0.0, 0.1])
+    np.testing.assert_allclose(with_tool["tool point"], [0.0, 0.0, 0.22])
 
 
 def test_derivatives_exist_everywhere(limits, postures):

@@ -47,6 +47,8 @@ def test_shares(comau):
     [
         ({"speed": 1.0}, "limits: 'speed'; must be one of position, velocity"),
         ({"velocity": {"joint_9": 1.0}}, "has no joint 'joint_9'; must be one of joint_1"),
+        ({"velocity": "fast"}, "velocity limits = 'fast'; must be numbers"),
+        ({"velocity": {"joint_1": [1.0, 2.0]}}, r"velocity limit of joint_1: shape \(2,\)"),
         ({"velocity": -1.0}, "velocity limit of joint_1 = -1; must be positive"),
         ({"velocity": [1.0, 2.0]}, r"velocity limits: shape \(2,\); must be one number or 6"),
         ({"position": {"joint_2": [1.0, -1.0]}}, "joint_2 = .*lower must be below upper"),

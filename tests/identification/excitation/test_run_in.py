@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
+from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
 from identification.excitation.run_in import rest_to_rest
+from identification.model.parameters import true_parameters
 from pfsc_drake.errors import InputError
 
 
-@pytest.fixture(scope="module")
-def run(comau, printed):
+@pytest.fixture(scope="module", params=["excitation", "excitation_optimal"])
+def run(comau, request):
     limits = chosen_limits(comau)
-    return rest_to_rest(printed, limits.velocity, limits.acceleration, periods=2)
+    motion = FourierTrajectory.load(shipped_excitation(name=request.param))
+    return rest_to_rest(motion, limits.velocity, limits.acceleration, periods=2)
 
 
 def test_begins_and_ends_at_rest(run):
@@ -28,6 +31,12 @@ def test_keeps_limits_all_along(run, comau):
     assert np.all((q >= limits.position[:, 0]) & (q <= limits.position[:, 1]))
 
 
+def test_torques_of_the_ramps_are_within_the_limits(run, comau, regressor):
+    motion = run.motion(np.linspace(0.0, run.ramp, 500))
+    tau = regressor.matrix(*motion) @ true_parameters(comau)
+    assert np.all(np.abs(tau) <= comau.effort_limit)
+
+
 def test_velocities_and_accelerations_are_derivatives(run):
     t, h = np.linspace(0.01, run.duration - 0.01, 101), 1e-5
     before, after, (_, v, a) = run.motion(t - h), run.motion(t + h), run.motion(t)
@@ -35,11 +44,11 @@ def test_velocities_and_accelerations_are_derivatives(run):
     np.testing.assert_allclose((after[1] - before[1]) / (2.0 * h), a, atol=1e-6)
 
 
-def test_periods_are_those_of_the_excitation(run, printed):
+def test_periods_are_those_of_the_excitation(run):
     t = np.linspace(0.0, 20.0, 101)
     q, v, _ = run.motion(run.ramp + t)
-    np.testing.assert_allclose(q, printed.motion(t)[0], atol=1e-9)
-    np.testing.assert_allclose(v, printed.motion(t)[1], atol=1e-9)
+    np.testing.assert_allclose(q, run.trajectory.motion(t)[0], atol=1e-9)
+    np.testing.assert_allclose(v, run.trajectory.motion(t)[1], atol=1e-9)
 
 
 def test_file_for_a_controller(run, tmp_path):
