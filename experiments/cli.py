@@ -10,10 +10,9 @@ import dataclasses
 import json
 import logging
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -21,12 +20,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
-from experiments.outcomes import fail, judge_run, judge_sweep, print_run, print_sweep, show_page
+from experiments.outcomes import judge_run, judge_sweep, print_run, print_sweep
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
-from reporting.interruption import INTERRUPTED, raised_interruption
+from reporting.commands import interruptible, run_app, show_page
 from reporting.progress import ProgressDisplay
-from reporting.terminal import one_line, print_error
 
 if TYPE_CHECKING:
     from reporting.page import Report
@@ -103,7 +101,7 @@ def run_command(
 
     seconds = None if duration is None else _read_duration(duration)
     further = _read_after_fault(after_fault)
-    with _interruptible():
+    with interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / loaded.name
         logging.getLogger("drake").setLevel(logging.CRITICAL)
@@ -131,7 +129,7 @@ def compare_command(
     """Put several runs on one page."""
     from experiments.pages.compare import write_comparison
 
-    with _interruptible():
+    with interruptible():
         report = write_comparison([expand_home(run) for run in runs], expand_home(out))
         raise typer.Exit(show_page("comparison", report))
 
@@ -178,7 +176,7 @@ def sweep_command(
     from experiments.sweep.sweep import define_sweep, run_sweep
 
     seconds = None if duration is None else _read_duration(duration)
-    with _interruptible():
+    with interruptible():
         sweep = define_sweep(
             scenario,
             vary or [],
@@ -221,7 +219,7 @@ def study_command(
     }
     if name not in studies:
         raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
-    with _interruptible():
+    with interruptible():
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console = Console()
         report = studies[name](
@@ -254,7 +252,7 @@ def margins_command(
     from experiments.studies.margins.page import write_margins
     from experiments.studies.margins.table import case_table, place_table, summary
 
-    with _interruptible():
+    with interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
@@ -277,30 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit status, see the module.
     """
-    usage_error: Any = typer.BadParameter.__base__
-    try:
-        status = app(
-            args=None if arguments is None else list(arguments),
-            prog_name="python -m experiments",
-            standalone_mode=False,
-        )
-    except InputError as error:
-        return fail(str(error))
-    except usage_error as error:
-        reason = one_line(error.format_message()).rstrip(".")
-        return fail(f"{reason}; see python -m experiments --help")
-    return status if isinstance(status, int) else 0
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Ends the command with one line at Ctrl-C; up to here the process has just ended."""
-    try:
-        with raised_interruption():
-            yield
-    except KeyboardInterrupt:
-        print_error("interrupted", after_echo=True)
-        raise typer.Exit(INTERRUPTED) from None
+    return run_app(app, "python -m experiments", arguments)
 
 
 def _read_duration(text: str) -> float:

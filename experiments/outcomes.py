@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from reporting.commands import FAULT, NOT_WRITTEN, WRONG_INPUT, print_page
 from reporting.interruption import INTERRUPTED
 from reporting.terminal import print_error
 
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
     from experiments.run import RunOutcome
     from experiments.sweep.sweep import SweepOutcome
     from reporting.metrics import Metric
-    from reporting.page import Report
-
-WRONG_INPUT = 2
-FAULT = 3
-NOT_WRITTEN = 4
 
 
 def print_run(console: Console, outcome: "RunOutcome") -> None:
@@ -29,7 +25,7 @@ def print_run(console: Console, outcome: "RunOutcome") -> None:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     if outcome.margins is not None:
         console.print(f"\nmargins: {escape(outcome.margins)}", soft_wrap=True, highlight=False)
-    _print_page(console, "\nOpen the report", outcome.report)
+    print_page(console, "\nOpen the report", outcome.report)
 
 
 def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
@@ -56,7 +52,7 @@ def print_sweep(console: Console, outcome: "SweepOutcome") -> None:
         console.print(f"\n[yellow]warning:[/] {escape(warning)}", soft_wrap=True)
     for strikes, command in outcome.commands.items():
         console.print(f"\n{escape(strikes)}\n  {escape(command)}", soft_wrap=True, highlight=False)
-    _print_page(console, "\nOpen the report", outcome.report)
+    print_page(console, "\nOpen the report", outcome.report)
 
 
 def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
@@ -78,22 +74,6 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
     return status
 
 
-def show_page(what: str, report: "Report") -> int:
-    """Says where a page is, or that it could not be written; returns the exit status."""
-    _print_page(Console(), f"Open the {what}", report.path)
-    if report.problem is None:
-        return 0
-    print_error(f"error: {report.problem}")
-    return NOT_WRITTEN
-
-
-def _print_page(console: Console, invitation: str, page: Path | None) -> None:
-    """Where a page is, if there is one."""
-    if page is not None:
-        # Soft wrap: a path broken into two lines cannot be clicked.
-        console.print(f"{invitation}: [bold cyan]{escape(str(page))}[/]", soft_wrap=True)
-
-
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
     from reporting.units import format_quantity
@@ -111,9 +91,3 @@ def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
         value = format_quantity(metric.value, metric.unit)
         table.add_row(name, value, f"{target} {marks[metric.passed]}".strip())
     return table
-
-
-def fail(message: str) -> int:
-    """Reports wrong input."""
-    print_error(f"error: {message}")
-    return WRONG_INPUT

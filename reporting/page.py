@@ -20,6 +20,23 @@ MAX_CARDS = 8
 _SYMBOLS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥"}
 
 
+@dataclass(frozen=True)
+class Table:
+    """A table of a page.
+
+    Attributes:
+        title: A few words.
+        caption: What to see in it, one or two sentences.
+        head: Names of the columns.
+        rows: Their cells; those that are numbers are set as such.
+    """
+
+    title: str
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str | float]]
+
+
 @dataclass
 class Report:
     """A report as written.
@@ -62,6 +79,8 @@ def report_page(
     kind: str = "Simulation run",
     commands: Mapping[str, str] | None = None,
     cards: Sequence[str] | None = None,
+    tables: Sequence[Table] = (),
+    details: str = "Scenario as resolved",
 ) -> str:
     """Returns the page; figures and diagram are inside, only the recording is beside it.
 
@@ -80,6 +99,8 @@ def report_page(
         kind: What the page is about, above its title.
         commands: Command lines worth repeating, by what they are good for.
         cards: Names of the metrics that become cards, instead.
+        tables: In reading order, after the figures.
+        details: What ``scenario_yaml_text`` is.
     """
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         kind=escape(kind),
@@ -91,9 +112,10 @@ def report_page(
         cards=_cards(metrics, cards),
         recording=_recording(recording),
         figures=_section("Figures", "\n".join(_figure(figure) for figure in figures)),
+        tables=_section("Tables", "\n".join(_data_table(table) for table in tables)),
         commands=_commands(commands or {}),
         table=_table(metrics),
-        details=_details(scenario_yaml_text, diagram_svg),
+        details=_details(details, scenario_yaml_text, diagram_svg),
         attributes="\n".join(
             f"<div><dt>{escape(_spoken(name))}</dt><dd>{escape(value)}</dd></div>"
             for name, value in log_attributes.items()
@@ -213,12 +235,26 @@ def _recording(recording: str | None) -> str:
     )
 
 
-def _details(scenario_yaml_text: str, diagram_svg: str | None) -> str:
+def _data_table(table: Table) -> str:
+    """A table with its caption."""
+
+    def cell(value: str | float) -> str:
+        if isinstance(value, str):
+            return f"<td>{escape(value)}</td>"
+        return f'<td class="number">{value:.4g}</td>'
+
+    head = "".join(f"<th>{escape(name)}</th>" for name in table.head)
+    rows = "\n".join(f"<tr>{''.join(map(cell, row))}</tr>" for row in table.rows)
+    return (
+        f'<figure><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}\n'
+        f"</tbody></table></div><figcaption><strong>{escape(table.title)}.</strong> "
+        f"{escape(table.caption)}</figcaption></figure>"
+    )
+
+
+def _details(summary: str, text: str, diagram_svg: str | None) -> str:
     """What was run in full: scenario and block diagram, folded."""
-    blocks = [
-        f"<details><summary>Scenario as resolved</summary><pre>{escape(scenario_yaml_text)}</pre>"
-        "</details>"
-    ]
+    blocks = [f"<details><summary>{escape(summary)}</summary><pre>{escape(text)}</pre></details>"]
     if diagram_svg:
         # As an image nothing inside the SVG can act on the page.
         encoded = base64.b64encode(diagram_svg.encode("utf-8")).decode("ascii")

@@ -44,7 +44,7 @@ def inconsistencies(subject: Subject, parameters: np.ndarray) -> list[str]:
     parameters = layout.check("parameters", parameters)
     found = []
     for i, rows in enumerate(layout.links):
-        found += [f"{layout.link_name(i)}: {reason}" for reason in _of_link(parameters[rows])]
+        found += [f"{layout.link_name(i)}: {reason}" for reason in link_faults(parameters[rows])]
     for rows, what in ((layout.rotors, "rotor inertia"), (layout.friction, "friction")):
         found += [
             f"{layout.names[row]} = {parameters[row]:.6g}: negative {what}"
@@ -142,13 +142,26 @@ def _worst(
     return LeastEigenvalue(float(eigenvalues[worst]), q[worst])
 
 
-def _of_link(parameters: np.ndarray) -> list[str]:
+def central_inertia(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return mass [kg], centre of mass [m] (3,) and inertia about that [kg m^2] (3, 3).
+
+    Args:
+        parameters: The ten of one link, with a mass, shape (10,).
+    """
     mass, moment, inertia = link_moments(parameters)
-    if mass <= 0.0:
-        return [f"mass {mass:.6g} kg; must be positive"]
     center = moment / mass
-    central = inertia - mass * (center @ center * np.eye(3) - np.outer(center, center))
-    low, middle, high = np.linalg.eigvalsh(central)
+    return mass, center, inertia - mass * (center @ center * np.eye(3) - np.outer(center, center))
+
+
+def link_faults(parameters: np.ndarray) -> list[str]:
+    """Return what is not physical about a link, in words; nothing if it is.
+
+    Args:
+        parameters: Its ten, shape (10,).
+    """
+    if parameters[0] <= 0.0:
+        return [f"mass {parameters[0]:.6g} kg; must be positive"]
+    low, middle, high = np.linalg.eigvalsh(central_inertia(parameters)[2])
     shown = f"principal moments of inertia [{low:.4g}, {middle:.4g}, {high:.4g}] kg m^2"
     slack = _ROUNDING * abs(np.trace(pseudo_inertia(parameters)[:3, :3]))
     if low < -slack:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.consistency.check import layout_of
+from identification.consistency.check import central_inertia, layout_of
 from identification.consistency.layout import Layout
 from identification.model.analytic_base import moved
-from identification.model.parameters import link_moments, link_parameters
+from identification.model.parameters import link_parameters
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.parameters import DeltaParameters
@@ -129,11 +129,9 @@ def flange(chain: SerialChain, tool: ToolParameters) -> tuple[np.ndarray, np.nda
 
 
 def _body(name: str, parameters: np.ndarray) -> BodyParameters:
-    mass, moment, inertia = link_moments(parameters)
-    if mass <= 0.0:
-        raise InputError(f"{name}: mass {mass:.6g} kg without the tool; must be positive")
-    center = moment / mass
-    I_C = inertia - mass * (center @ center * np.eye(3) - np.outer(center, center))
+    if parameters[0] <= 0.0:
+        raise InputError(f"{name}: mass {parameters[0]:.6g} kg without the tool; must be positive")
+    mass, center, I_C = central_inertia(parameters)
     rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
     try:
         return BodyParameters(name, float(mass), center, I_C[rows, columns], SOURCE)

@@ -27,6 +27,8 @@ from pfsc_drake.errors import InputError
 
 # of the distance from the prior, in units of squared standard deviations
 PRIOR_WEIGHT = 0.1
+# no combination of parameters counts as known better than to this part of the prior's size
+_MOST_CERTAIN = 1e5
 _TERMS = np.array(linear_terms())
 
 
@@ -51,7 +53,8 @@ def least_squares(
     :mod:`~identification.consistency.pseudo_inertia`. The prior decides on what the torques do not
     depend on, whatever its weight. With ``P_0 = L L'`` the unknown of each link is
     ``L^-1 P L^-T``, of the order of one; and all are counted from a set that fits the
-    measurements without being consistent, so that the cost is of the order of chi squared.
+    measurements without being consistent, so that the cost is of the order of chi squared. What is
+    known to better than 1e-5 of that unit counts as known to 1e-5.
 
     Args:
         A: Weighted so that b has the unit matrix for its covariance, shape (k, n).
@@ -64,29 +67,30 @@ def least_squares(
 
     Raises:
         InputError: If the bounds contradict each other (names the link) or are of another robot,
-            the prior is of no robot, the weight is negative or no solution is found.
+            the prior is of no robot, the weight is not positive or no solution is found.
     """
-    if not 0.0 <= prior_weight < np.inf:
-        raise InputError(f"prior_weight = {prior_weight!r}; must be finite and not negative")
+    if not 0.0 < prior_weight < np.inf:
+        raise InputError(f"prior_weight = {prior_weight!r}; must be finite and positive")
     layout = Layout.of(names)
     check_bounds(layout, bounds)
     rho_0 = prior_from_bounds(names, bounds) if prior is None else check_prior(names, prior)
     S = _units(layout, rho_0, A)
     start = np.linalg.solve(S, np.where(np.isfinite(rho_0), rho_0, 0.0))
-    start += np.linalg.lstsq(A @ S, b - A @ S @ start, rcond=None)[0]
+    known, values = _reduced(A @ S, b)
+    weak, middle = _prior_rows(layout, rho_0)
+    weight = np.sqrt(prior_weight)
+    start += np.linalg.lstsq(known, values - known @ start, rcond=None)[0]
+    rows = np.vstack([known, weight * weak])
+    offset = rows @ start - np.concatenate([values, weight * middle])
     program = MathematicalProgram()
     z = program.NewContinuousVariables(layout.size, "z")
-    program.Add2NormSquaredCost(A @ S, b - A @ S @ start, z)
+    triangle = np.asarray(np.linalg.qr(np.column_stack([rows, offset]), mode="r"))
+    # the length itself, since its square is worse conditioned
+    program.AddL2NormCostUsingConicConstraint(triangle[:, :-1], triangle[:, -1], z)
     _add(program, other_intervals(layout, bounds), S, start, z)
-    for rows, link in zip(layout.links, bounds.links, strict=True):
-        _add_link(program, link, S[np.ix_(rows, rows)], start[rows], z[rows])
-        if prior_weight > 0.0:
-            _add_distance(program, start[rows], z[rows], prior_weight)
-    for row in layout.rotors:
-        if prior_weight > 0.0 and np.isfinite(rho_0[row]):
-            # in units of the prior
-            w = np.sqrt(prior_weight)
-            program.Add2NormSquaredCost(np.array([[w]]), np.array([w - w * start[row]]), z[[row]])
+    for link_rows, link in zip(layout.links, bounds.links, strict=True):
+        block = S[np.ix_(link_rows, link_rows)]
+        _add_link(program, link, block, start[link_rows], z[link_rows])
     result = ClarabelSolver().Solve(program)
     if not result.is_success():
         _explain(result.get_solution_result().name, layout, bounds)
@@ -94,6 +98,28 @@ def least_squares(
     not_negative = np.concatenate([layout.rotors, layout.friction])
     parameters[not_negative] = np.maximum(parameters[not_negative], 0.0)
     return np.asarray(parameters)
+
+
+def _reduced(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return as few rows with the same squares but for a constant, none too certain."""
+    U, sizes, Vt = np.linalg.svd(A, full_matrices=False)
+    certain = np.minimum(sizes, _MOST_CERTAIN)
+    share = np.divide(certain, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+    return certain[:, None] * Vt, share * (U.T @ b)
+
+
+def _prior_rows(layout: Layout, rho_0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and right side of the distance from the prior, in units of the prior."""
+    rows, right = [], []
+    for link in layout.links:
+        block = np.zeros((SIZE**2, layout.size))
+        block[:, link] = np.sqrt(0.5) * _TERMS.reshape(PER_LINK, -1).T
+        rows.append(block)
+        right.append(np.sqrt(0.5) * np.eye(SIZE).ravel())
+    for row in layout.rotors[np.isfinite(rho_0[layout.rotors])]:
+        rows.append(np.eye(1, layout.size, row))
+        right.append(np.ones(1))
+    return np.vstack([np.zeros((0, layout.size)), *rows]), np.concatenate([np.zeros(0), *right])
 
 
 def _units(layout: Layout, rho_0: np.ndarray, A: np.ndarray) -> np.ndarray:
@@ -138,14 +164,6 @@ def _add_link(
     terms = inverse @ np.tensordot(S.T, extended(link), 1) @ inverse.T
     terms = 0.5 * (terms + terms.transpose(0, 2, 1))
     program.AddLinearMatrixInequalityConstraint([np.tensordot(start, terms, 1), *terms], z)
-
-
-def _add_distance(
-    program: MathematicalProgram, start: np.ndarray, z: np.ndarray, weight: float
-) -> None:
-    """Add that from the prior, whose pseudo-inertia is the unit matrix in the unknowns."""
-    rows = np.sqrt(0.5 * weight) * _TERMS.reshape(PER_LINK, -1).T
-    program.Add2NormSquaredCost(rows, rows @ (_identity() - start), z)
 
 
 def _identity() -> np.ndarray:

@@ -5,9 +5,9 @@ import xml.etree.ElementTree as ET
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from identification.consistency.check import layout_of
+from identification.consistency.check import central_inertia, layout_of
 from identification.consistency.parameter_files import flange, links_without_tool
-from identification.model.parameters import link_moments, link_parameters
+from identification.model.parameters import link_parameters
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.visuals import format_numbers
@@ -120,9 +120,7 @@ def _moving_joint(model: ET.Element, link: ChainLink, acceleration_limit: float)
 
 def _body(model: ET.Element, name: str, parameters: np.ndarray) -> None:
     """Add a link with the inertia about its centre of mass."""
-    mass, moment, inertia = link_moments(parameters)
-    center = moment / mass
-    I_C = inertia - mass * (center @ center * np.eye(3) - np.outer(center, center))
+    mass, center, I_C = central_inertia(parameters)
     inertial = ET.SubElement(ET.SubElement(model, "link", name=name), "inertial")
     _place(inertial, RigidTransform(center))
     _numbers(inertial, "mass", value=mass)

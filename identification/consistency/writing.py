@@ -9,6 +9,7 @@ from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.robots.model import locate_model
 from identification.consistency.check import require_consistent
+from identification.consistency.model_edits import edited_model
 from identification.consistency.parameter_files import identified_delta, identified_robot
 from identification.consistency.urdf import urdf_text
 from identification.excitation.fourier import write_text
@@ -29,18 +30,22 @@ class WrittenModel:
         parameters: The parameter file, for ``controller.model``, for
             ``controller.friction.believed.file`` and of a DELTA robot for ``robot.model``; None
             for robots that were read from a bare model.
-        models: SDF files, one for each variant of the parameter file.
+        models: SDF files, one for each variant of the parameter file; of another robot its own
+            model file with identified inertias.
         urdf: The robot with rigid joints; None for DELTA robots.
+        notes: What could not be written and why, one sentence each.
     """
 
     parameters: Path | None
     models: Sequence[Path]
     urdf: Path | None
+    notes: Sequence[str] = ()
 
     @property
     def files(self) -> list[Path]:
         """All of them."""
-        return [file for file in (self.parameters, *self.models, self.urdf) if file is not None]
+        files = (self.parameters, *self.models, self.urdf)
+        return list(dict.fromkeys(file for file in files if file is not None))
 
 
 def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) -> WrittenModel:
@@ -69,10 +74,8 @@ def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) ->
     if subject.delta is not None:
         write_text(file, _commented(yaml_dump_typed(identified_delta(subject, parameters))))
         return WrittenModel(file, [], None)
-    urdf = folder / f"{subject.name}.urdf"
     if subject.parameters is None:
-        write_text(urdf, urdf_text(subject, parameters))
-        return WrittenModel(None, [], urdf)
+        return _write_own(subject, parameters, folder)
     robot = identified_robot(subject, parameters)
     urdf = folder / f"{robot.name}.urdf"
     write_text(file, _commented(yaml_dump_typed(robot)))
@@ -82,6 +85,24 @@ def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) ->
         write_text(models[-1], write_sdf(robot, variant, appearance))
     write_text(urdf, urdf_text(subject, parameters))
     return WrittenModel(file, models, urdf)
+
+
+def _write_own(subject: Subject, parameters: np.ndarray, folder: Path) -> WrittenModel:
+    """Write a robot without parameter file."""
+    assert subject.block is not None
+    own = locate_model(subject.block, subject.folder)
+    model, urdf = folder / own.name, folder / f"{own.stem}.urdf"
+    if model.resolve() == own.resolve():
+        raise InputError(f"{folder}: holds the robot's own model {own.name}; must be another one")
+    try:
+        text = edited_model(subject, parameters)
+    except InputError as error:
+        write_text(urdf, urdf_text(subject, parameters))
+        return WrittenModel(None, [], urdf, [f"links and joints alone are written: {error}"])
+    write_text(model, text)
+    if model != urdf:
+        write_text(urdf, urdf_text(subject, parameters))
+    return WrittenModel(None, [model], urdf)
 
 
 def _appearance(subject: Subject) -> Appearance:

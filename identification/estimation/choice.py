@@ -26,6 +26,7 @@ from identification.estimation.friction import (
     FrictionModel,
     FrictionTerm,
 )
+from identification.estimation.identifiability import factorize
 from identification.estimation.information import (
     SLOW,
     Information,
@@ -102,16 +103,19 @@ def choose_friction(
         regressor: Of the robot, with friction.
         base: Its base parameters.
         motion: That parameters are estimated on.
-        other: That they are judged on, another trajectory.
-        kinds: Candidates for each joint.
+        other: That they are judged on, another trajectory; need not excite all parameters.
+        kinds: Candidates for each joint, at least one.
         slow: Part of a joint's largest velocity below which its torques do not count.
         progress: Told the fraction done and what is done.
 
     Raises:
-        InputError: If the regressor is without friction, a kind is unknown, or a motion does not
-            fit the robot or is not exciting enough.
+        InputError: If the regressor is without friction, there is no kind or an unknown one, a
+            motion does not fit the robot, a joint stands still in one of them, or the first one
+            does not excite all parameters.
     """
     subject = regressor.subject
+    if not kinds:
+        raise InputError(f"friction: no kind to choose from; allowed: {', '.join(KINDS)}")
     if not regressor.friction:
         raise InputError(
             f"{subject.name}: regressor without friction; one with Coulomb and viscous friction is "
@@ -122,10 +126,10 @@ def choose_friction(
         if system.still.any():
             joint = subject.joint_names[int(np.argmax(system.still))]
             raise InputError(f"{subject.name}: {joint} stands still in the {what}; all must move")
-    joints = range(subject.dimension)
+    factorize(*systems[0].weighted(), base.short_names, subject.name)
     candidates = [
         FrictionTerm(joint, kind, 1.0 if kind in KINDS_WITH_WIDTH else None)
-        for joint in joints
+        for joint in range(subject.dimension)
         for kind in kinds
     ]
     search = _Search(_Data(systems[0], motion.v), _Data(systems[1], other.v), candidates)
@@ -172,9 +176,7 @@ class _Search:
         self._normal, self._right = training.X.T @ training.X, training.X.T @ training.b
         self._square = float(training.b @ training.b)
         self._fastest = np.abs(training.v).max(axis=0)
-        self.threshold = float(
-            student.ppf(1.0 - _ERROR / max(len(self._candidates), 1), _SECTIONS - 1)
-        )
+        self.threshold = float(student.ppf(1.0 - _ERROR / len(self._candidates), _SECTIONS - 1))
         self._own = [self._friction_columns(j) for j in range(training.v.shape[1])]
         self._friction = self._friction_square()
         self._adaptable = [

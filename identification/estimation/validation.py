@@ -133,7 +133,7 @@ class TruthTest:
     """Errors of an estimate beside the covariance that was predicted for them.
 
     Attributes:
-        names: Of the n_b parameters.
+        names: Of the n_b parameters that count.
         errors: Estimate less truth, SI units, shape (n_b,).
         standard_errors: In units of their standard deviations, shape (n_b,).
         chi_squared: ``e' C^-1 e``.
@@ -157,24 +157,28 @@ class TruthTest:
         return self.p_value > level
 
 
-def compare_with_truth(estimate: Estimate, truth: np.ndarray) -> TruthTest:
+def compare_with_truth(estimate: Estimate, truth: np.ndarray, friction: bool = True) -> TruthTest:
     """Compare an estimate with the true parameters.
 
     Args:
         estimate: With covariance.
         truth: True base parameters, ``estimate.base.values(parameters)``, shape (n_b,).
+        friction: Whether parameters of friction count, which may be others in each run
+            while those of the bodies stay.
 
     Raises:
         InputError: If the truth has another size or is not known.
     """
-    errors = estimate.base_parameters - checked_truth(estimate, truth)
-    value = mahalanobis(errors, estimate.covariance)
+    names = estimate.short_names
+    counts = [i for i, name in enumerate(names) if friction or ".f_" not in name]
+    errors = (estimate.base_parameters - checked_truth(estimate, truth))[counts]
+    value = mahalanobis(errors, estimate.covariance[np.ix_(counts, counts)])
     size = len(errors)
     below = float(chi2.cdf(value, size))
     return TruthTest(
-        estimate.short_names,
+        [names[i] for i in counts],
         errors,
-        errors / estimate.standard_deviation,
+        errors / estimate.standard_deviation[counts],
         value,
         size,
         2.0 * min(below, float(chi2.sf(value, size))),

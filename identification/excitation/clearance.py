@@ -75,7 +75,9 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
     lower, upper = np.clip(subject.position_limits, -_FULL_TURN, _FULL_TURN).T
     postures = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, chain.dimension))
     sampled = balls.sample(postures)
-    near = [(o, _near_obstacle(o, balls, scene, sampled, cell.clearance)) for o in cell.obstacles]
+    obstacles = cell.obstacles if balls.radii.size else []
+    near = [(o, _near_obstacle(o, balls, scene, sampled, cell.clearance)) for o in obstacles]
+    near = [(obstacle, numbers) for obstacle, numbers in near if numbers]
     pairs = _near_each_other(balls, scene, sampled, cell.clearance)
     used = {*(n for _, numbers in near for n in numbers), *(n for p in pairs for n in p)}
     q = ca.SX.sym("q", chain.dimension)

@@ -20,6 +20,7 @@ _MOST_ROUNDS = 8
 _START_SHARE = 0.7  # of the joint limits that a random motion takes
 _START_OFFSET = 0.4  # of the reach, largest distance of its middle from that of the limits
 _POSTURES = 500
+_MOST_TRIALS = 4
 _FROM_NEAR = 0.4  # part of the way to a random motion
 # what may be missing of limits, relative, before an instant is added
 _ENOUGH = 1e-3
@@ -76,14 +77,20 @@ class LocalSearch:
 
         Args:
             seed: Of the random motion.
-            iterations: At most so many of the solver, in all.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
             posture: That the random motion is about [rad or m], shape (N,); or random, too.
             near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
         """
-        start = random_motion_about(self.problem, np.random.default_rng(seed), posture)
-        if near is not None:
-            start = near + _FROM_NEAR * (start - near)
-        return self.improve(start, seed, iterations)
+        random = np.random.default_rng(seed)
+        for _ in range(_MOST_TRIALS):
+            start = random_motion_about(self.problem, random, posture)
+            if near is not None:
+                start = near + _FROM_NEAR * (start - near)
+            optimum = self.improve(start, seed, iterations)
+            # now and then the way to allowed postures ends with a joint at rest
+            if np.isfinite(optimum.value):
+                break
+        return optimum
 
     def improve(self, coefficients: np.ndarray, seed: int, iterations: int) -> LocalOptimum:
         """Return the optimum next to a motion.
@@ -91,7 +98,7 @@ class LocalSearch:
         Args:
             coefficients: Of the motion, shape (N, 2M + 1).
             seed: That it has come from.
-            iterations: At most so many of the solver, in all.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
         """
         problem = self.problem
         joint_times = _instants(problem, _COARSE_JOINTS)

@@ -101,7 +101,7 @@ def excitation_problem(
         weights = 1.0 / noise
     smooth = Regressor(subject, sign_width=_SIGN_WIDTH * float(limits.velocity.max()))
     base = base_parameters(Regressor(subject))
-    believed = believed_parameters(subject) if parameters is None else np.asarray(parameters)
+    believed = believed_parameters(subject, parameters)
     q, v, a = (ca.SX.sym(name, n) for name in "qva")
     tau = ca.densify(smooth.function(q, v, a) @ ca.DM(believed))
     posture: PostureLimits | None = None
@@ -120,9 +120,26 @@ def excitation_problem(
     )
 
 
-def believed_parameters(subject: Subject) -> np.ndarray:
-    """Return what the model says of the parameters, shape (n,); friction is 0 where unknown."""
-    return np.nan_to_num(true_parameters(subject))
+def believed_parameters(subject: Subject, given: np.ndarray | None = None) -> np.ndarray:
+    """Return parameters to predict torques with, shape (n,).
+
+    Args:
+        subject: The robot.
+        given: Those, shape (n,); by default what the model says, with no friction where unknown.
+
+    Raises:
+        InputError: If they are too few or too many, or not finite.
+    """
+    own = true_parameters(subject)
+    if given is None:
+        return np.nan_to_num(own)
+    believed = np.asarray(given, dtype=float)
+    if believed.shape != own.shape or not np.isfinite(believed).all():
+        raise InputError(
+            f"parameters: shape {believed.shape}; must be {own.size} finite numbers for "
+            f"{subject.name}"
+        )
+    return believed
 
 
 def tightened(

@@ -64,10 +64,11 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
         def run(
             function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
         ) -> Iterator[Result]:
-            shared = client.scatter(common, broadcast=True)
+            # of its own name: what is common to two batches is gone with the first one
+            shared = client.scatter(common, broadcast=True, hash=False)
             futures = [client.submit(function, shared, task, pure=False) for task in tasks]
-            for _, result in as_completed(futures, loop=client.loop, with_results=True):
-                yield result
+            for future in as_completed(futures, loop=client.loop):
+                yield future.result()
 
         yield run
 

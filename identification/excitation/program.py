@@ -46,6 +46,11 @@ class ExcitationProgram:
     Args:
         problem: Of the robot.
         samples: Of the criterion per period.
+
+    Attributes:
+        problem: Of the robot.
+        cost: To be as small as possible.
+        constraints: Beside those of positions, velocities and accelerations.
     """
 
     def __init__(self, problem: ExcitationProblem, samples: int) -> None:
@@ -57,7 +62,7 @@ class ExcitationProgram:
         # of order one for the solver: positions by their range, the rest by the velocities
         self._scale = np.repeat(limits.velocity[:, None], problem.shape[1], axis=1)
         self._scale[:, 0] = limits.reach
-        self._constraints = _nonlinear_constraints(problem)
+        self.constraints = _nonlinear_constraints(problem)
 
     def solve(
         self,
@@ -78,7 +83,7 @@ class ExcitationProgram:
         x = program.NewContinuousVariables(coefficients.size, "c")
         program.AddCost(self._evaluate_cost, vars=x)
         self._add_joint_limits(program, x.reshape(coefficients.shape), joint_times)
-        for constraint in self._constraints:
+        for constraint in self.constraints:
             evaluate = constraint.at(self.problem, posture_times, self._scale)
             count = constraint.size * len(posture_times)
             lower = np.full(count, constraint.lower)
@@ -120,7 +125,7 @@ class ExcitationProgram:
 
 
 @dataclass(frozen=True, eq=False)
-class _Constraint:
+class MotionConstraint:
     """Bounds of a function of the motion at one instant.
 
     Attributes:
@@ -139,7 +144,16 @@ class _Constraint:
     upper: float
 
     def at(self, problem: ExcitationProblem, times: np.ndarray, scale: np.ndarray) -> Evaluated:
-        """Return the function of the scaled coefficients that a solver evaluates."""
+        """Return the function of the scaled coefficients that a solver evaluates.
+
+        Args:
+            problem: Of the robot.
+            times: When it is to hold [s], shape (K,).
+            scale: Of the coefficients, shape (N, 2M + 1).
+
+        Returns:
+            Function of what a solver varies, shape (N * (2M + 1),), to values, shape (K * size,).
+        """
         bases = np.array(fourier_basis(times, problem.period, problem.harmonics))[self.orders]
         sampled = SampledFunction(self.function, len(times))
         shape = (len(times), len(bases), problem.dimension, self.size)
@@ -155,7 +169,7 @@ class _Constraint:
         return evaluate
 
 
-def _nonlinear_constraints(problem: ExcitationProblem) -> list[_Constraint]:
+def _nonlinear_constraints(problem: ExcitationProblem) -> list[MotionConstraint]:
     q, v, a = motion = [ca.SX.sym(name, problem.dimension) for name in "qva"]
     constraints = []
     known = np.flatnonzero(np.isfinite(problem.limits.effort))
@@ -163,12 +177,12 @@ def _nonlinear_constraints(problem: ExcitationProblem) -> list[_Constraint]:
         effort = problem.limits.effort[known]
         share = problem.torque(q, v, a)[known.tolist()] / effort
         function = _with_derivatives(motion, share)
-        constraints.append(_Constraint(function, [0, 1, 2], known.size, -1.0, 1.0))
+        constraints.append(MotionConstraint(function, [0, 1, 2], known.size, -1.0, 1.0))
     if problem.posture is not None:
         # one by one, each is short enough for machine code
         for value in ca.vertsplit(problem.posture.function(q)):
             function = _with_derivatives([q], value)
-            constraints.append(_Constraint(function, [0], 1, 0.0, np.inf))
+            constraints.append(MotionConstraint(function, [0], 1, 0.0, np.inf))
     return constraints
 
 

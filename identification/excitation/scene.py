@@ -5,6 +5,7 @@ as their convex hulls.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import (
@@ -24,7 +25,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.model import locate_model
-from identification.excitation.cell import Cell, Obstacle
+from identification.excitation.cell import Cell, Obstacle, load_cell
 from identification.model.subject import Subject, tool_frame_of
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.reading import read_model
@@ -237,6 +238,21 @@ class RobotScene:
         q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, self._dimension))
         touching = np.all(self.distances(q) < clearance, axis=0)
         self.pairs = [p for p, joined in zip(self.pairs, touching, strict=True) if not joined]
+
+
+def cell_of(subject: Subject, cell: Cell | str | Path | None) -> Cell:
+    """Return the cell of a robot.
+
+    Args:
+        subject: The robot.
+        cell: One, or its file; None for the one shipped with the robot's model, or an empty one.
+
+    Raises:
+        InputError: If the file cannot be read or does not fit; one line that names it.
+    """
+    if isinstance(cell, Cell):
+        return cell
+    return load_cell(cell, subject.name if subject.block is None else subject.block.model)
 
 
 def obstacle_shape(obstacle: Obstacle) -> tuple[RigidTransform, Shape]:

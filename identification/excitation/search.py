@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.excitation.cell import Cell, load_cell
+from identification.excitation.cell import Cell
 from identification.excitation.criterion import Information, information
 from identification.excitation.feasibility import (
     check_excited,
@@ -25,7 +25,7 @@ from identification.excitation.problem import (
     tightened,
 )
 from identification.excitation.processes import side_by_side
-from identification.excitation.scene import RobotScene
+from identification.excitation.scene import RobotScene, cell_of
 from identification.excitation.verification import Verification, verify
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
@@ -110,7 +110,7 @@ def search(
         parameters: Believed ones, for the torques, shape (n,); those of the model by default.
         torque_noise: Standard deviations of the measured torques, which weight the rows of the
             regressor, shape (N,) [Nm or N]; all one by default.
-        iterations: Of the solver, at most about so many per start.
+        iterations: Of the solver per start, at most; a quarter of them whenever it goes on.
         workers: Number of processes; one for each core by default, 1 for no others than this.
         progress: Told the fraction done and the best figure so far.
 
@@ -125,8 +125,7 @@ def search(
     tell(0.0, "preparing the search")
     joints = chosen_limits(subject, limits)
     is_serial = subject.chain is not None and subject.block is not None
-    if not isinstance(cell, Cell):
-        cell = load_cell(cell, subject.name)
+    cell = cell_of(subject, cell)
     scene = RobotScene(subject, cell) if is_serial else None
     problem = excitation_problem(
         subject,
@@ -141,7 +140,7 @@ def search(
     )
     regressor = Regressor(subject)
     base = base_parameters(regressor)
-    believed = believed_parameters(subject) if parameters is None else np.asarray(parameters)
+    believed = believed_parameters(subject, parameters)
     about = None
     if posture is not None:
         about = check_start_posture(subject, problem, posture, cell, scene)
@@ -172,7 +171,7 @@ def search(
         verification,
         [_figure(criterion, optimum.value) for optimum in found],
         time.perf_counter() - begin,
-        [] if scene is None else list(scene.warnings),
+        _unchecked(subject, cell, scene),
     )
 
 
@@ -195,6 +194,14 @@ class _Start:
 
 def _search_from(problem: ExcitationProblem, start: _Start) -> LocalOptimum:
     return LocalSearch(problem).run(start.seed, start.iterations, start.posture, start.near)
+
+
+def _unchecked(subject: Subject, cell: Cell, scene: RobotScene | None) -> list[str]:
+    """Return what was not checked, one sentence each."""
+    if scene is None:
+        return []
+    none = f"{subject.name}: no obstacles are known; links are checked against each other alone"
+    return scene.warnings or ([] if cell.obstacles else [none])
 
 
 def _rank(optimum: LocalOptimum) -> tuple[bool, float, int]:

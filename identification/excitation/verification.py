@@ -7,6 +7,7 @@ the model with the sign of the velocities itself. Distances are those of Drake's
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -14,10 +15,13 @@ from identification.excitation.balls import ends, points_of_last_link
 from identification.excitation.cell import Cell
 from identification.excitation.clearance import delta_posture_limits, height_of
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import JointLimits, used_shares
-from identification.excitation.scene import RobotScene
+from identification.excitation.limits import Given, JointLimits, chosen_limits, used_shares
+from identification.excitation.problem import believed_parameters
+from identification.excitation.scene import RobotScene, cell_of
 from identification.excitation.swept_clearance import SweptClearance, swept_clearance
 from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
 
 _INSTANTS = 10_000  # per period
 # what counts as the limit, relative to it
@@ -96,7 +100,7 @@ def verify(
         workspace = delta_posture_limits(subject.delta)
         least = workspace.values(motion[0]).min(axis=0)
         margins = dict(zip(workspace.names, least.tolist(), strict=True))
-    elif cell is not None and subject.chain is not None:
+    elif cell is not None and subject.chain is not None and subject.block is not None:
         scene = scene or RobotScene(subject, cell)
         if np.isfinite(cell.tool_above):
             tips = ends(subject)
@@ -115,6 +119,32 @@ def verify(
         if margin < -_ROUNDING
     ]
     return Verification(shares, margins, clearance, asked, problems)
+
+
+def verify_excitation(
+    subject: Subject,
+    trajectory: FourierTrajectory,
+    limits: JointLimits | Mapping[str, Given] | None = None,
+    cell: Cell | str | Path | None = None,
+) -> Verification:
+    """Return how much of a robot's limits a motion takes.
+
+    Args:
+        subject: The robot.
+        trajectory: The motion.
+        limits: Of the joints where not those of the model, see
+            :func:`~identification.excitation.limits.chosen_limits`.
+        cell: What stands around a serial robot; None for what is shipped with it.
+
+    Raises:
+        InputError: If the motion has too few or too many joints, or a limit is out of range.
+    """
+    if trajectory.dimension != subject.dimension:
+        raise InputError(
+            f"excitation: of {trajectory.dimension} joints; {subject.name} has {subject.dimension}"
+        )
+    joints, around = chosen_limits(subject, limits), cell_of(subject, cell)
+    return verify(Regressor(subject), believed_parameters(subject), joints, trajectory, around)
 
 
 def _between_samples(trajectory: FourierTrajectory, step: float) -> np.ndarray:

@@ -28,7 +28,7 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
         ]
     if not edits:
         return None
-    edits += _absolute_names(model)
+    edits += absolute_names(model)
     content = model.content
     for element, text in sorted(edits, key=lambda edit: -edit[0].start):
         # as many line breaks as before, so that messages name the right line
@@ -60,7 +60,12 @@ def _look(material: Element) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _absolute_names(model: ModelXml) -> Iterator[tuple[Element, str]]:
+def absolute_names(model: ModelXml) -> Iterator[tuple[Element, str]]:
+    """Yield elements with relative file names, and what they are with absolute ones.
+
+    Args:
+        model: The model.
+    """
     folder = model.file.parent
     for element in model.root.within():
         address = element.attributes.get("filename", "")

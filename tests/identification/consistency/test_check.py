@@ -82,3 +82,11 @@ def test_mass_matrix_of_the_table_is_not(comau_regressor, comau_base):
     parameters = np.zeros(78)
     parameters[comau_base.indices] = load_printed_identification().base_parameters.mean
     assert least_eigenvalue(comau_regressor, parameters).value < -0.01
+
+
+def test_delta_robot_within_its_stroke(delta):
+    """Its mass matrix is between those of slides alone and of all masses on them."""
+    least = least_eigenvalue(Regressor(delta), true_parameters(delta))
+    assert least.value >= delta.delta.parameters.masses.effective_slide
+    lower, upper = delta.position_limits.T
+    assert np.all((lower <= least.q) & (least.q <= upper))

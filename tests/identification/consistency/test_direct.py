@@ -67,7 +67,7 @@ def test_is_the_better_estimate_of_a_consistent_robot(
         link.least_extent *= 0.5
     motion = measured(comau_regressor, 10.0 * NOISE)
     free = estimate(comau_regressor, comau_base, motion, white=True)
-    found = estimate_consistent(free, comau_bounds, prior_weight=0.0)
+    found = estimate_consistent(free, comau_bounds, prior_weight=1e-6)
     assert inconsistencies(comau, found.parameters) == []
     truth = comau_base.values(true_parameters(comau))
     errors = found.base_values - truth, free.base_parameters - truth
@@ -79,10 +79,10 @@ def test_is_the_better_estimate_of_a_consistent_robot(
 
 def test_the_nearest_on_a_line(comau_estimate, comau_bounds, comau):
     """Along a line from the set to another consistent one the cost only grows."""
-    found = estimate_consistent(comau_estimate, comau_bounds, prior_weight=0.0)
+    found = estimate_consistent(comau_estimate, comau_bounds, prior_weight=1e-6)
     for link in comau_bounds.links:
         link.least_extent *= 2.0
-    other = estimate_consistent(comau_estimate, comau_bounds, prior_weight=0.0)
+    other = estimate_consistent(comau_estimate, comau_bounds, prior_weight=1e-6)
     system = comau_estimate.system
 
     def cost(share):

@@ -55,7 +55,7 @@ def test_infimum_of_the_table(comau_base, comau_bounds, printed):
         link.center_of_mass.lower[:], link.center_of_mass.upper[:] = -1.0, 1.0
     comau_bounds.rotor_inertia.clear()
     found = nearest_consistent(
-        comau_base, printed.mean, np.diag(printed.standard_deviation**2), comau_bounds, None, 0.0
+        comau_base, printed.mean, np.diag(printed.standard_deviation**2), comau_bounds, None, 1e-6
     )
     assert found.chi_squared == pytest.approx(1228.4, abs=0.5)
 
@@ -115,7 +115,7 @@ def test_bad_input(comau_base, comau_bounds, printed, delta):
     lost = np.where(np.arange(52) == 29, np.nan, mean)
     refused("base parameters: link_6.Izz is nan", comau_base, lost, C, comau_bounds)
     bounds = (comau_base, mean, C, comau_bounds)
-    refused("prior_weight = -1.0", *bounds, prior_weight=-1.0)
+    refused("prior_weight = 0.0; must be", *bounds, prior_weight=0.0)
     refused("prior: link_1 of 1 kg has no positive definite", *bounds, prior=np.ones(78))
     few = Prediction(np.ones((3, 6, 5)), np.ones(6), 1.0)
     refused("prediction: matrices .3, 6, 5.; must have 52 columns", *bounds, prediction=few)

@@ -103,60 +103,6 @@ def write_scenario(folder, model):
     return scenario
 
 
-def test_chain_without_parameter_file(tmp_path):
-    """A slide and two joints askew, on a slanted base."""
-    file = tmp_path / "crane.urdf"
-    file.write_text(CRANE)
-    scenario = tmp_path / "scenario.yaml"
-    scenario.write_text(
-        f"robot: {{model: {file}, tool_frame: hook, "
-        "base_pose: {position: [0.1, 0.2, 0.3], zyx_deg: [10, 20, 30]}}\n"
-    )
-    subject = load_subject(scenario)
-    n = subject.dimension
-    own = true_parameters(subject, friction=False)
-    parameters = np.concatenate(
-        [own * np.repeat([1.3, 0.8, 1.1, 1.0], [10, 10, 10, n]), np.ones(2 * n)]
-    )
-    parameters[10 * n : 11 * n] = [0.2, 0.01, 0.0]
-    written = write_model(subject, parameters, tmp_path / "out")
-    assert written.parameters is None and len(written.files) == 1
-    other = scenario.with_name("other.yaml")
-    other.write_text(scenario.read_text().replace(str(file), str(written.urdf)))
-    again = load_subject(other)
-    np.testing.assert_allclose(
-        true_parameters(again, friction=False), parameters[: 11 * n], atol=1e-12
-    )
-    assert again.joint_names == subject.joint_names
-    np.testing.assert_allclose(again.position_limits, subject.position_limits)
-    motion = random_motion(Regressor(subject, friction=False))
-    one, two = (Regressor(s, friction=False).matrix(*motion) for s in (subject, again))
-    np.testing.assert_allclose(one, two, atol=1e-9)
-    np.testing.assert_allclose(again.chain.p_LT, subject.chain.p_LT, atol=1e-12)
-    np.testing.assert_allclose(again.chain.links[1].viscous_damping, 1.0)
-
-
-CRANE = """<robot name="crane">
-  <link name="foot"/>
-  <link name="tower"><inertial><origin xyz="0.1 0 0.3" rpy="0 0 0"/><mass value="10"/>
-    <inertia ixx="1" iyy="1.2" izz="0.8" ixy="0.1" ixz="0" iyz="0"/></inertial></link>
-  <link name="arm"><inertial><origin xyz="0.5 0 0" rpy="0.1 0.2 0.3"/><mass value="4"/>
-    <inertia ixx="0.2" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="hook"><inertial><origin xyz="0 0 -0.2" rpy="0 0 0"/><mass value="2"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="swing" type="continuous"><parent link="foot"/><child link="tower"/>
-    <origin xyz="0 0 0.2" rpy="0.1 0 0"/><axis xyz="0 0.6 0.8"/>
-    <limit effort="100" velocity="2"/></joint>
-  <joint name="out" type="prismatic"><parent link="tower"/><child link="arm"/>
-    <origin xyz="0 0.1 1" rpy="0 0.3 0.2"/><axis xyz="1 0 0"/>
-    <limit effort="200" velocity="1" lower="0" upper="2"/></joint>
-  <joint name="nod" type="revolute"><parent link="arm"/><child link="hook"/>
-    <origin xyz="1 0 0" rpy="0 0 0.5"/><axis xyz="0 1 0"/>
-    <limit effort="50" velocity="3" lower="-1" upper="1.5"/></joint>
-</robot>
-"""
-
-
 def test_bad_input(comau, delta, tmp_path):
     def refused(message, subject, parameters, folder=tmp_path):
         with pytest.raises(InputError, match=message):

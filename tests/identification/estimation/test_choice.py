@@ -105,6 +105,11 @@ def test_bad_input(comau, data, measure):
     motion, other = data(np.zeros_like)
     with pytest.raises(InputError, match="friction term 'bumpy'"):
         choose_friction(comau.regressor, comau.base, motion, other, kinds=["bumpy"])
+    with pytest.raises(InputError, match="no kind to choose from; allowed: stribeck"):
+        choose_friction(comau.regressor, comau.base, motion, other, kinds=[])
+    same = tuple(values[:, [1, 1, 1, 1, 1, 1]] for values in comau.motion)
+    with pytest.raises(InputError, match="cannot be told apart"):
+        choose_friction(comau.regressor, comau.base, measure(motion=same), other)
     with pytest.raises(InputError, match="regressor without friction"):
         bare = Regressor(comau.subject, friction=False)
         choose_friction(bare, comau.base, motion, other)

@@ -6,14 +6,13 @@ import pytest
 from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import chosen_limits
 from identification.excitation.local_search import LocalSearch, random_motion_about
-from identification.excitation.problem import believed_parameters
 from identification.excitation.processes import side_by_side
 from identification.excitation.search import search
-from identification.excitation.verification import verify
+from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
+from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
 
 POST = Obstacle(
@@ -35,19 +34,21 @@ def found(found_and_told):
     return found_and_told[0]
 
 
-def figures(arm, motion):
+@pytest.fixture(scope="module")
+def figures(arm):
     regressor = Regressor(arm)
-    return information(regressor, base_parameters(regressor), motion)
+    base = base_parameters(regressor)
+    return lambda motion: information(regressor, base, motion)
 
 
-def test_is_much_better_than_random_motions(arm, found, arm_problem):
+def test_is_much_better_than_random_motions(found, figures, arm_problem):
     motions = [random_motion_about(arm_problem, np.random.default_rng(i)) for i in range(10)]
     others = [
-        figures(arm, FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
+        figures(FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
         for c in motions
     ]
     assert found.information.log_determinant > max(others) + 20.0
-    assert found.information == figures(arm, found.trajectory)
+    assert found.information == figures(found.trajectory)
 
 
 def test_keeps_all_limits_of_the_cell(arm, found):
@@ -56,8 +57,7 @@ def test_keeps_all_limits_of_the_cell(arm, found):
     assert np.all((q >= arm.position_limits[:, 0]) & (q <= arm.position_limits[:, 1]))
     assert np.all(np.abs(v) <= arm.velocity_limit)
     assert np.all(np.abs(a) <= arm.acceleration_limit)
-    regressor = Regressor(arm)
-    again = verify(regressor, believed_parameters(arm), chosen_limits(arm), found.trajectory, CELL)
+    again = verify_excitation(arm, found.trajectory, cell=CELL)
     assert again.problems == found.verification.problems == []
     assert again.clearance.guaranteed >= 0.018
 
@@ -81,6 +81,37 @@ def test_delta(delta):
         )
 
 
+CRANE = """\
+<robot name="crane">
+  <link name="base"/>
+  <link name="beam"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="hook"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.005" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="swing" type="revolute"><parent link="base"/><child link="beam"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="2" effort="50"/></joint>
+  <joint name="lift" type="prismatic"><parent link="beam"/><child link="hook"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.5" velocity="1" effort="100"/></joint>
+</robot>
+"""
+
+
+def test_model_file_with_a_slide_and_no_shapes(tmp_path):
+    file = tmp_path / "crane.urdf"
+    file.write_text(CRANE)
+    crane = load_subject(file)
+    cell = Cell([POST], tool_above=-0.2)
+    found = search(crane, cell=cell, limits={"acceleration": 10.0}, **QUICK)
+    assert found.warnings == ["crane: the model has no shapes; collisions are not checked"]
+    assert found.verification.keeps_all
+    q, _, _ = found.trajectory.motion(np.linspace(0.0, 5.0, 500))
+    height = -0.4 * np.sin(q[:, 0]) + q[:, 1] * np.cos(q[:, 0])
+    margin = found.verification.margins["height of the tool point"]
+    assert height.min() == pytest.approx(-0.2 + margin, abs=1e-3)
+    assert height.min() >= -0.2
+
+
 def test_is_the_same_again(arm_problem):
     ends = [LocalSearch(arm_problem).run(seed, 5).coefficients for seed in (1, 1, 2)]
     np.testing.assert_array_equal(ends[0], ends[1])
@@ -102,6 +133,9 @@ def test_progress(found_and_told):
         ({"workers": 0}, "workers = 0; must be 1 or more"),
         ({"period": 0.0}, "period = 0.0 s"),
         ({"harmonics": ()}, "harmonics"),
+        ({"harmonics": (1,)}, r"harmonics = \[1\]: too few to show all 22 base .* link_3.Izz"),
+        ({"parameters": np.ones(3)}, r"parameters: shape \(3,\); must be 39 finite numbers"),
+        ({"cell": "nowhere.yaml"}, "nowhere.yaml"),
         ({"limits": {"velocity": {"elbow": 1.0}}}, "no joint 'elbow'"),
         ({"limits": {"effort": 1.0}}, "hardest to keep is the effort limit of joint_2"),
         (

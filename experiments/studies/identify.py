@@ -1,0 +1,283 @@
+"""The circle of an identification: excite, measure, estimate, believe the result, and drive."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure as Canvas
+
+from experiments.catalog.scenario_file import ScenarioFile, read_scenario
+from experiments.studies.side_by_side import run_side_by_side
+from experiments.sweep.rows import COMPLETED, RunRow
+from identification.consistency.nearest import ConsistentParameters
+from identification.estimation.results import FILE_NAME, save_estimate
+from identification.excitation.cell import load_cell
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.recording import record_excitation
+from identification.excitation.search import search
+from identification.findings import Findings
+from identification.measurement.columns import Reading
+from identification.measurement.imperfections import shipped_imperfections
+from identification.model.subject import Subject, load_subject
+from identification.report.page import PageContent, write_page
+from identification.steps import (
+    EXCITATION,
+    RECORDING,
+    bounds_of,
+    consistent_set,
+    estimate_files,
+    save_excitation,
+    simulate_runs,
+    write_consistent,
+)
+from pfsc_drake.robot.models.files import models_directory
+from reporting.folder import ResultsFolder, open_results
+from reporting.metrics import Metrics
+from reporting.page import Report, Table
+from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
+
+TRUE, WRONG, IDENTIFIED = "true", "wrong by Tab. C.3", "identified"
+BELIEFS = (TRUE, WRONG, IDENTIFIED)
+MOST = 1.5  # of the deviation with the true model
+_ENCODERS = (
+    "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
+)
+_ERROR = "model_error={random: {seed: 1, mass: 0.056, inertia: 0.056, friction: 0.05}}"
+_DEVIATION, _FROM_REFERENCE = "max_path_deviation", "max_error_from_compliant_reference"
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A scenario that is driven with what was identified.
+
+    Attributes:
+        scenario: Its name.
+        model: Which of the written models it believes.
+        metric: What it is judged by.
+        overrides: Of the scenario, for all beliefs.
+        friction: Whether it believes a friction.
+    """
+
+    scenario: str
+    model: str
+    metric: str = _DEVIATION
+    overrides: tuple[str, ...] = ()
+    friction: bool = True
+
+
+@dataclass(frozen=True)
+class Circle:
+    """The identification of a robot, and what is driven with it.
+
+    Attributes:
+        robot: Name of a shipped one.
+        drives: By what they are called on the page.
+        starts: Of the search for an excitation.
+        validation: File of another motion beside the robot's model; searched for without.
+    """
+
+    robot: str
+    drives: Mapping[str, Drive]
+    starts: int = 4
+    validation: str = ""
+
+
+CIRCLES = (
+    Circle(
+        "comau_racer_1_4",
+        {
+            "pfc_comau_6r": Drive("pfc_comau_6r", "comau_racer_1_4_elastic.sdf", friction=False),
+            "pfc_comau_6r, friction and encoders": Drive(
+                "pfc_comau_6r",
+                "comau_racer_1_4_elastic.sdf",
+                overrides=(
+                    "friction.file=comau_racer_1_4",
+                    "controller.friction.source=model",
+                    _ENCODERS,
+                ),
+            ),
+            "pfc_compliant_6r": Drive(
+                "pfc_compliant_6r",
+                "comau_racer_1_4.sdf",
+                _FROM_REFERENCE,
+                ("controller.friction.source=model",),
+            ),
+        },
+        validation="excitation.yaml",
+    ),
+    Circle(
+        "franka_emika_panda",
+        {
+            "pfc_panda_7r": Drive("pfc_panda_7r", "franka_emika_panda.sdf", friction=False),
+            "pfc_panda_7r, friction and encoders": Drive(
+                "pfc_panda_7r",
+                "franka_emika_panda.sdf",
+                overrides=(
+                    "friction.file=franka_emika_panda",
+                    "controller.friction.source=model",
+                    _ENCODERS,
+                ),
+            ),
+        },
+    ),
+)
+_RUNS, _SEED = 3, 1
+_DESCRIPTION = (
+    "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
+    "disturbance; from what was measured come its base parameters, the nearest consistent model, "
+    "and files. Then scenarios are driven three times: with a law that believes the true model, "
+    "one wrong by the deviations of Tab. C.3, and the identified one."
+)
+
+
+def write_identification(
+    out: Path, progress: Callable[[str], None], circles: Sequence[Circle] = CIRCLES
+) -> Report:
+    """Identify robots, drive with the results, and write a page for each robot.
+
+    Args:
+        out: Folder: one folder for each robot, and in it one with the files of each step.
+        progress: Told one line per step.
+        circles: What to identify and to drive.
+
+    Returns:
+        The page of the first robot.
+
+    Raises:
+        InputError: If ``out`` cannot take the results.
+    """
+    return [_identify(circle, out / circle.robot, progress) for circle in circles][0]
+
+
+def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Report:
+    subject = load_subject(circle.robot, tool=False)
+    with open_results(out, "identification") as results:
+        say = _stepwise(circle.robot, progress)
+        found = search(subject, starts=circle.starts, seed=_SEED, progress=say)
+        save_excitation(subject, found, out / "excitation", periods=5)
+        other = _other_motion(subject, circle, say)
+        faults = shipped_imperfections(subject.name).realistic()
+        trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
+        records = simulate_runs(subject, trajectory, faults, out / "runs", _RUNS, _SEED, say)
+        unused = simulate_runs(subject, other, faults, out / "validation", 1, 100, say)[0]
+        findings, motion = estimate_files(
+            subject, records, unused, Reading(), simulated=True, progress=say
+        )
+        save_estimate(out / FILE_NAME, findings.estimate, findings.runs)
+        consistent = consistent_set(findings, bounds_of(subject, None), direct=False)
+        model = write_consistent(subject, consistent, out / "model")
+        progress(f"{circle.robot}: model written, {len(model.files)} files")
+        rows = run_side_by_side(_scenarios(circle, out / "model"), _said(circle, progress))
+        cell = load_cell(None, subject.name)
+        results.write(RECORDING, record_excitation(subject, trajectory, cell=cell))
+        content = _content(circle, subject, findings, consistent, rows, results)
+        return write_page(results, content(None if motion is None else motion.t))
+
+
+def _stepwise(robot: str, progress: Callable[[str], None]) -> Callable[[float, str], None]:
+    """Return what tells a line at the beginning of a step, and at each half of it."""
+    said = ""
+
+    def tell(fraction: float, phase: str) -> None:
+        nonlocal said
+        words = phase.split(",", maxsplit=1)[0]
+        if words != said:
+            said = words
+            progress(f"{robot}: {phase}")
+
+    return tell
+
+
+def _other_motion(
+    subject: Subject, circle: Circle, progress: Callable[[float, str], None]
+) -> FourierTrajectory:
+    if circle.validation:
+        return FourierTrajectory.load(models_directory() / subject.name / circle.validation)
+    return search(subject, starts=1, seed=100, iterations=40, progress=progress).trajectory
+
+
+def _scenarios(circle: Circle, model: Path) -> dict[tuple[str, str], ScenarioFile]:
+    folder = model.resolve()
+    found = {}
+    for name, drive in circle.drives.items():
+        believed = [f"controller.model={folder / drive.model}", "model_error={}"]
+        if drive.friction:
+            believed.append(f"controller.friction.believed.file={folder / 'parameters.yaml'}")
+        beliefs = {TRUE: ["model_error={}"], WRONG: [_ERROR], IDENTIFIED: believed}
+        for belief, changes in beliefs.items():
+            found[name, belief] = read_scenario(drive.scenario, [*drive.overrides, *changes])
+    return found
+
+
+def _said(
+    circle: Circle, progress: Callable[[str], None]
+) -> Callable[[tuple[str, str], RunRow], None]:
+    def tell(case: tuple[str, str], row: RunRow) -> None:
+        value = _value(row, circle.drives[case[0]].metric)
+        progress(f"{case[0]:38s} {case[1]:20s} {row.reason or f'{value * 1e3:.4f} mm'}")
+
+    return tell
+
+
+def _value(row: RunRow, metric: str) -> float:
+    return float(row.metrics[metric].value) if row.status == COMPLETED else float("nan")
+
+
+def _content(
+    circle: Circle,
+    subject: Subject,
+    findings: Findings,
+    consistent: ConsistentParameters,
+    rows: Mapping[tuple[str, str], RunRow],
+    results: ResultsFolder,
+) -> Callable[[np.ndarray | None], PageContent]:
+    metrics, table = Metrics(), []
+    deviations = np.array(
+        [
+            [_value(rows[name, belief], drive.metric) for belief in BELIEFS]
+            for name, drive in circle.drives.items()
+        ]
+    )
+    for (name, drive), values in zip(circle.drives.items(), deviations, strict=True):
+        ratio = values[2] / values[0]
+        source = f"{drive.metric}, identified by true model"
+        metrics.add(
+            f"{name.replace(', ', '_').replace(' ', '_')}", ratio, "1", f"<= {MOST}", source
+        )
+        table.append([name, drive.metric, *(1e3 * values).tolist(), ratio])
+    head = ["scenario", "metric", *(f"{belief} in mm" for belief in BELIEFS), "ratio"]
+    caption = "Largest deviations with laws that believe these models; identified by true."
+    picture = _picture(list(circle.drives), deviations)
+    return lambda other_t: PageContent(
+        subject,
+        findings,
+        other_t=other_t,
+        consistent=consistent,
+        recording=RECORDING,
+        metrics=metrics,
+        figures=[picture],
+        tables=[Table("Driven with what was identified", caption, head, table)],
+        attributes={"circle": _DESCRIPTION},
+    )
+
+
+def _picture(names: Sequence[str], deviations: np.ndarray) -> Figure:
+    with plt.rc_context(STYLE):
+        canvas = Canvas(figsize=(WIDTH, 0.9 * len(names) + 1.2))
+        panel = canvas.subplots()
+        places = np.arange(len(names))[::-1].astype(float)
+        for i, belief in enumerate(BELIEFS):
+            panel.barh(
+                places + 0.27 * (1 - i),
+                1e3 * deviations[:, i],
+                height=0.25,
+                color=COLOURS[i],
+                label=belief,
+            )
+        panel.set(xscale="log", xlabel="largest deviation in mm")
+        panel.set_yticks(places, names)
+        canvas.legend(loc="outside lower center", ncols=3, frameon=False)
+        caption = "Laws that believe the true, a wrong and the identified model of the same robot."
+        return render(Drawing("circle", "Driven with what was identified", caption, canvas))

@@ -1,0 +1,297 @@
+"""The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
+
+``consistent`` writes a model, ``report`` draws the page anew. Exit status: 0 done; 2 the input is
+wrong, one line on stderr; 4 results could not be written; 130 interrupted.
+"""
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pfsc_drake.errors import InputError, shortened
+from reporting.commands import interruptible, run_app, show_page
+from reporting.fraction import fraction_display
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="From a robot to its model: excitation, experiment, estimation, consistency.",
+)
+Robot = Annotated[
+    str, typer.Argument(help="Shipped robot, SDF or URDF file, or scenario with a robot.")
+]
+Tool = Annotated[
+    bool, typer.Option("--tool/--no-tool", help="Whether the shipped robot carries its tool.")
+]
+Records = Annotated[list[Path], typer.Argument(help="Runs of one excitation: CSV, HDF5 or MAT.")]
+Validation = Annotated[
+    Path | None, typer.Option(help="Record of another motion, to choose friction and to predict.")
+]
+Bounds = Annotated[
+    Path | None, typer.Option(help="What is known of the links (YAML). Default: what is shipped")
+]
+Units = Annotated[
+    list[str] | None,
+    typer.Option("--unit", metavar="SIGNAL=UNIT", help="Unit that a file does not state."),
+]
+Names = Annotated[
+    list[str] | None,
+    typer.Option("--name", metavar="FILE_NAME=SIGNAL", help="What a file calls otherwise."),
+]
+Scales = Annotated[
+    list[str] | None,
+    typer.Option("--scale", metavar="SIGNAL=NUMBER", help="SI units per unit of the file."),
+]
+Simulated = Annotated[
+    bool, typer.Option("--simulated", help="The robot's model is the truth: compare with it.")
+]
+
+
+@app.command("excite")
+def excite_command(
+    robot: Robot,
+    out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_excitation")] = None,
+    criterion: Annotated[
+        str, typer.Option(help="D: largest determinant; condition: smallest condition number.")
+    ] = "D",
+    harmonics: Annotated[str, typer.Option(help="Of the fundamental frequency.")] = "1,3,5",
+    period: Annotated[float, typer.Option(help="Of the motion [s].")] = 10.0,
+    periods: Annotated[int, typer.Option(min=1, help="How often it is to be run.")] = 5,
+    starts: Annotated[int, typer.Option(min=1, help="Random motions to start from.")] = 16,
+    seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
+    cell: Annotated[Path | None, typer.Option(help="What stands around the robot (YAML).")] = None,
+    tool: Tool = False,
+) -> None:
+    """Find a motion that shows all parameters within all limits."""
+    from identification.excitation.search import search
+    from identification.model.subject import load_subject
+    from identification.steps import RECORDING, save_excitation
+
+    with interruptible():
+        _quiet()
+        console = Console()
+        subject = load_subject(robot, tool=tool)
+        folder = out or Path("out") / f"{subject.name}_excitation"
+        numbers = [_integer(number, "--harmonics") for number in harmonics.split(",")]
+        with fraction_display(console, "excitation") as progress:
+            found = search(
+                subject, criterion, numbers, period, starts, seed, cell=cell, progress=progress
+            )
+        save_excitation(subject, found, folder, periods)
+        console.print(
+            f"log det {found.information.log_determinant:.2f}, condition number "
+            f"{found.information.condition_number:.0f}, {found.information.base_parameters} "
+            f"parameters, {found.seconds:.0f} s",
+            highlight=False,
+        )
+        for name, shares in found.verification.shares.items():
+            console.print(f"{name}: up to {100.0 * shares.max():.1f} % of the limit")
+        for name, margin in found.verification.margins.items():
+            console.print(f"{name}: {margin:.3f} to spare")
+        for warning in found.warnings:
+            console.print(f"[yellow]warning:[/] {warning}")
+        console.print(f"Written to {folder}; open {folder / RECORDING}", soft_wrap=True)
+
+
+@app.command("simulate")
+def simulate_command(
+    robot: Robot,
+    out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_runs")] = None,
+    excitation: Annotated[
+        Path | None, typer.Option(help="excitation.yaml. Default: the one that is shipped")
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="How often.")] = 7,
+    seed: Annotated[int, typer.Option(help="Of the first run.")] = 1,
+    realistic: Annotated[
+        bool,
+        typer.Option(help="Coloured disturbance, and friction that differs from run to run."),
+    ] = False,
+    tool: Tool = False,
+) -> None:
+    """Simulate the experiment: rotors, friction, servo, encoders, noise; five periods a run."""
+    from identification.measurement.imperfections import shipped_imperfections
+    from identification.model.subject import load_subject
+    from identification.steps import load_excitation, simulate_runs
+
+    with interruptible():
+        _quiet()
+        console = Console()
+        subject = load_subject(robot, tool=tool)
+        folder = out or Path("out") / f"{subject.name}_runs"
+        trajectory = load_excitation(subject, excitation)
+        faults = shipped_imperfections(subject.name)
+        faults = faults.realistic() if realistic else faults
+        with fraction_display(console, "experiment") as progress:
+            files = simulate_runs(subject, trajectory, faults, folder, runs, seed, progress)
+        for file in files:
+            console.print(str(file), soft_wrap=True, highlight=False)
+
+
+@app.command("estimate")
+def estimate_command(
+    robot: Robot,
+    records: Records,
+    validation: Validation = None,
+    out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_identification")] = None,
+    period: Annotated[
+        float | None, typer.Option(help="Of the motion [s], if the files do not state it.")
+    ] = None,
+    skip: Annotated[int, typer.Option(min=0, help="Periods at the start to leave out.")] = 1,
+    bandwidth: Annotated[
+        float | None, typer.Option(help="Of the motion [Hz]. Default: 20 / period")
+    ] = None,
+    plain: Annotated[
+        bool, typer.Option("--plain", help="Coulomb and viscous friction only.")
+    ] = False,
+    bounds: Bounds = None,
+    units: Units = None,
+    names: Names = None,
+    scales: Scales = None,
+    simulated: Simulated = False,
+    tool: Tool = False,
+) -> None:
+    """Estimate base parameters from measured motions, and write identification.h5 and a page."""
+    from identification.measurement.columns import Reading
+    from identification.model.subject import load_subject
+    from identification.pages import write_identification
+    from identification.report.tables import parameter_table, print_table, torque_table
+    from identification.steps import estimate_files
+
+    with interruptible():
+        _quiet()
+        console = Console()
+        subject = load_subject(robot, tool=tool)
+        folder = out or Path("out") / f"{subject.name}_identification"
+        scale = {name: _number(value, "--scale") for name, value in _pairs(scales, "--scale")}
+        reading = Reading(dict(_pairs(names, "--name")), dict(_pairs(units, "--unit")), scale)
+        with fraction_display(console, subject.name) as progress:
+            findings, other = estimate_files(
+                subject,
+                records,
+                validation,
+                reading,
+                period=period,
+                skip=skip,
+                bandwidth_hz=bandwidth,
+                choose=not plain,
+                simulated=simulated,
+                progress=progress,
+            )
+        report = write_identification(
+            subject,
+            findings,
+            other,
+            folder,
+            [*records, *([validation] if validation else [])],
+            bounds,
+        )
+        print_table(console, parameter_table(findings), most=12)
+        print_table(console, torque_table(findings))
+        raise typer.Exit(show_page("report", report))
+
+
+@app.command("consistent")
+def consistent_command(
+    robot: Robot,
+    identification: Annotated[
+        Path, typer.Argument(help="identification.h5, or the folder that it is in.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_model")] = None,
+    bounds: Bounds = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="In one step from the first run's torques.")
+    ] = False,
+    tool: Tool = False,
+) -> None:
+    """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
+    from identification.model.subject import load_subject
+    from identification.steps import (
+        bounds_of,
+        consistent_set,
+        stored_findings,
+        write_consistent,
+    )
+
+    with interruptible():
+        _quiet()
+        console = Console()
+        subject = load_subject(robot, tool=tool)
+        folder = out or Path("out") / f"{subject.name}_model"
+        findings = stored_findings(subject, identification, None, simulated=False)
+        found = consistent_set(findings, bounds_of(subject, bounds), direct)
+        written = write_consistent(subject, found, folder)
+        console.print(
+            f"chi squared {found.chi_squared:.4g} of {len(found.base_values)} base parameters",
+            highlight=False,
+        )
+        for file in written.files:
+            console.print(str(file), soft_wrap=True, highlight=False)
+
+
+@app.command("report")
+def report_command(
+    robot: Robot,
+    folder: Annotated[Path, typer.Argument(help="Folder with identification.h5.")],
+    validation: Validation = None,
+    bounds: Bounds = None,
+    excitation: Annotated[
+        Path | None, typer.Option(help="excitation.yaml, to see the robot move.")
+    ] = None,
+    simulated: Simulated = False,
+    tool: Tool = False,
+    out: Annotated[Path | None, typer.Option(help="Default: FOLDER_report")] = None,
+) -> None:
+    """Write the page of an identification anew, with what else there is to see on it."""
+    from identification.model.subject import load_subject
+    from identification.pages import write_stored
+
+    with interruptible():
+        _quiet()
+        subject = load_subject(robot, tool=tool)
+        target = out or folder.with_name(f"{folder.name}_report")
+        report = write_stored(subject, folder, validation, bounds, excitation, simulated, target)
+        raise typer.Exit(show_page("report", report))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: Without the program's name; by default those of the process.
+
+    Returns:
+        Exit status, see the module.
+    """
+    return run_app(app, "python -m identification", arguments)
+
+
+def _quiet() -> None:
+    logging.getLogger("drake").setLevel(logging.CRITICAL)
+
+
+def _pairs(options: list[str] | None, option: str) -> list[tuple[str, str]]:
+    pairs = []
+    for text in options or []:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise InputError(f"{option} {shortened(text)}: allowed: NAME=VALUE")
+        pairs.append((name, value))
+    return pairs
+
+
+def _number(text: str, option: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option} {shortened(text)}: allowed: a number") from None
+
+
+def _integer(text: str, option: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f"{option} {shortened(text)}: allowed: integers, e.g. 1,3,5") from None

@@ -1,0 +1,170 @@
+"""A model file of any robot with identified inertias in it, all else as it was."""
+
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+
+from diagrams.robots.model import locate_model, read_robot
+from diagrams.scenario import RobotParameters as RobotBlock
+from identification.consistency.check import central_inertia, layout_of, link_faults
+from identification.model.analytic_base import moved
+from identification.model.parameters import link_parameters, true_parameters
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.model_text import absolute_names
+from pfsc_drake.robot.models.model_xml import Element, ModelXml, read_model_xml
+from pfsc_drake.robot.models.visuals import format_numbers
+
+_KINDS = (".urdf", ".sdf")
+_ENTRIES = {
+    "ixx": (0, 0),
+    "ixy": (0, 1),
+    "ixz": (0, 2),
+    "iyy": (1, 1),
+    "iyz": (1, 2),
+    "izz": (2, 2),
+}
+_ROTOR = "drake:rotor_inertia"
+
+
+@dataclass(frozen=True)
+class _Edit:
+    """Bytes of a file from start to end that become a text."""
+
+    start: int
+    end: int
+    text: str
+
+
+def edited_model(subject: Subject, parameters: np.ndarray) -> str:
+    """Return the text of a robot's model file with identified inertias.
+
+    What was identified of a link beyond what the model has goes into the heaviest of the bodies
+    that it is made of; the others, such as a tool or a gripper with its fingers fixed, stay. Rotors
+    stand at the drives; friction is left to the scenario, and damping that the model has stays.
+
+    Args:
+        subject: A serial robot read from a URDF or an SDF file with rigid joints.
+        parameters: Of the robot, with or without friction, shape (n,).
+
+    Raises:
+        InputError: If the model is of another kind or spread over several files, or a body would
+            not be physical beside the others of its link.
+    """
+    assert subject.block is not None and subject.chain is not None
+    file = locate_model(subject.block, subject.folder)
+    if file.suffix.lower() not in _KINDS:
+        raise InputError(f"{file}: no inertias can be set; allowed: {', '.join(_KINDS)}")
+    model, layout = read_model_xml(file), layout_of(subject, parameters)
+    plain = replace(copy.deepcopy(subject.block), elastic=RobotBlock().elastic, joint_damping=[])
+    plant, _ = read_robot(plain, subject.folder)
+    if plant.num_velocities() != subject.dimension:
+        raise InputError(f"{file}: elastic or other joints; allowed: a rigid chain of them")
+    change = (layout.check("parameters", parameters) - _own(subject, parameters))[layout.links]
+    edits = [_Edit(element.start, element.end, text) for element, text in absolute_names(model)]
+    for name, own in zip(subject.joint_names, change, strict=True):
+        edits.append(_inertial(model, plant, name, own))
+    for name, inertia in zip(subject.joint_names, parameters[layout.rotors], strict=True):
+        edits += _rotor(model, name, float(inertia))
+    content = model.content
+    for edit in sorted(edits, key=lambda edit: -edit.start):
+        content = content[: edit.start] + edit.text.encode() + content[edit.end :]
+    return content.decode("utf-8")
+
+
+def _own(subject: Subject, parameters: np.ndarray) -> np.ndarray:
+    """Return the parameters that the model has, as many as were identified."""
+    return np.nan_to_num(true_parameters(subject)[: np.size(parameters)])
+
+
+def _inertial(model: ModelXml, plant: MultibodyPlant, joint: str, change: np.ndarray) -> _Edit:
+    """Return the edit of the heaviest body behind a joint; the change is in the link frame."""
+    frame, context = plant.GetJointByName(joint).frame_on_child(), plant.CreateDefaultContext()
+    bodies = plant.GetBodiesWeldedTo(frame.body())
+    body = max(bodies, key=lambda body: body.default_mass())
+    X_BL = plant.CalcRelativeTransform(context, body.body_frame(), frame)
+    own = _parameters(plant, body) + moved(change, X_BL.rotation().matrix(), X_BL.translation())
+    faults = link_faults(own)
+    if faults:
+        others = ", ".join(other.name() for other in bodies if other is not body) or "nothing"
+        raise InputError(f"{model.file}: link '{body.name()}' beside {others}: {faults[0]}")
+    links = [e for e in model.root.within() if e.name == "link"]
+    named = [e for e in links if e.attributes.get("name") == body.name()]
+    inertial = named[0].first("inertial") if len(named) == 1 else None
+    if inertial is None:
+        raise InputError(
+            f"{model.file}: link '{body.name()}' has no <inertial> of its own in this file; "
+            "allowed: models in one file"
+        )
+    write = _urdf_inertial if model.root.name == "robot" else _sdf_inertial
+    return _Edit(inertial.start, inertial.end, write(own))
+
+
+def _parameters(plant: MultibodyPlant, body: RigidBody) -> np.ndarray:
+    M = body.default_spatial_inertia()
+    return link_parameters(M.get_mass(), M.get_com(), M.CalcRotationalInertia().CopyToFullMatrix3())
+
+
+def _urdf_inertial(own: np.ndarray) -> str:
+    mass, center, I_C = central_inertia(own)
+    entries = " ".join(f'{k}="{format_numbers([I_C[e]])}"' for k, e in _ENTRIES.items())
+    return (
+        f'<inertial><origin xyz="{format_numbers(center)}" rpy="0 0 0"/>'
+        f'<mass value="{format_numbers([mass])}"/><inertia {entries}/></inertial>'
+    )
+
+
+def _sdf_inertial(own: np.ndarray) -> str:
+    mass, center, I_C = central_inertia(own)
+    entries = "".join(f"<{k}>{format_numbers([I_C[e]])}</{k}>" for k, e in _ENTRIES.items())
+    return (
+        f"<inertial><pose>{format_numbers([*center, 0.0, 0.0, 0.0])}</pose>"
+        f"<mass>{format_numbers([mass])}</mass><inertia>{entries}</inertia></inertial>"
+    )
+
+
+def _rotor(model: ModelXml, joint: str, inertia: float) -> Iterator[_Edit]:
+    """Yield the edit of a drive, or none if the model and the measurement have no rotor there."""
+    value = format_numbers([inertia])
+    if model.root.name == "robot":
+        for transmission in model.root.all("transmission"):
+            told = transmission.first("joint")
+            actuator = transmission.first("actuator")
+            if told is None or actuator is None or told.attributes.get("name") != joint:
+                continue
+            yield _child(model, actuator, f'<{_ROTOR} value="{value}"/>')
+            return
+        if inertia > 0.0:
+            end = model.content.rindex(b"</robot>")
+            yield _Edit(end, end, _transmission(joint, value))
+        return
+    joints = [e for e in model.root.within() if e.name == "joint"]
+    (element,) = [e for e in joints if e.attributes.get("name") == joint]
+    if inertia > 0.0 or element.first(_ROTOR) is not None:
+        yield _child(model, element, f"<{_ROTOR}>{value}</{_ROTOR}>")
+
+
+def _child(model: ModelXml, parent: Element, text: str) -> _Edit:
+    """Return the edit that puts the rotor's inertia into an element, in place of what is there."""
+    old = parent.first(_ROTOR)
+    if old is not None:
+        return _Edit(old.start, old.end, text)
+    closing = model.content.rfind(b"</", parent.start, parent.end)
+    if closing >= 0:
+        return _Edit(closing, closing, text)
+    slash = model.content.rindex(b"/>", parent.start, parent.end)
+    return _Edit(slash, parent.end, f">{text}</{parent.name}>")
+
+
+def _transmission(joint: str, value: str) -> str:
+    return (
+        f'  <transmission name="transmission_{joint}">\n'
+        "    <type>transmission_interface/SimpleTransmission</type>\n"
+        f'    <joint name="{joint}"/>\n'
+        f'    <actuator name="drive_{joint}"><{_ROTOR} value="{value}"/></actuator>\n'
+        "  </transmission>\n"
+    )

@@ -1,0 +1,114 @@
+"""From measured motions to a robot's model, in one go."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.consistency.bounds import PhysicalBounds
+from identification.consistency.nearest import ConsistentParameters, nearest_consistent
+from identification.estimation.choice import FrictionChoice, choose_friction
+from identification.estimation.friction import FrictionModel
+from identification.estimation.information import MeasuredMotion
+from identification.estimation.least_squares import Estimate, estimate
+from identification.estimation.repetitions import Repetitions
+from identification.estimation.validation import Prediction, TruthTest, compare_with_truth, predict
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What repeated runs of an excitation tell about a robot.
+
+    Attributes:
+        runs: Estimates, one for each run.
+        choice: How friction was chosen; None if it was not.
+        prediction: Of a motion that was not used; None without one.
+        truth: True base parameters, shape (n_b,); None for a real robot.
+    """
+
+    runs: Repetitions
+    choice: FrictionChoice | None = None
+    prediction: Prediction | None = None
+    truth: np.ndarray | None = None
+
+    @property
+    def estimate(self) -> Estimate:
+        """That of the first run."""
+        return self.runs.estimates[0]
+
+    @property
+    def truth_test(self) -> TruthTest | None:
+        """Errors of the first run beside their covariance; None without truth.
+
+        Friction does not count, which is another one each day.
+        """
+        if self.truth is None:
+            return None
+        return compare_with_truth(self.estimate, self.truth, friction=False)
+
+
+def find_parameters(
+    regressor: Regressor,
+    base: BaseParameters,
+    motions: Sequence[MeasuredMotion],
+    validation: MeasuredMotion | None = None,
+    *,
+    choose: bool = True,
+    truth: np.ndarray | None = None,
+    progress: Progress | None = None,
+) -> Findings:
+    """Estimate the base parameters of a robot from each of several motions.
+
+    Args:
+        regressor: Of the robot.
+        base: Its base parameters.
+        motions: Of one excitation, averaged; at least one.
+        validation: Another motion, on which friction is chosen and which is predicted.
+        choose: Whether to choose friction beyond Coulomb's and viscous.
+        truth: True parameters of the robot, shape (n,), if it is simulated.
+        progress: Told the fraction done and what is done.
+
+    Raises:
+        InputError: If there is no motion, one does not fit the robot, or does not excite it.
+    """
+    if not motions:
+        raise InputError("estimate: no record; at least one is required")
+    tell = progress or (lambda fraction, phase: None)
+    choice, friction = None, FrictionModel()
+    if choose and validation is not None:
+        tell(0.0, "choosing friction")
+        choice = choose_friction(regressor, base, motions[0], validation)
+        friction = choice.model
+    estimates = []
+    for run, motion in enumerate(motions):
+        tell((1 + run) / (2 + len(motions)), f"estimating, run {run + 1} of {len(motions)}")
+        estimates.append(estimate(regressor, base, motion, friction))
+    runs = Repetitions(tuple(estimates))
+    prediction = None if validation is None else predict(estimates[0], regressor, validation)
+    known = None
+    if truth is not None:
+        extra = np.zeros(estimates[0].base.rank - base.rank)  # terms that the robot does not have
+        known = np.concatenate([base.values(truth), extra])
+    tell(1.0, "done")
+    return Findings(runs, choice, prediction, known)
+
+
+def find_consistent(runs: Repetitions, bounds: PhysicalBounds) -> ConsistentParameters:
+    """Return the consistent parameters nearest to the mean of repeated runs.
+
+    Args:
+        runs: Estimates of the same parameters.
+        bounds: What is known of the bodies.
+
+    Raises:
+        InputError: See :func:`~identification.consistency.nearest.nearest_consistent`.
+    """
+    first = runs.estimates[0]
+    robot = first.robot_base
+    own = slice(0, robot.rank)
+    covariance = runs.covariance_of_mean[own, own]
+    return nearest_consistent(robot, runs.mean[own], covariance, bounds)

@@ -1,0 +1,124 @@
+"""Pages of an identification in folders."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from identification.consistency.bounds import PhysicalBounds
+from identification.consistency.nearest import ConsistentParameters
+from identification.estimation.results import FILE_NAME, save_estimate
+from identification.excitation.cell import load_cell
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.recording import record_excitation
+from identification.findings import Findings
+from identification.measurement.drift import friction_trend
+from identification.measurement.periods import AveragedMotion
+from identification.measurement.prepare import read_motion
+from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from identification.report.page import PageContent, write_page
+from identification.steps import RECORDING, bounds_of, consistent_set, stored_findings
+from pfsc_drake.errors import InputError
+from reporting.folder import open_results
+from reporting.page import Report
+
+
+def write_identification(
+    subject: Subject,
+    findings: Findings,
+    other: AveragedMotion | None,
+    folder: Path,
+    inputs: Sequence[Path],
+    bounds: Path | None,
+) -> Report:
+    """Write ``identification.h5`` and a page.
+
+    Args:
+        subject: The robot.
+        findings: What was estimated.
+        other: Motion that was not used.
+        folder: Where.
+        inputs: Files that it is from.
+        bounds: What is known of the links; None for what is shipped, if anything.
+    """
+    with open_results(folder, "identification", inputs) as results:
+        save_estimate(folder / FILE_NAME, findings.estimate, findings.runs)
+        content = PageContent(
+            subject,
+            findings,
+            other_t=None if other is None else other.t,
+            consistent=_consistent(subject, findings, bounds),
+            warnings=_warnings(findings),
+        )
+        return write_page(results, content)
+
+
+def write_stored(
+    subject: Subject,
+    source: Path,
+    validation: Path | None,
+    bounds: Path | None,
+    excitation: Path | None,
+    simulated: bool,
+    folder: Path,
+) -> Report:
+    """Write a page about a stored identification.
+
+    Args:
+        subject: The robot.
+        source: Folder with ``identification.h5``, or the file.
+        validation: Record of a motion that was not used.
+        bounds: What is known of the links; None for what is shipped, if anything.
+        excitation: Coefficients of the motion, to see the robot move.
+        simulated: Whether the robot's model is the truth.
+        folder: Where to write.
+    """
+    other = None if validation is None else read_motion(validation, Regressor(subject))
+    findings = stored_findings(subject, source, other, simulated)
+    with open_results(folder, "identification") as results:
+        recording = None
+        if excitation is not None:
+            cell = None if subject.chain is None else load_cell(None, subject.name)
+            page = record_excitation(subject, FourierTrajectory.load(excitation), cell=cell)
+            recording = RECORDING if results.write(RECORDING, page) else None
+        content = PageContent(
+            subject,
+            findings,
+            other_t=None if other is None else other.t,
+            consistent=_consistent(subject, findings, bounds),
+            recording=recording,
+        )
+        return write_page(results, content)
+
+
+def _consistent(
+    subject: Subject, findings: Findings, file: Path | None
+) -> ConsistentParameters | None:
+    """Return the consistent set, or None if nothing is known of the links."""
+    found: PhysicalBounds | None = None
+    try:
+        found = bounds_of(subject, file)
+    except InputError:
+        if file is not None:
+            raise
+    return None if found is None else consistent_set(findings, found, direct=False)
+
+
+def _warnings(findings: Findings) -> list[str]:
+    """Return what may not be as it should, one sentence each."""
+    said = []
+    for run, estimate in enumerate(findings.runs.estimates, start=1):
+        if not isinstance(estimate.motion, AveragedMotion):
+            continue
+        trend = friction_trend(estimate.motion)
+        for j in np.flatnonzero(trend.changes):
+            said.append(
+                f"run {run}: friction of {estimate.joint_names[j]} changed by "
+                f"{trend.coulomb[j]:.3g} and {trend.viscous[j]:.3g} times the velocity from the "
+                "first to the last period"
+            )
+        if run == 1 and estimate.coloured.any():
+            names = ", ".join(np.array(estimate.joint_names)[estimate.coloured])
+            said.append(f"the noise of {names} has a colour, which the covariance knows")
+    return said

@@ -1,0 +1,129 @@
+"""Tables of an identification, for pages and terminals."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table as TerminalTable
+
+from identification.consistency.nearest import ConsistentParameters
+from identification.estimation.choice import FrictionChoice
+from identification.estimation.least_squares import Estimate
+from identification.findings import Findings
+from reporting.page import Table
+
+
+def parameter_table(findings: Findings) -> Table:
+    """Return Tab. C.3: each base parameter with its standard deviations."""
+    rows: list[list[str | float]] = [
+        [
+            str(row.number),
+            row.combination,
+            row.mean,
+            row.unit,
+            row.relative_deviation,
+            row.predicted_deviation,
+            row.truth,
+        ]
+        for row in findings.runs.parameter_rows(findings.truth)
+    ]
+    return Table(
+        "Base parameters",
+        "Mean of the runs; standard deviation of one run in % of it, of the runs and predicted.",
+        ["", "parameter", "mean", "unit", "of the runs in %", "predicted in %", "true"],
+        rows,
+    )
+
+
+def torque_table(findings: Findings) -> Table:
+    """Return Tab. C.4: what the model leaves of the torques, beside their noise."""
+    used = findings.prediction
+    rows: list[list[str | float]] = []
+    for j, row in enumerate(findings.runs.torque_rows()):
+        other = [float("nan")] * 2 if used is None else [used.error_rms[j], 100 * used.explained[j]]
+        rows.append(
+            [
+                row.joint,
+                row.unit,
+                row.noise_level,
+                row.error_rms,
+                100.0 * row.explained,
+                *map(float, other),
+            ]
+        )
+    head = [
+        "joint",
+        "unit",
+        "noise",
+        "error",
+        "explained in %",
+        "error, not used",
+        "explained in %",
+    ]
+    caption = (
+        "Root mean squares of single measured torques: noise, and error of the model on the motion "
+        "that it is from and on one that was not used; share of the torques' variance that it "
+        "explains."
+    )
+    return Table("Torques", caption, head, rows)
+
+
+def weakness_table(estimate: Estimate) -> Table:
+    """Return what is badly identifiable, and why."""
+    rows: list[list[str | float]] = [
+        [weak.name, 100.0 * weak.relative_deviation, weak.reason]
+        for weak in estimate.weak_parameters()
+    ]
+    caption = "Parameters with a standard deviation above 15 % of their value."
+    return Table("Badly identifiable", caption, ["parameter", "in %", "why"], rows)
+
+
+def friction_table(choice: FrictionChoice, joints: Sequence[str]) -> Table:
+    """Return the friction terms that were tried."""
+    rows: list[list[str | float]] = [
+        [
+            joints[judged.term.joint],
+            judged.term.kind,
+            "" if judged.term.width is None else f"{judged.term.width:.3g}",
+            100.0 * judged.share,
+            judged.significance,
+            "chosen" if judged.chosen else "",
+        ]
+        for judged in choice.judgements
+    ]
+    caption = (
+        "By how much terms beside Coulomb and viscous friction lower the error of a motion that "
+        f"was not used; chosen above a significance of {choice.threshold:.2f}."
+    )
+    head = ["joint", "term", "width", "share in %", "significance", ""]
+    return Table("Friction", caption, head, rows)
+
+
+def consistent_table(found: ConsistentParameters, units: Sequence[str]) -> Table:
+    """Return all parameters of the consistent set."""
+    rows: list[list[str | float]] = [
+        [name, value, unit]
+        for name, value, unit in zip(found.names, found.parameters.tolist(), units, strict=True)
+    ]
+    caption = f"Every link is a body of positive density; chi squared {found.chi_squared:.4g}."
+    return Table("Physically consistent parameters", caption, ["parameter", "value", "unit"], rows)
+
+
+def print_table(console: Console, table: Table, most: int | None = None) -> None:
+    """Print a table.
+
+    Args:
+        console: Where.
+        table: Which.
+        most: Rows to print at most; None for all.
+    """
+    shown = TerminalTable(title=table.title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    numbers = {k for row in table.rows for k, cell in enumerate(row) if not isinstance(cell, str)}
+    for k, name in enumerate(table.head):
+        shown.add_column(name, justify="right" if k in numbers else "left")
+    for row in table.rows[:most]:
+        shown.add_row(*(escape(x) if isinstance(x, str) else f"{x:.4g}" for x in row))
+    console.print(shown)
+    if most is not None and len(table.rows) > most:
+        console.print(f"... {len(table.rows) - most} more on the page", style="dim")
+    console.print()

@@ -1,0 +1,243 @@
+"""The steps of an identification on files, as the command line has them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from identification.consistency.bounds import PhysicalBounds, load_bounds
+from identification.consistency.direct import estimate_consistent
+from identification.consistency.nearest import ConsistentParameters
+from identification.consistency.writing import WrittenModel, write_model
+from identification.estimation.repetitions import Repetitions
+from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
+from identification.estimation.results import save_estimate as save_estimate
+from identification.estimation.validation import predict
+from identification.excitation.cell import load_cell
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.recording import record_excitation
+from identification.excitation.run_in import rest_to_rest
+from identification.excitation.search import SearchResult
+from identification.findings import Findings, find_consistent, find_parameters
+from identification.measurement.columns import Reading
+from identification.measurement.experiment import run_experiment
+from identification.measurement.files import write_record
+from identification.measurement.imperfections import Imperfections
+from identification.measurement.periods import AveragedMotion
+from identification.measurement.prepare import read_motion
+from identification.model.base import base_parameters
+from identification.model.parameters import true_parameters
+from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.robot.models.files import models_directory
+
+EXCITATION, RUN, RECORDING = "excitation.yaml", "excitation.csv", "excitation.html"
+_RATE = 1000.0  # Hz, of the motion for a robot's controller
+
+
+def save_excitation(subject: Subject, found: SearchResult, folder: Path, periods: int) -> None:
+    """Write an excitation: coefficients, motion from rest to rest, and a page that plays it.
+
+    Args:
+        subject: The robot.
+        found: What was found.
+        folder: Where; made if it is not there.
+        periods: How often the motion is run.
+    """
+    make_folder(folder)
+    trajectory, joints = found.trajectory, subject.joint_names
+    trajectory.save(
+        folder / EXCITATION, subject.name, f"{found.criterion}-optimal", joints, found.figures
+    )
+    run = rest_to_rest(
+        trajectory, subject.velocity_limit, subject.acceleration_limit, periods=periods, rate=_RATE
+    )
+    run.export_csv(folder / RUN, _RATE, list(subject.joint_units))
+    cell = None if subject.chain is None else load_cell(None, subject.name)
+    record_excitation(subject, trajectory, folder / RECORDING, cell)
+
+
+def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
+    """Return the excitation of a file, or the best one that is shipped with the robot.
+
+    Raises:
+        InputError: If there is none, or the file cannot be read.
+    """
+    if file is not None:
+        return FourierTrajectory.load(file)
+    shipped = models_directory() / subject.name / "excitation_optimal.yaml"
+    if not shipped.is_file():
+        raise InputError(
+            f"--excitation: none is shipped for {subject.name}; make one with: "
+            f"python -m identification excite {subject.name}"
+        )
+    return FourierTrajectory.load(shipped)
+
+
+def simulate_runs(
+    subject: Subject,
+    trajectory: FourierTrajectory,
+    imperfections: Imperfections | None,
+    folder: Path,
+    runs: int,
+    seed: int,
+    progress: Progress,
+) -> list[Path]:
+    """Simulate an experiment several times, and return the files with what was measured.
+
+    Args:
+        subject: The robot.
+        trajectory: The excitation.
+        imperfections: Of all runs; None for those shipped with the robot.
+        folder: Where to write; made if it is not there.
+        runs: How many.
+        seed: Of the first one.
+        progress: Told the fraction done and what is done.
+    """
+    make_folder(folder)
+    files = []
+    for run in range(runs):
+
+        def tell(fraction: float, phase: str, run: int = run) -> None:
+            progress((run + fraction) / runs, f"run {run + 1} of {runs}, {phase}")
+
+        measured = run_experiment(
+            subject, trajectory, imperfections, seed=seed + run, progress=tell
+        )
+        files.append(folder / f"run_{seed + run}.h5")
+        write_record(files[-1], measured.record, subject)
+    return files
+
+
+def estimate_files(
+    subject: Subject,
+    records: Sequence[Path],
+    validation: Path | None,
+    reading: Reading,
+    *,
+    period: float | None = None,
+    skip: int = 1,
+    bandwidth_hz: float | None = None,
+    choose: bool = True,
+    simulated: bool = False,
+    progress: Progress,
+) -> tuple[Findings, AveragedMotion | None]:
+    """Return what files with measured motions tell, and the motion that was not used.
+
+    Args:
+        subject: The robot.
+        records: Runs of one excitation.
+        validation: Of another motion.
+        reading: What files say in other words or not at all.
+        period: Of the excitation [s], if files do not state it.
+        skip: Periods at the start that are left out.
+        bandwidth_hz: Of the motion [Hz]; by default ``20 / T_f``.
+        choose: Whether to choose friction beyond Coulomb's and viscous.
+        simulated: Whether the robot's model is the truth.
+        progress: Told the fraction done and what is done.
+    """
+    regressor = Regressor(subject)
+    total, motions = len(records) + (validation is not None), []
+    for k, path in enumerate([*records, *([validation] if validation else [])]):
+        progress(0.5 * k / total, f"reading {path.name}")
+        motions.append(
+            read_motion(path, regressor, period, reading, skip=skip, bandwidth_hz=bandwidth_hz)
+        )
+    other = motions.pop() if validation is not None else None
+    findings = find_parameters(
+        regressor,
+        base_parameters(regressor),
+        motions,
+        other,
+        choose=choose,
+        truth=true_parameters(subject) if simulated else None,
+        progress=lambda fraction, phase: progress(0.5 + 0.5 * fraction, phase),
+    )
+    return findings, other
+
+
+def stored_findings(
+    subject: Subject, path: Path, other: AveragedMotion | None, simulated: bool
+) -> Findings:
+    """Return the findings that ``identification.h5`` holds.
+
+    Args:
+        subject: The robot.
+        path: The file, or the folder that it is in.
+        other: A motion to predict, if any.
+        simulated: Whether the robot's model is the truth.
+
+    Raises:
+        InputError: If the file cannot be read, or is of another robot.
+    """
+    stored = load_stored(subject, path)
+    first = stored.estimate
+    runs = [first] + [
+        replace(first, base_parameters=values, covariance=covariance)
+        for values, covariance in zip(
+            stored.repeated[1:], stored.repeated_covariance[1:], strict=True
+        )
+    ]
+    prediction = None if other is None else predict(first, Regressor(subject), other)
+    truth = None
+    if simulated:
+        extra = np.zeros(len(first.friction.terms))
+        truth = np.concatenate([first.robot_base.values(true_parameters(subject)), extra])
+    return Findings(Repetitions(tuple(runs)), None, prediction, truth)
+
+
+def load_stored(subject: Subject, path: Path) -> StoredIdentification:
+    """Return the content of ``identification.h5`` of a robot.
+
+    Raises:
+        InputError: If the file cannot be read, or is of another robot.
+    """
+    file = path / FILE_NAME if path.is_dir() else path
+    stored = load_estimate(file)
+    if stored.estimate.robot != subject.name:
+        raise InputError(f"{file}: of {stored.estimate.robot}; must be of {subject.name}")
+    return stored
+
+
+def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
+    """Return what is known of a robot's bodies: of a file, else what is shipped.
+
+    Raises:
+        InputError: If there is neither, or the file cannot be read.
+    """
+    return load_bounds(subject.name if file is None else file)
+
+
+def consistent_set(
+    findings: Findings, bounds: PhysicalBounds, direct: bool
+) -> ConsistentParameters:
+    """Return the consistent set of what was found.
+
+    Args:
+        findings: Base parameters.
+        bounds: What is known of the bodies.
+        direct: Whether in one step from the first motion, in place of the mean of the runs.
+    """
+    if direct:
+        return estimate_consistent(findings.estimate, bounds)
+    return find_consistent(findings.runs, bounds)
+
+
+def write_consistent(subject: Subject, found: ConsistentParameters, folder: Path) -> WrittenModel:
+    """Write the model of a consistent set, without friction that models do not have."""
+    return write_model(subject, found.parameters[: len(true_parameters(subject))], folder)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder with its parents.
+
+    Raises:
+        InputError: If that is not possible.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
