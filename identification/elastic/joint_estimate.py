@@ -83,7 +83,7 @@ def check_estimate(where: str, estimate: JointEstimate) -> None:
         raise InputError(
             f"{where}: not excited as an elastic joint: stiffness {value:.3g} with a standard "
             f"deviation of {deviation:.3g}; must be below {_VAGUE:g} of it, torques that twist the "
-            "joint more are required"
+            "joint more are required (or q_motor is of another joint or by another gear ratio)"
         )
     for name in ("stiffness", "inertia", "viscous", "damping"):
         if name not in estimate.parameters:

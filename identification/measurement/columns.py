@@ -151,7 +151,8 @@ class _Table:
         values: Mapping[str, str | float] = getattr(self._reading, option)
         own = f"{signal}_{self._robot.joint_names[index]}"
         for key in (self._label(signal, index), own, signal):
-            if key in values:
+            # q of a joint 'motor_2' is no q_motor of joint 2
+            if key in values and (parse_name(key) or ("",))[0] == signal:
                 self._unused[option].discard(key)
                 return values[key]
         return None
