@@ -87,7 +87,8 @@ def build_station(
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
     signals |= add_friction(builder, part, true_state, scenario, folder, faults)
     signals |= states_to_log(scenario, true_state, joint_state)
-    log = add_log(builder, signals, scenario.controller.sampling_time)
+    discrete = part.drives.step is not None
+    log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "station")
     link_state = part.coordinates.link_rows @ initial_state

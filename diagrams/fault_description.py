@@ -83,9 +83,7 @@ def first_instant(
     ]
     if k == len(times):
         # it is so new that it has not been logged
-        row = log.sink.get_input_port().Eval(log.sink.GetMyContextFromRoot(root))
-        now = {name: row[rows] for name, rows in log.rows.items()}
-        instants.append(Instant(root.get_time(), now))
+        instants.append(Instant(root.get_time(), log.now(root)))
     return instants[-1], instants[0] if len(instants) > 1 else None
 
 

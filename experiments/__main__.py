@@ -2,8 +2,8 @@
 
 import sys
 
-from experiments.interruption import leave_when_interrupted
-from experiments.terminal import prepare_streams, silence_libraries
+from reporting.interruption import leave_when_interrupted
+from reporting.terminal import prepare_streams, silence_libraries
 
 if __name__ == "__main__":
     leave_when_interrupted()

@@ -21,15 +21,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
-from experiments.interruption import INTERRUPTED, raised_interruption
 from experiments.outcomes import fail, judge_run, judge_sweep, print_run, print_sweep, show_page
-from experiments.progress import ProgressDisplay
-from experiments.terminal import one_line, print_error
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
+from reporting.interruption import INTERRUPTED, raised_interruption
+from reporting.progress import ProgressDisplay
+from reporting.terminal import one_line, print_error
 
 if TYPE_CHECKING:
-    from experiments.pages.report import Report
+    from reporting.page import Report
 
 _LONGEST_AFTER_FAULT = 100.0  # s
 

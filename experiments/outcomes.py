@@ -8,14 +8,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.interruption import INTERRUPTED
-from experiments.terminal import print_error
+from reporting.interruption import INTERRUPTED
+from reporting.terminal import print_error
 
 if TYPE_CHECKING:
-    from experiments.pages.report import Report
-    from experiments.results.metrics import Metric
     from experiments.run import RunOutcome
     from experiments.sweep.sweep import SweepOutcome
+    from reporting.metrics import Metric
+    from reporting.page import Report
 
 WRONG_INPUT = 2
 FAULT = 3
@@ -96,7 +96,7 @@ def _print_page(console: Console, invitation: str, page: Path | None) -> None:
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
-    from experiments.results.units import format_quantity
+    from reporting.units import format_quantity
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("Metric", no_wrap=True)

@@ -16,11 +16,11 @@ from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
 from experiments.length import check_frames, check_length
-from experiments.progress import ProgressListener
 from experiments.results.targets import check_targets
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.typed import load_typed
+from reporting.progress import ProgressListener
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,13 @@ from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.wording import posture_text
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import render_figures
-from experiments.interruption import noticed_interruption
-from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import PreparedRun, prepare
-from experiments.progress import ProgressListener
-from experiments.results.folder import ResultsFolder, check_folder, open_results
 from experiments.results.friction_metrics import friction_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import lap_length
-from experiments.results.metrics import Metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.posture_metrics import posture_metrics
 from experiments.results.press_metrics import press_metrics
-from experiments.results.provenance import standard_attributes
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
@@ -37,6 +31,12 @@ from experiments.simulation import simulate
 from experiments.studies.margins.analysis import MarginAnalysis, analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.words import metrics_of, one_line
+from reporting.folder import ResultsFolder, check_folder, open_results
+from reporting.interruption import noticed_interruption
+from reporting.metrics import Metrics
+from reporting.page import Report, report_page, write_report
+from reporting.progress import ProgressListener
+from reporting.provenance import standard_attributes
 
 _MOVING = 0.01  # m/s, from which on the tool counts as moving
 
@@ -100,7 +100,7 @@ def run_scenario(
 
     Args:
         scenario: The scenario as read.
-        out: Folder for the results, see :func:`experiments.results.folder.open_results`.
+        out: Folder for the results, see :func:`reporting.folder.open_results`.
         duration: Simulated time [s] instead of the scenario's.
         figures: Whether to draw figures.
         recording: Whether to record the motion.

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context
 
 from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
-from experiments.progress import ProgressListener
+from reporting.progress import ProgressListener
 
 # progress and faults are looked at this often [s]; between them nothing interrupts the loop
 _CHUNK = 0.05

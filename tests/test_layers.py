@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LAYERS = [
     ["experiments"],
     ["identification"],
+    ["reporting"],
     ["diagrams"],
     ["pfsc_drake.systems"],
     ["pfsc_drake.physics"],
@@ -45,7 +46,8 @@ UNKNOWN = {
     "pfsc_drake.geometry": ["pydrake", "casadi", "matplotlib"],
     "pfsc_drake.control": ["pydrake", "matplotlib"],
     "pfsc_drake.physics": ["pydrake", "matplotlib"],
-    "pfsc_drake": ["matplotlib", "diagrams", "experiments", "identification"],
+    "pfsc_drake": ["matplotlib", "diagrams", "experiments", "identification", "reporting"],
+    "reporting": ["pydrake", "diagrams"],
     "diagrams": ["matplotlib", "h5py", "typer", "rich"],
 }
 # what the law knows is any manifold, not a particular one
@@ -61,7 +63,7 @@ LAW_KNOWS_NO = [
 def modules():
     """Return the imported modules of every file, by the file's own module."""
     found = {}
-    for top in ("experiments", "identification", "diagrams", "pfsc_drake"):
+    for top in ("experiments", "identification", "reporting", "diagrams", "pfsc_drake"):
         for file in (ROOT / top).rglob("*.py"):
             name = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
             imported = set()

@@ -33,7 +33,7 @@ def build_delta_replay(
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
     """
-    _arrange_scene(np.concatenate(manifold.outline())[:, 2], meshcat)
+    arrange_scene(np.concatenate(manifold.outline())[:, 2], meshcat)
     if workpiece is not None:
         look_down_at(meshcat, np.array([0.0, 0.0, _CLEARANCE]))
     builder = DiagramBuilder()
@@ -43,8 +43,13 @@ def build_delta_replay(
     return builder.Build()
 
 
-def _arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
-    """Hang the robot above the grid, and look at it from the side, level with the rods."""
+def arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
+    """Hang the robot above the grid, and look at it from the side, level with the rods.
+
+    Args:
+        depth: Where something is to be seen, z_0 down [m], shape (K,).
+        meshcat: Where to draw.
+    """
     height = float(depth.max()) + _CLEARANCE
     turn_scene_over(meshcat, height)
     target = np.array([0.0, 0.0, height - 0.55 * depth.max()])

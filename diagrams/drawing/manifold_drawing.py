@@ -9,9 +9,10 @@ from pydrake.systems.framework import DiagramBuilder, InputPort
 
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
+from pfsc_drake.geometry.path_on_surface import CurveOnSurface
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
-from pfsc_drake.systems.drawing.surface_visualizer import SurfaceVisualizer
+from pfsc_drake.systems.drawing.surface_visualizer import SurfaceVisualizer, draw_surface
 
 _POINTS = 600
 # of a surface, in each direction, and of the points of each line
@@ -39,7 +40,7 @@ class ManifoldDrawing(Protocol):
 
 @dataclass(frozen=True)
 class PathDrawing:
-    """A path, drawn.
+    """A path, drawn, and the surface that it lies on, if any.
 
     Attributes:
         path: The path.
@@ -56,6 +57,9 @@ class PathDrawing:
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """See :class:`ManifoldDrawing`."""
+        curve = self.path.position
+        if isinstance(curve, CurveOnSurface):
+            draw_surface(meshcat, "path_surface", *_skin_and_lines(curve.surface))
         visualizer = PathVisualizer(self.path, self.layout, meshcat, period)
         drawing = builder.AddNamedSystem("path_visualizer", visualizer)
         return drawing.GetInputPort("path_point")
@@ -75,9 +79,7 @@ class SurfaceDrawing:
 
     def outline(self) -> list[np.ndarray]:
         """See :class:`ManifoldDrawing`."""
-        grid = self._grid(_LINE_POINTS)
-        stride = (_LINE_POINTS - 1) // (_LINES - 1)
-        return [*grid[::stride], *np.swapaxes(grid, 0, 1)[::stride]]
+        return _skin_and_lines(self.surface)[1]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """See :class:`ManifoldDrawing`."""
@@ -86,16 +88,18 @@ class SurfaceDrawing:
         def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return point[layout.position][:3], self.manifold.axes(point)
 
+        skin, lines = _skin_and_lines(self.surface)
         drawing = builder.AddNamedSystem(
             "surface_visualizer",
-            SurfaceVisualizer(
-                self._grid(_LINE_POINTS), self.outline(), layout.size, place, meshcat, period
-            ),
+            SurfaceVisualizer(skin, lines, layout.size, place, meshcat, period),
         )
         return drawing.GetInputPort("manifold_point")
 
-    def _grid(self, points: int) -> np.ndarray:
-        """Return points of the surface on a grid [m], shape (points, points, 3)."""
-        first, second = (np.linspace(*ends, points) for ends in self.surface.domain)
-        theta = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
-        return self.surface.partials(theta, 0)[..., 0, :]
+
+def _skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return points of a surface on a grid [m], shape (points, points, 3), and lines of it."""
+    first, second = (np.linspace(*ends, _LINE_POINTS) for ends in surface.domain)
+    theta = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
+    grid = surface.partials(theta, 0)[..., 0, :]
+    stride = (_LINE_POINTS - 1) // (_LINES - 1)
+    return grid, [*grid[::stride], *np.swapaxes(grid, 0, 1)[::stride]]

@@ -68,6 +68,7 @@ class RecordedMotion:
         pushes: What pushes its links.
         distance: What the colour of the tool's way tells; of one colour without.
         tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
+        trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
     """
 
     times: np.ndarray
@@ -78,6 +79,7 @@ class RecordedMotion:
     pushes: RecordedPushes | None = None
     distance: RecordedDistance | None = None
     tool_force: np.ndarray | None = None
+    trail: np.ndarray | None = None
 
 
 def build_replay(
@@ -188,7 +190,8 @@ def _add_tool(
     """Add the way of the tool, and the force on it, where it is recorded."""
     points, distance = motion.tool_pose[:, :3], motion.distance
     color = _TOOL if distance is None else partial(signed_color, largest=distance.largest)
-    trail = _add_trail(builder, "path_following", color, motion, points, meshcat, period)
+    way = points if motion.trail is None else motion.trail
+    trail = _add_trail(builder, "path_following", color, motion, way, meshcat, period)
     if distance is not None:
         source = add_source(builder, "distance", motion.times, distance.values[:, np.newaxis])
         builder.Connect(source, trail.GetInputPort("value"))

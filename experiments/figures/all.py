@@ -30,10 +30,10 @@ from experiments.figures.posture import (
     has_conditioning,
     has_pushes,
 )
-from experiments.figures.style import STYLE, Drawing, Figure, render
 from experiments.figures.surface_fit import draw_surface_fit
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals
+from reporting.style import STYLE, Drawing, Figure, render
 
 
 def render_figures(

@@ -4,7 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from experiments.figures.forces import shade_pushes
-from experiments.figures.style import (
+from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.geometry import angle_between
+from reporting.style import (
     BROAD,
     COLOURS,
     INK,
@@ -20,8 +22,6 @@ from experiments.figures.style import (
     place_legend,
     scale_to_late,
 )
-from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.geometry import angle_between
 
 MILLI = 1e3
 FLOOR = 1e-9  # m or rad; zero has no place on a logarithmic axis

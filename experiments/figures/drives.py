@@ -7,7 +7,8 @@ forces in N. The words follow the units of the signals.
 import numpy as np
 from matplotlib.axes import Axes
 
-from experiments.figures.style import (
+from experiments.results.run_log import RunLog, Signal
+from reporting.style import (
     ALERT,
     COLOURS,
     REFERENCE,
@@ -20,7 +21,6 @@ from experiments.figures.style import (
     scale_to_late,
     shade,
 )
-from experiments.results.run_log import RunLog, Signal
 
 MILLI = 1e3
 AT_REST = 0.01  # share of an axis' largest velocity, below which it counts as at rest

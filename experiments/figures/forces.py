@@ -6,7 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from experiments.figures.style import (
+from experiments.results.posture_metrics import PUSHED, push_size
+from experiments.results.run_log import FloatArray, RunLog
+from reporting.style import (
     INK,
     REFERENCE,
     Drawing,
@@ -16,8 +18,6 @@ from experiments.figures.style import (
     place_legend,
     shade,
 )
-from experiments.results.posture_metrics import PUSHED, push_size
-from experiments.results.run_log import FloatArray, RunLog
 
 FORCE_SIGNALS = ("manifold_force", "wrench_ext", "wrench_measured")
 LEVER = 1e-3  # m; moments below the largest force times this lever are noise and not drawn

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from experiments.figures.style import (
+from experiments.results.friction_metrics import relative_errors
+from experiments.results.run_log import RunLog
+from reporting.style import (
     BROAD,
     COLOURS,
     REFERENCE,
@@ -11,8 +13,6 @@ from experiments.figures.style import (
     make_panels,
     place_legend,
 )
-from experiments.results.friction_metrics import relative_errors
-from experiments.results.run_log import RunLog
 
 _SMALLEST_SPAN = 2.0  # %, of the axis of relative errors
 

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from experiments.figures.style import COLOURS, INK, REFERENCE, Drawing
 from experiments.results.run_log import RunLog
+from reporting.style import COLOURS, INK, REFERENCE, Drawing
 
 _SIZE = 5.0  # inches
 _MARGIN = 1.25  # of the picture, beyond the farthest point

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from experiments.figures.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing
 from experiments.results.run_log import FloatArray, RunLog
+from reporting.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing
 
 ARROW_COUNT = 5
 ELEVATION = 28.0  # degrees, of the viewer

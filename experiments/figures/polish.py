@@ -4,7 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from experiments.figures.style import (
+from experiments.results.press_metrics import TOUCHING, force_error, held_samples
+from experiments.results.run_log import RunLog
+from reporting.style import (
     BROAD,
     COLOURS,
     REFERENCE,
@@ -12,8 +14,6 @@ from experiments.figures.style import (
     make_panels,
     place_legend,
 )
-from experiments.results.press_metrics import TOUCHING, force_error, held_samples
-from experiments.results.run_log import RunLog
 
 BAND = 2.0  # N, to either side of the reference
 _SIZE = (7.0, 4.6)  # inches

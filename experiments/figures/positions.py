@@ -5,7 +5,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from experiments.figures.drives import MOVERS, axis_labels, plural
-from experiments.figures.style import (
+from experiments.results.posture_metrics import has_spare_joints
+from experiments.results.run_log import FloatArray, RunLog, Signal
+from reporting.style import (
     ALERT,
     COLOURS,
     INK,
@@ -15,8 +17,6 @@ from experiments.figures.style import (
     place_legend,
     shade,
 )
-from experiments.results.posture_metrics import has_spare_joints
-from experiments.results.run_log import FloatArray, RunLog, Signal
 
 POSITION_UNITS = {"rad": (180.0 / np.pi, "deg")}
 _REACH = 0.1  # of the range of an axis, below which its distance from a limit matters

@@ -5,7 +5,9 @@ import numpy as np
 from experiments.figures.drives import axis_labels
 from experiments.figures.forces import shade_pushes
 from experiments.figures.positions import position_unit
-from experiments.figures.style import (
+from experiments.results.posture_metrics import elbow_shift, has_spare_joints
+from experiments.results.run_log import RunLog
+from reporting.style import (
     ALERT,
     COLOURS,
     INK,
@@ -16,8 +18,6 @@ from experiments.figures.style import (
     make_panels,
     place_legend,
 )
-from experiments.results.posture_metrics import elbow_shift, has_spare_joints
-from experiments.results.run_log import RunLog
 
 MILLI = 1e3
 _WORTH_A_LOOK = 10.0  # times the threshold, below which conditioning is drawn of any arm

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from experiments.figures.style import COLOURS, INK, WIDTH, Drawing, fitting_unit
 from pfsc_drake.geometry.surfaces.residuals import Residuals
+from reporting.style import COLOURS, INK, WIDTH, Drawing, fitting_unit
 
 _BINS = 40
 _ROOM = 1.05  # of the largest distance

@@ -7,7 +7,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments.figures.style import (
+from experiments.results.run_log import RunLog
+from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.text_file import read_text
+from reporting.folder import open_results
+from reporting.metrics import Metrics
+from reporting.page import Report, report_page, write_report
+from reporting.style import (
     COLOURS,
     STYLE,
     Drawing,
@@ -16,12 +22,6 @@ from experiments.figures.style import (
     place_legend,
     render,
 )
-from experiments.pages.report import Report, report_page, write_report
-from experiments.results.folder import open_results
-from experiments.results.metrics import Metrics
-from experiments.results.run_log import RunLog
-from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.text_file import read_text
 
 _COMPARED = (
     "max_path_deviation",
@@ -50,7 +50,7 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Report:
 
     Raises:
         InputError: If a folder holds no run, or fewer than two are given, or ``out`` cannot take
-            the page (see :func:`experiments.results.folder.open_results`).
+            the page (see :func:`reporting.folder.open_results`).
     """
     if len(folders) < 2:
         raise InputError(f"compare: {len(folders)} run given; two or more are needed")

@@ -8,8 +8,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
+from reporting.metrics import Metrics
 
 _COEFFICIENTS = {"f_c": "coulomb", "f_v": "viscous"}
 

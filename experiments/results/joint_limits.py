@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.wording import coordinate_text
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.robot.robot_model import RobotModel
+from reporting.metrics import Metrics
 
 # relative; a limit that is missed by rounding is not passed
 _ROUNDING = 1e-9

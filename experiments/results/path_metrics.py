@@ -15,8 +15,8 @@ from collections.abc import Collection
 import numpy as np
 
 from experiments.results.drive_metrics import peak_torque, saturation_count
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
+from reporting.metrics import Metrics
 
 
 def path_distance(log: RunLog) -> FloatArray:

@@ -10,8 +10,8 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
+from reporting.metrics import Metrics
 
 REST = 0.1  # s, end of a run over which the joints' speeds are looked at
 AT_REST = 1e-3  # m/s, below which the tool rests

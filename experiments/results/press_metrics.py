@@ -10,8 +10,8 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import FloatArray, RunLog
+from reporting.metrics import Metrics
 
 TOUCHING = 0.5  # N, from which on the tool counts as on the workpiece
 SETTLING = 0.2  # s, from touch-down and full force on, until the force shall keep

@@ -7,6 +7,11 @@ from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPu
 from diagrams.station import Station
 from experiments.results.run_log import FloatArray, RunLog
 
+# of the tool's way over what it presses on, where it would be hidden [m]
+_LIFT = 3e-3
+# share of the samples whose distance fits the colours, and of the largest distance that it takes
+_LASTING, _LEAST_COLOR = 0.9, 0.1
+
 
 def collect_motion(
     station: Station, root: Context, period: float, log: RunLog, start: float
@@ -31,16 +36,26 @@ def collect_motion(
     pushes = None
     if "push_force" in log:
         pushes = RecordedPushes(log["push_point"].values[frames], log["push_force"].values[frames])
+    points = raw["manifold_point"][frames]
     return RecordedMotion(
         log.time[frames],
         positions,
         np.hstack([log["y_t"].values, log["R_e"].values])[frames],
-        raw["manifold_point"][frames],
+        points,
         log["elbow"].values[frames] if "elbow" in log else None,
         pushes,
         _distance(log.time[frames], log["xi"].values[frames], start),
         log["wrench_ext"].values[frames, :3] if "wrench_ext" in log else None,
+        _lifted(station, log["y_t"].values[frames], points),
     )
+
+
+def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:
+    """Return the tool's way above the workpiece that it gives way to, shape (frames, 3)."""
+    workpiece, place = station.workpiece, station.task.place
+    if workpiece is None or len(points) == 0 or workpiece.normal(place.axes(points[0])) is None:
+        return None
+    return y_t + _LIFT * np.array([workpiece.normal(place.axes(point)) for point in points])
 
 
 def _distance(times: FloatArray, xi: FloatArray, start: float) -> RecordedDistance | None:
@@ -54,5 +69,8 @@ def _distance(times: FloatArray, xi: FloatArray, start: float) -> RecordedDistan
     if xi.shape[1] != 1:
         return None
     counting = np.abs(xi[times >= start, 0])
-    largest = float(counting.max(initial=0.0))
-    return RecordedDistance(xi[:, 0], largest) if largest > 0.0 else None
+    if not counting.size or not counting.any():
+        return None
+    # what lasts, such as the shape of a workpiece, is to be seen beside a short way to it
+    largest = float(max(np.quantile(counting, _LASTING), _LEAST_COLOR * counting.max()))
+    return RecordedDistance(xi[:, 0], largest)

@@ -2,10 +2,10 @@
 
 import math
 
-from experiments.results.metrics import Metrics
 from pfsc_drake.geometry import ShapeReport
 from pfsc_drake.geometry.surfaces.report import SurfaceReport
 from pfsc_drake.geometry.surfaces.residuals import Residuals
+from reporting.metrics import Metrics
 
 
 def shape_metrics(shape: ShapeReport | SurfaceReport, fit: Residuals | None = None) -> Metrics:

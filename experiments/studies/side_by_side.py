@@ -4,10 +4,10 @@ from collections.abc import Callable, Hashable, Mapping
 from typing import TypeVar
 
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.interruption import noticed_interruption
 from experiments.sweep.many import run_many
 from experiments.sweep.rows import RunRow
 from experiments.sweep.worker import RunTask
+from reporting.interruption import noticed_interruption
 
 Key = TypeVar("Key", bound=Hashable)
 

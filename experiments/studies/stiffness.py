@@ -12,10 +12,6 @@ from matplotlib.figure import Figure as Canvas
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
-from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.pages.report import Report
-from experiments.results.folder import open_results
-from experiments.results.metrics import Metrics
 from experiments.studies.side_by_side import run_side_by_side
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.rows import COMPLETED, RunRow
@@ -23,6 +19,10 @@ from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
+from reporting.folder import open_results
+from reporting.metrics import Metrics
+from reporting.page import Report
+from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
 LAWS = ("elastic", "visco_elastic", "singular_perturbation", "rigid", "velocity_servo")
 # of laws that the scenario is not made for: Tab. 4.4, and a loop that is slow against its servos
@@ -96,7 +96,7 @@ def write_study(
 
     Raises:
         InputError: If ``out`` cannot take the page (see
-            :func:`experiments.results.folder.open_results`); nothing has been run then.
+            :func:`reporting.folder.open_results`); nothing has been run then.
     """
     with open_results(out, "study") as results:
         points = _run_all(progress, laws, stiffnesses)

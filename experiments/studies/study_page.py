@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from experiments.figures.style import Figure
-from experiments.pages.report import Report, report_page, write_report
-from experiments.results.folder import ResultsFolder
-from experiments.results.metrics import Metrics
-from experiments.results.provenance import standard_attributes
+from reporting.folder import ResultsFolder
+from reporting.metrics import Metrics
+from reporting.page import Report, report_page, write_report
+from reporting.provenance import standard_attributes
+from reporting.style import Figure
 
 
 def write_study_page(

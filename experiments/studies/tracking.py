@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import read_scenario
-from experiments.figures.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
-from experiments.pages.report import Report
-from experiments.results.folder import open_results
-from experiments.results.metrics import Metrics
 from experiments.studies.side_by_side import run_side_by_side
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.rows import COMPLETED, RunRow
+from reporting.folder import open_results
+from reporting.metrics import Metrics
+from reporting.page import Report
+from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
 
 _GAINS = "controller.gains.singular_perturbation.xi.coefficients"
 LAWS: Mapping[str, tuple[str, tuple[str, ...]]] = {
@@ -69,7 +69,7 @@ def write_tracking(
 
     Raises:
         InputError: If ``out`` cannot take the page (see
-            :func:`experiments.results.folder.open_results`); nothing has been run then.
+            :func:`reporting.folder.open_results`); nothing has been run then.
     """
     scenarios = {
         (law, force, robot): read_scenario(name, [*gains, *forces[force], *robots[robot]])

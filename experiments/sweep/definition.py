@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.results.folder import ResultsFolder
 from experiments.sweep.rows import RunRow
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.text_file import read_text
+from reporting.folder import ResultsFolder
 
 RECORD = "sweep.json"
 

@@ -12,11 +12,11 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from experiments.figures.style import ALERT, COLOURS, INK, STYLE, WIDTH, Drawing, Figure, render
-from experiments.results.units import format_quantity
 from experiments.sweep.rows import COMPLETED
 from experiments.sweep.summary import Spread
 from experiments.sweep.table import Columns
+from reporting.style import ALERT, COLOURS, INK, STYLE, WIDTH, Drawing, Figure, render
+from reporting.units import format_quantity
 
 MAX_PANELS = 12
 

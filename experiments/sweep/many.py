@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from experiments.sweep.cluster import count_cores, open_cluster
 from experiments.sweep.rows import DIED, FAILED, RunRow
 from experiments.sweep.worker import RunTask, run_task
-from experiments.terminal import one_line
 from pfsc_drake.errors import shortened
+from reporting.terminal import one_line
 
 if TYPE_CHECKING:
     from distributed import Client, Future

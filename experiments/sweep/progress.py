@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
-from experiments.progress import PLAIN_LINES
 from experiments.sweep.rows import COMPLETED
+from reporting.progress import PLAIN_LINES
 
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
 

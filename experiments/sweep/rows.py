@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from experiments.results.metrics import Metrics
+from reporting.metrics import Metrics
 
 COMPLETED = "completed"
 FAULT = "fault"  # the run was stopped by one

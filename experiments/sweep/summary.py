@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.results.metrics import Metric, Metrics
-from experiments.results.units import format_quantity
 from experiments.sweep.rows import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
+from reporting.metrics import Metric, Metrics
+from reporting.units import format_quantity
 
 # of the machine and what else it does, not of the robot
 MACHINE_METRICS = ("real_time_factor", "controller_tick_us", "controller_tick_us_p99")

@@ -9,11 +9,6 @@ from rich.console import Console
 
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
-from experiments.interruption import noticed_interruption
-from experiments.pages.report import report_page, write_report
-from experiments.results.folder import ResultsFolder, check_folder, open_results
-from experiments.results.metrics import Metrics
-from experiments.results.provenance import standard_attributes
 from experiments.sweep.cluster import count_cores
 from experiments.sweep.definition import SweepDefinition, SweepRecord, fingerprint
 from experiments.sweep.figures import draw_sweep
@@ -34,6 +29,11 @@ from experiments.sweep.worker import RunTask, program_revision
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
+from reporting.folder import ResultsFolder, check_folder, open_results
+from reporting.interruption import noticed_interruption
+from reporting.metrics import Metrics
+from reporting.page import report_page, write_report
+from reporting.provenance import standard_attributes
 
 _KIND = "sweep"
 # samples that are tried against the schema before anything runs

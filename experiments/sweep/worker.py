@@ -13,10 +13,10 @@ from typing import Any
 
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.results.provenance import git_revision
 from experiments.sweep.rows import COMPLETED, FAILED, FAULT, REFUSED, RunRow
-from experiments.terminal import one_line, silence_libraries
 from pfsc_drake.errors import InputError, shortened
+from reporting.provenance import git_revision
+from reporting.terminal import one_line, silence_libraries
 
 # of a worker that has several threads: compilation and the garbage collector know but one run
 _ONE_AT_A_TIME = threading.Lock()

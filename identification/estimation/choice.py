@@ -5,6 +5,9 @@ motion, its width included, and judged on another one: the decrease of the squar
 summed over sections of the motion, must be larger than chance explains, whatever the number of
 candidates, and be worth a parameter. The best one stays. In the end each term goes that is no
 longer worth it, now that others are there.
+
+Friction is not the same every day, and what matters here is its form. Before errors are squared,
+the sizes of Coulomb and viscous friction are therefore adapted to the motion that is judged on.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +26,7 @@ from identification.estimation.friction import (
     FrictionModel,
     FrictionTerm,
 )
+from identification.estimation.identifiability import factorize
 from identification.estimation.information import (
     SLOW,
     Information,
@@ -99,16 +103,19 @@ def choose_friction(
         regressor: Of the robot, with friction.
         base: Its base parameters.
         motion: That parameters are estimated on.
-        other: That they are judged on, another trajectory.
-        kinds: Candidates for each joint.
+        other: That they are judged on, another trajectory; need not excite all parameters.
+        kinds: Candidates for each joint, at least one.
         slow: Part of a joint's largest velocity below which its torques do not count.
         progress: Told the fraction done and what is done.
 
     Raises:
-        InputError: If the regressor is without friction, a kind is unknown, or a motion does not
-            fit the robot or is not exciting enough.
+        InputError: If the regressor is without friction, there is no kind or an unknown one, a
+            motion does not fit the robot, a joint stands still in one of them, or the first one
+            does not excite all parameters.
     """
     subject = regressor.subject
+    if not kinds:
+        raise InputError(f"friction: no kind to choose from; allowed: {', '.join(KINDS)}")
     if not regressor.friction:
         raise InputError(
             f"{subject.name}: regressor without friction; one with Coulomb and viscous friction is "
@@ -119,10 +126,10 @@ def choose_friction(
         if system.still.any():
             joint = subject.joint_names[int(np.argmax(system.still))]
             raise InputError(f"{subject.name}: {joint} stands still in the {what}; all must move")
-    joints = range(subject.dimension)
+    factorize(*systems[0].weighted(), base.short_names, subject.name)
     candidates = [
         FrictionTerm(joint, kind, 1.0 if kind in KINDS_WITH_WIDTH else None)
-        for joint in joints
+        for joint in range(subject.dimension)
         for kind in kinds
     ]
     search = _Search(_Data(systems[0], motion.v), _Data(systems[1], other.v), candidates)
@@ -169,10 +176,12 @@ class _Search:
         self._normal, self._right = training.X.T @ training.X, training.X.T @ training.b
         self._square = float(training.b @ training.b)
         self._fastest = np.abs(training.v).max(axis=0)
-        self.threshold = float(
-            student.ppf(1.0 - _ERROR / max(len(self._candidates), 1), _SECTIONS - 1)
-        )
+        self.threshold = float(student.ppf(1.0 - _ERROR / len(self._candidates), _SECTIONS - 1))
+        self._own = [self._friction_columns(j) for j in range(training.v.shape[1])]
         self._friction = self._friction_square()
+        self._adaptable = [
+            np.linalg.qr(test.by_joint[:, j, columns])[0] for j, columns in enumerate(self._own)
+        ]
         self._errors = lru_cache(maxsize=_REMEMBERED_ERRORS)(self._errors_of)
 
     def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
@@ -260,19 +269,24 @@ class _Search:
         return solution, float(squares)
 
     def _errors_of(self, model: FrictionModel) -> np.ndarray:
-        """Return the weighted errors in the other motion, shape (K, N)."""
+        """Return the weighted errors in the other motion, with its own f_c, f_v; shape (K, N)."""
         solution, size, data = self._solve(model)[0], len(self._right), self._test
         errors = data.torques - data.by_joint @ solution[:size]
         for factor, term in zip(solution[size:], model.terms, strict=True):
             errors[:, term.joint] -= factor * data.column(term)
+        for j, friction in enumerate(self._adaptable):
+            errors[:, j] -= friction @ (friction.T @ errors[:, j])
         return errors
+
+    def _friction_columns(self, j: int) -> list[int]:
+        names = self._test.base.short_names
+        return [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
 
     def _friction_square(self) -> np.ndarray:
         """Return the weighted mean square of Coulomb and viscous friction, shape (N,)."""
         solution, _ = self._solve(FrictionModel())
-        names, data = self._test.base.short_names, self._test
         squares = []
-        for j in range(data.v.shape[1]):
-            own = [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
-            squares.append(np.mean((data.by_joint[:, j, own] @ solution[own]) ** 2))
+        for j, columns in enumerate(self._own):
+            friction = self._test.by_joint[:, j, columns] @ solution[columns]
+            squares.append(np.mean(friction**2))
         return np.array(squares)

@@ -163,9 +163,13 @@ class WeakParameter:
             others = ", ".join(self.partners) or "many others, a little with each"
             reasons.append(
                 f"moves together with {others} (were all others known: "
-                f"{100.0 * self.relative_deviation_alone:.2g} %)"
+                f"{_percent(self.relative_deviation_alone)})"
             )
         return "; ".join(reasons)
+
+
+def _percent(ratio: float) -> str:
+    return "more than 1000 %" if ratio > 10.0 else f"{100.0 * ratio:.2g} %"
 
 
 def weak_parameters(

@@ -62,7 +62,7 @@ class SpreadTest:
 
     Attributes:
         chi_squared: ``sum_r (x_r - mean)' C^-1 (x_r - mean)``.
-        degrees_of_freedom: ``(R - 1) n_b``.
+        degrees_of_freedom: ``R - 1`` times the number of parameters that count.
         p_value: Probability of a chi-squared at least as far from the middle, on either side.
         median_ratio: Median of empirical by predicted standard deviations.
     """
@@ -124,6 +124,18 @@ class Repetitions:
         """Of one run, shape (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def covariance_of_mean(self) -> np.ndarray:
+        """Of ``mean``, shape (n_b, n_b).
+
+        The predicted one, larger where runs differ by more than it predicts, as friction does
+        that is another one each day.
+        """
+        predicted = self.covariance / len(self.estimates)
+        ratio = self.standard_deviation / self.predicted_standard_deviation
+        wider = np.maximum(1.0, np.nan_to_num(ratio, nan=1.0))
+        return predicted * np.outer(wider, wider)
+
     def parameter_rows(self, truth: np.ndarray | None = None) -> list[ParameterRow]:
         """Return the rows of Tab. C.3.
 
@@ -161,8 +173,12 @@ class Repetitions:
             )
         return rows
 
-    def spread_test(self) -> SpreadTest:
+    def spread_test(self, friction: bool = True) -> SpreadTest:
         """Compare the spread of the runs with what their covariance predicts.
+
+        Args:
+            friction: Whether parameters of friction count, which may be others in each run
+                while those of the bodies stay.
 
         Raises:
             InputError: If there is one run only.
@@ -170,11 +186,14 @@ class Repetitions:
         runs = len(self.estimates)
         if runs < 2:
             raise InputError("repetitions: one run; at least two are required for a spread")
-        deviations, covariance = self.values - self.mean, self.covariance
+        names = self.estimates[0].short_names
+        counts = [i for i, name in enumerate(names) if friction or ".f_" not in name]
+        covariance = self.covariance[np.ix_(counts, counts)]
+        deviations = (self.values - self.mean)[:, counts]
         value = sum(mahalanobis(deviation, covariance) for deviation in deviations)
-        freedom = (runs - 1) * len(self.mean)
+        freedom = (runs - 1) * len(counts)
         tail = min(float(chi2.cdf(value, freedom)), float(chi2.sf(value, freedom)))
-        ratio = np.median(self.standard_deviation / self.predicted_standard_deviation)
+        ratio = np.median((self.standard_deviation / self.predicted_standard_deviation)[counts])
         return SpreadTest(value, freedom, 2.0 * tail, float(ratio))
 
 

@@ -13,8 +13,8 @@ from pfsc_drake.errors import InputError
 
 # delays that residuals are compared with themselves at, in samples
 LAGS = 20
-# bandwidths of the motion that residuals are looked at in: friction has more harmonics than it
-_BANDWIDTHS = 5.0
+# of the period that residuals are looked at in
+_HARMONICS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +94,14 @@ class Excess:
     Attributes:
         joint_names: N names.
         highest_hz: Of the frequencies [Hz].
+        freedom: Degrees of freedom of the residuals of a joint.
         ratio: Shape (N,); 1 if there is nothing but noise.
         p_value: Probability of a larger ratio of noise, shape (N,).
     """
 
     joint_names: tuple[str, ...]
     highest_hz: float
+    freedom: float
     ratio: np.ndarray
     p_value: np.ndarray
 
@@ -125,7 +127,7 @@ def excess(
         residuals: Of the mean torques, shape (K, N).
         used: Which count, shape (K, N).
         motion: Whose residuals they are.
-        highest_hz: By default 5 times the bandwidth of the motion [Hz].
+        highest_hz: By default that of 100 harmonics of the period [Hz].
         parameters: Number that was estimated from the same torques, which takes away as many
             degrees of freedom; 0 for another motion.
 
@@ -135,7 +137,7 @@ def excess(
     """
     samples, joints = residuals.shape
     half = 0.5 * samples / motion.period
-    highest = min(_BANDWIDTHS * motion.bandwidth_hz, half) if highest_hz is None else highest_hz
+    highest = min(_HARMONICS / motion.period, half) if highest_hz is None else highest_hz
     count = int(np.floor(highest * motion.period * (1.0 + 1e-9)))
     if not 1 <= count <= samples // 2:
         raise InputError(
@@ -157,6 +159,7 @@ def excess(
     return Excess(
         tuple(motion.joint_names),
         float(highest),
+        freedom,
         ratio,
         fisher.sf(ratio, freedom, 2.0 * count * (motion.periods - 1)),
     )

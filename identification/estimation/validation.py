@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from identification.estimation.information import SLOW, MeasuredMotion, information
+from identification.estimation.information import SLOW, Information, MeasuredMotion, information
 from identification.estimation.least_squares import Estimate
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
@@ -69,7 +69,11 @@ class Prediction:
 
 
 def predict(
-    estimate: Estimate, regressor: Regressor, motion: MeasuredMotion, slow: float = SLOW
+    estimate: Estimate,
+    regressor: Regressor,
+    motion: MeasuredMotion,
+    slow: float = SLOW,
+    adapt_friction: bool = False,
 ) -> Prediction:
     """Return what an estimate predicts of another motion.
 
@@ -79,22 +83,44 @@ def predict(
         motion: The motion; need not excite all parameters.
         slow: Part of a joint's largest velocity below which its torques do not count where noise
             is compared with.
+        adapt_friction: Whether the sizes of Coulomb and viscous friction, which are not the same
+            every day, are fitted to the motion.
 
     Raises:
-        InputError: If the motion or the regressor do not fit the estimate.
+        InputError: If the motion or the regressor do not fit the estimate, or friction is to be
+            adapted and the regressor is without.
     """
     system = information(regressor, estimate.robot_base, motion, estimate.friction, slow)
+    predicted = system.matrix @ estimate.base_parameters
+    if adapt_friction:
+        predicted = predicted + _further_friction(system, predicted)
     deviation = system.matrix @ np.linalg.cholesky(_regular(estimate.covariance))
     return Prediction(
         estimate.joint_names,
         tuple("Nm" if unit == "rad" else "N" for unit in estimate.joint_units),
         system.torques,
-        system.matrix @ estimate.base_parameters,
+        predicted,
         system.used,
         np.asarray(motion.torque_variance),
         np.asarray(motion.mean_torque_variance),
         np.sqrt(np.mean(np.sum(deviation**2, axis=2), axis=0)),
     )
+
+
+def _further_friction(system: Information, predicted: np.ndarray) -> np.ndarray:
+    """Return the Coulomb and viscous friction that residuals ask for, shape (K, N)."""
+    names, further = system.base.short_names, np.zeros_like(predicted)
+    for j in range(predicted.shape[1]):
+        own = [f"joint_{j + 1}.{name}" for name in ("f_c", "f_v")]
+        if not set(own) <= set(names):
+            raise InputError(
+                "prediction: friction is to be adapted; a regressor with it is required"
+            )
+        columns = system.matrix[:, j, [names.index(name) for name in own]]
+        used = system.used[:, j]
+        residuals = system.torques[used, j] - predicted[used, j]
+        further[:, j] = columns @ np.linalg.lstsq(columns[used], residuals, rcond=None)[0]
+    return further
 
 
 def _regular(covariance: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """A robot's shapes covered by balls, whose distances are smooth functions of joint positions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,6 +9,7 @@ import numpy as np
 from pydrake.geometry import Capsule, Cylinder, GeometryId, SceneGraphInspector, Sphere
 
 from identification.excitation.scene import WORLD, RobotScene
+from identification.model.subject import Subject
 from pfsc_drake import jets
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import points_on_links
@@ -65,9 +67,7 @@ class RobotBalls:
 
 
 def cover(chain: SerialChain, scene: RobotScene) -> RobotBalls:
-    """Return balls that cover all shapes of a robot, and two without extent at its tip.
-
-    These are the origin of the last link's frame and the tool point, the last two balls.
+    """Return balls that cover all shapes of a robot.
 
     Args:
         chain: The robot.
@@ -80,14 +80,42 @@ def cover(chain: SerialChain, scene: RobotScene) -> RobotBalls:
             shapes.append(k)
             centers.append(shape.X_LG @ center)
             radii.append(radius)
-    last = chain.dimension - 1
     return RobotBalls(
         chain,
-        np.array([*links, last, last]),
-        np.array([*shapes, -1, -1]),
-        np.array([*centers, np.zeros(3), chain.p_LT]),
-        np.array([*radii, 0.0, 0.0]),
+        np.array(links, dtype=int),
+        np.array(shapes, dtype=int),
+        np.reshape(centers, (-1, 3)),
+        np.array(radii),
     )
+
+
+def ends(subject: Subject) -> dict[str, np.ndarray]:
+    """Return points of a serial robot's last link that its end effector lies between, by name.
+
+    In the last link's frame [m], each (3,): of a robot whose tool is known the flange, and the tool
+    point as long as the tool is there; of others the last joint and the tool point.
+
+    Args:
+        subject: The robot.
+    """
+    chain, parameters = subject.chain, subject.parameters
+    assert chain is not None
+    if parameters is None:
+        return {"last joint": np.zeros(3), "tool point": chain.p_LT}
+    flange = chain.p_LT - chain.R_LT @ parameters.tool.tool_point
+    return {"flange": flange} | ({"tool point": chain.p_LT} if subject.tool else {})
+
+
+def points_of_last_link(chain: SerialChain, points: Sequence[np.ndarray]) -> RobotBalls:
+    """Return points of a robot's last link as balls without extent.
+
+    Args:
+        chain: The robot.
+        points: In the last link's frame [m], n of shape (3,).
+    """
+    n = len(points)
+    links = np.full(n, chain.dimension - 1)
+    return RobotBalls(chain, links, np.full(n, -1), np.array(points), np.zeros(n))
 
 
 def covering_balls(

@@ -31,7 +31,8 @@ class Cell:
 
     Attributes:
         obstacles: None of them may be touched.
-        tool_above: Least z of the tool point in the world [m]; minus infinity for any.
+        tool_above: Least z of the end effector in the world [m], the flange where there is no tool;
+            minus infinity for any.
         clearance: Least distance between the robot and obstacles, and between links that are not
             neighbours [m].
         self_collision: Whether links that are no neighbours are checked against each other.

@@ -13,7 +13,13 @@ import casadi as ca
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from identification.excitation.balls import RobotBalls, cover, without_inner
+from identification.excitation.balls import (
+    RobotBalls,
+    cover,
+    ends,
+    points_of_last_link,
+    without_inner,
+)
 from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.scene import WORLD, RobotScene
 from identification.model.subject import Subject
@@ -23,7 +29,7 @@ from pfsc_drake.robot.delta.kinematics import rod_motion
 
 _SOFT = 0.004  # m, scale of the soft minimum
 _ROUND = 0.02  # m, by which edges of obstacles are rounded off
-_POSTURES = 2000
+_POSTURES = 800
 # balls that never come nearer in random postures are left to the check at the end [m]
 _NEAR = 0.06
 _ABOUT = 0.01  # m, of gaps that are about the least
@@ -69,17 +75,20 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
     lower, upper = np.clip(subject.position_limits, -_FULL_TURN, _FULL_TURN).T
     postures = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, chain.dimension))
     sampled = balls.sample(postures)
-    near = [(o, _near_obstacle(o, balls, scene, sampled, cell.clearance)) for o in cell.obstacles]
+    obstacles = cell.obstacles if balls.radii.size else []
+    near = [(o, _near_obstacle(o, balls, scene, sampled, cell.clearance)) for o in obstacles]
+    near = [(obstacle, numbers) for obstacle, numbers in near if numbers]
     pairs = _near_each_other(balls, scene, sampled, cell.clearance)
-    tips = [len(balls.radii) - 2, len(balls.radii) - 1]
-    used = {*tips, *(n for _, numbers in near for n in numbers), *(n for p in pairs for n in p)}
+    used = {*(n for _, numbers in near for n in numbers), *(n for p in pairs for n in p)}
     q = ca.SX.sym("q", chain.dimension)
     at = balls.places(q, sorted(used))
     elements: list[tuple[str, ca.SX]] = []
     if np.isfinite(cell.tool_above):
-        # what is on the line between both, such as a flange, is above, too
-        for name, tip in zip(("last joint", "tool point"), tips, strict=True):
-            elements.append((f"height of the {name}", at[tip][2] - cell.tool_above))
+        # so is what lies between them
+        tips = ends(subject)
+        places = points_of_last_link(chain, list(tips.values())).places(q, list(range(len(tips))))
+        for name, place in zip(tips, places.values(), strict=True):
+            elements.append((height_of(name), place[2] - cell.tool_above))
     for obstacle, numbers in near:
         distances = [_distance(obstacle, at[n]) - balls.radii[n] for n in numbers]
         elements.append((f"clearance of {obstacle.name}", soft_min(distances) - cell.clearance))
@@ -94,6 +103,11 @@ def serial_posture_limits(subject: Subject, cell: Cell, scene: RobotScene) -> Po
     names = [name for name, _ in elements]
     g = ca.densify(ca.vertcat(*[value for _, value in elements]))
     return PostureLimits(ca.Function("g", [q], [g], ["q"], ["g"]), names, ["m"] * len(names))
+
+
+def height_of(name: str) -> str:
+    """Return the name of the limit of an end's height."""
+    return f"height of the {name}"
 
 
 def delta_posture_limits(robot: DeltaRobot) -> PostureLimits:
@@ -168,9 +182,9 @@ def _near_obstacle(
     gaps = flat.reshape(-1, count) - balls.radii
     bodies = np.array([scene.shapes[k].body if k >= 0 else "" for k in balls.shapes])
     gaps[:, (balls.links == WORLD) | np.isin(bodies, obstacle.beside)] = np.inf
-    numbers = np.flatnonzero(_nearest(gaps, clearance))
+    numbers = np.flatnonzero(_nearest(gaps, clearance)).tolist()
     per_link = [[n for n in numbers if balls.links[n] == i] for i in range(balls.chain.dimension)]
-    return [int(n) for own in per_link for n in without_inner(balls, own)]
+    return [n for own in per_link for n in without_inner(balls, own)]
 
 
 def _near_each_other(

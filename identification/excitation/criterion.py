@@ -17,12 +17,12 @@ import numpy as np
 import scipy.linalg
 
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
+from identification.excitation.sampled import SampledFunction
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
-from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 
-Criterion = Literal["determinant", "condition"]
+Criterion = Literal["D", "condition"]
 CRITERIA: tuple[str, ...] = get_args(Criterion)
 # of one period, for figures that are compared
 REPORTED_SAMPLES = 1000
@@ -61,9 +61,7 @@ def information(
     values = np.linalg.svd(X, compute_uv=False)
     if not values[-1] > _SINGULAR * values[0]:
         return Information(-np.inf, np.inf, base.rank)
-    return Information(
-        2.0 * float(np.log(values).sum()), float(values[0] / values[-1]), base.rank
-    )
+    return Information(2.0 * float(np.log(values).sum()), float(values[0] / values[-1]), base.rank)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ class ExcitationCost:
         period: Of the motion [s].
         harmonics: Of it, M of them.
         samples: Per period.
-        criterion: ``determinant`` or ``condition``.
+        criterion: ``D`` or ``condition``.
 
     Raises:
         InputError: If the criterion is unknown or the samples are fewer than the parameters.
@@ -128,7 +126,7 @@ class ExcitationCost:
         period: float,
         harmonics: tuple[int, ...],
         samples: int,
-        criterion: str = "determinant",
+        criterion: str = "D",
     ) -> None:
         self._dimension, self._size = kernels.forward.size_out(0)
         if criterion not in CRITERIA:
@@ -140,8 +138,8 @@ class ExcitationCost:
             )
         self._samples, self._criterion = samples, criterion
         self._bases = fourier_basis(np.arange(samples) * period / samples, period, harmonics)
-        self._forward = BoundFunction(kernels.forward.map(samples))
-        self._adjoint = BoundFunction(kernels.adjoint.map(samples))
+        self._forward = SampledFunction(kernels.forward, samples)
+        self._adjoint = SampledFunction(kernels.adjoint, samples)
         self._shift = self._size * np.log(REPORTED_SAMPLES / samples)
 
     def __call__(self, coefficients: np.ndarray) -> tuple[float, np.ndarray]:
@@ -155,28 +153,22 @@ class ExcitationCost:
             shape of the coefficients.
         """
         motion = [basis @ coefficients.T for basis in self._bases]
-        for name, values in zip("qva", motion, strict=True):
-            self._forward.arguments[name][:] = values.ravel()
-            self._adjoint.arguments[name][:] = values.ravel()
-        self._forward.evaluate()
+        (columns,) = self._forward(*motion)
         # the matrices of the samples stand by columns, one after the other
-        Y = self._forward.results["Y"].reshape(self._samples, self._size, self._dimension)
+        Y = columns.reshape(self._samples, self._size, self._dimension)
         X = Y.transpose(0, 2, 1).reshape(-1, self._size)
         value, S = self._log_determinant(X) if self._by_determinant else _log_condition(X)
         if not np.isfinite(value):
             return np.inf, np.zeros_like(coefficients)
         seeds = S.reshape(self._samples, self._dimension, self._size).transpose(0, 2, 1)
-        self._adjoint.arguments["S"][:] = seeds.ravel()
-        self._adjoint.evaluate()
-        by_motion = self._adjoint.results["g"].reshape(self._samples, 3, self._dimension)
-        gradient = sum(
-            by_motion[:, i].T @ basis for i, basis in enumerate(self._bases)
-        )
+        (by_motion,) = self._adjoint(*motion, seeds)
+        by_motion = by_motion.reshape(self._samples, 3, self._dimension)
+        gradient = sum(by_motion[:, i].T @ basis for i, basis in enumerate(self._bases))
         return value, np.asarray(gradient)
 
     @property
     def _by_determinant(self) -> bool:
-        return self._criterion == "determinant"
+        return self._criterion == "D"
 
     def _log_determinant(self, X: np.ndarray) -> tuple[float, np.ndarray]:
         """Return ``-log det(X^T X)`` and its gradient by X, from ``X = Q R``."""

@@ -10,7 +10,7 @@ prints the sum without the factors ``1 / (k w_f)``; its Tab. C.2 keeps the limit
 them alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -115,7 +115,12 @@ class FourierTrajectory:
         return np.arange(samples_per_period(self.period, rate)) / rate
 
     def save(
-        self, path: str | Path, robot: str = "", source: str = "", joints: Sequence[str] = ()
+        self,
+        path: str | Path,
+        robot: str = "",
+        source: str = "",
+        joints: Sequence[str] = (),
+        figures: Mapping[str, float] | None = None,
     ) -> None:
         """Write the coefficients as YAML.
 
@@ -124,6 +129,7 @@ class FourierTrajectory:
             robot: What it is for.
             source: Where it is from.
             joints: Names of the joints.
+            figures: Of its quality, by name.
 
         Raises:
             InputError: If the file cannot be written.
@@ -137,6 +143,7 @@ class FourierTrajectory:
             "q_0": np.round(self.q_0, _DIGITS).tolist(),
             "a": np.round(self.a, _DIGITS).tolist(),
             "b": np.round(self.b, _DIGITS).tolist(),
+            "figures": dict(figures or {}),
         }
         write_text(Path(path), dump_yaml(content))
 
@@ -168,6 +175,7 @@ class ExcitationFile:
         q_0: ``[N]`` offsets [rad or m].
         a: ``[N, M]`` velocity amplitudes of the cosines [rad/s or m/s].
         b: ``[N, M]`` velocity amplitudes of the sines [rad/s or m/s].
+        figures: Of its quality, by name.
     """
 
     period: float = field(default=1.0, metadata=REQUIRED)
@@ -178,6 +186,7 @@ class ExcitationFile:
     robot: str = ""
     source: str = ""
     joints: list[str] = field(default_factory=list)
+    figures: dict[str, float] = field(default_factory=dict)
 
     def trajectory(self) -> FourierTrajectory:
         """Return the trajectory; raises InputError if shapes or values do not fit."""
@@ -269,8 +278,8 @@ def check_harmonics(harmonics: Sequence[int]) -> None:
     fit = all(k == int(k) and 1 <= k <= _MOST_HARMONICS for k in harmonics)
     if not len(harmonics) or not fit or len(set(harmonics)) != len(harmonics):
         raise InputError(
-            f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different integers "
-            f"from 1 to {_MOST_HARMONICS}"
+            f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different "
+            f"integers from 1 to {_MOST_HARMONICS}"
         )
 
 

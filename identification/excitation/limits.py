@@ -7,7 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.model.subject import Subject
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, shortened
+
+# of all joints, or by names of joints
+Given = ArrayLike | Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,9 @@ def joint_limits(
     n, names = subject.dimension, subject.joint_names
     bounds = np.asarray(subject.position_limits if position is None else position, dtype=float)
     if bounds.shape != (n, 2):
-        raise InputError(f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper")
+        raise InputError(
+            f"position limits: shape {bounds.shape}; must be ({n}, 2), lower and upper"
+        )
     magnitudes = {
         "velocity": (velocity, subject.velocity_limit),
         "acceleration": (acceleration, subject.acceleration_limit),
@@ -83,11 +88,10 @@ def joint_limits(
         if array.shape not in ((), (1,), (n,)):
             raise InputError(f"{key} limits: shape {array.shape}; must be one number or {n}")
         values[key] = np.broadcast_to(array, n).copy()
-    for i, name in enumerate(names):
-        lower, upper = bounds[i]
-        if not (np.isfinite(lower) and np.isfinite(upper)):
-            _refuse_unknown(subject, "position", [n for n, b in zip(names, bounds, strict=True)
-                                                  if not np.isfinite(b).all()])
+    unbounded = np.flatnonzero(~np.isfinite(bounds).all(axis=1))
+    if unbounded.size:
+        _refuse_unknown(subject, "position", [names[i] for i in unbounded])
+    for name, (lower, upper) in zip(names, bounds, strict=True):
         if not lower < upper:
             raise InputError(
                 f"position limits of {name} = [{lower:g}, {upper:g}]; lower must be below upper"
@@ -101,6 +105,54 @@ def joint_limits(
             if not x > 0.0:
                 raise InputError(f"{key} limit of {name} = {x:g}; must be positive")
     return JointLimits(**values)
+
+
+def chosen_limits(
+    subject: Subject, limits: "JointLimits | Mapping[str, Given] | None" = None
+) -> JointLimits:
+    """Return a robot's limits, those of its model where no others are given.
+
+    Args:
+        subject: The robot.
+        limits: All of them; or ``position``, ``velocity``, ``acceleration``, ``effort`` as for
+            :func:`joint_limits`, or by names of joints, ``{"velocity": {"joint_2": 1.0}}``.
+
+    Raises:
+        InputError: If a limit or joint is unknown, or a value out of range.
+    """
+    if isinstance(limits, JointLimits):
+        if limits.velocity.size != subject.dimension:
+            raise InputError(
+                f"limits: of {limits.velocity.size} joints; {subject.name} has {subject.dimension}"
+            )
+        return limits
+    own = {
+        "position": subject.position_limits,
+        "velocity": subject.velocity_limit,
+        "acceleration": subject.acceleration_limit,
+        "effort": subject.effort_limit,
+    }
+    given: dict[str, ArrayLike] = {}
+    for key, value in (limits or {}).items():
+        if key not in own:
+            raise InputError(f"limits: {shortened(key)!r}; must be one of {', '.join(own)}")
+        if isinstance(value, Mapping):
+            table = own[key].copy()
+            for joint, entry in value.items():
+                table[_joint(subject, joint, f"{key} limits")] = entry
+            given[key] = table
+        else:
+            given[key] = value
+    return joint_limits(subject, **given)
+
+
+def _joint(subject: Subject, joint: str, where: str) -> int:
+    if joint not in subject.joint_names:
+        raise InputError(
+            f"{where}: {subject.name} has no joint {shortened(str(joint))!r}; must be one of "
+            f"{', '.join(subject.joint_names)}"
+        )
+    return subject.joint_names.index(joint)
 
 
 def _refuse_unknown(subject: Subject, key: str, joints: Sequence[str]) -> None:

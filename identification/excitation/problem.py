@@ -1,5 +1,6 @@
 """What a search for an excitation needs to know, in a form that goes to other processes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -36,7 +37,7 @@ class ExcitationProblem:
         kernels: Of the criterion.
         torque: ``(q, v, a) -> tau``, predicted torques of the drives.
         posture: What the joint positions must keep to; None for nothing but the limits.
-        criterion: ``determinant`` or ``condition``.
+        criterion: ``D`` or ``condition``.
     """
 
     period: float
@@ -64,7 +65,7 @@ def excitation_problem(
     *,
     period: float = 10.0,
     harmonics: tuple[int, ...] = (1, 3, 5),
-    criterion: str = "determinant",
+    criterion: str = "D",
     cell: Cell | None = None,
     scene: RobotScene | None = None,
     parameters: np.ndarray | None = None,
@@ -77,7 +78,7 @@ def excitation_problem(
         limits: Of its joints.
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency in use.
-        criterion: ``determinant`` or ``condition``.
+        criterion: ``D`` or ``condition``.
         cell: What stands around a serial robot.
         scene: The same for Drake; made anew if there is a cell alone.
         parameters: Believed ones, for the torques, shape (n,); those of the model by default.
@@ -100,7 +101,7 @@ def excitation_problem(
         weights = 1.0 / noise
     smooth = Regressor(subject, sign_width=_SIGN_WIDTH * float(limits.velocity.max()))
     base = base_parameters(Regressor(subject))
-    believed = true_parameters(subject) if parameters is None else np.asarray(parameters)
+    believed = believed_parameters(subject, parameters)
     q, v, a = (ca.SX.sym(name, n) for name in "qva")
     tau = ca.densify(smooth.function(q, v, a) @ ca.DM(believed))
     posture: PostureLimits | None = None
@@ -119,6 +120,43 @@ def excitation_problem(
     )
 
 
-def without_posture_limits(problem: ExcitationProblem) -> ExcitationProblem:
-    """Return the problem of a robot that may be anywhere within its joint limits."""
-    return replace(problem, posture=None)
+def believed_parameters(subject: Subject, given: np.ndarray | None = None) -> np.ndarray:
+    """Return parameters to predict torques with, shape (n,).
+
+    Args:
+        subject: The robot.
+        given: Those, shape (n,); by default what the model says, with no friction where unknown.
+
+    Raises:
+        InputError: If they are too few or too many, or not finite.
+    """
+    own = true_parameters(subject)
+    if given is None:
+        return np.nan_to_num(own)
+    believed = np.asarray(given, dtype=float)
+    if believed.shape != own.shape or not np.isfinite(believed).all():
+        raise InputError(
+            f"parameters: shape {believed.shape}; must be {own.size} finite numbers for "
+            f"{subject.name}"
+        )
+    return believed
+
+
+def tightened(
+    problem: ExcitationProblem, share: float, margins: Mapping[str, float], margin: float = 0.0
+) -> ExcitationProblem:
+    """Return the problem with narrower limits, for what solvers leave of them.
+
+    Args:
+        problem: Of a robot.
+        share: Of the joint limits that is left.
+        margins: Least values of posture limits by name, instead of zero [m or 1].
+        margin: Of those that are not named [m or 1].
+    """
+    posture = problem.posture
+    if posture is not None:
+        q = ca.SX.sym("q", problem.dimension)
+        least = ca.DM([margins.get(name, margin) for name in posture.names])
+        g = posture.function(q) - least
+        posture = replace(posture, function=ca.Function("g", [q], [g], ["q"], ["g"]))
+    return replace(problem, limits=problem.limits.scaled(share), posture=posture)

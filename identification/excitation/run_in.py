@@ -1,9 +1,9 @@
 """A periodic motion as a robot's controller runs it: from rest, some periods, to rest.
 
 The robot goes along the periodic motion from the first instant on, ever faster: the motion is
-``q(s(t))`` with the rate ``s'`` of its clock rising from 0 to 1 before the first period, and falling
-after the last. So postures, and with them position limits and clearances, are those of one period;
-where velocities and accelerations of the ramps are not, the ramps are made longer.
+``q(s(t))`` with the rate ``s'`` of its clock rising from 0 to 1 before the first period, and
+falling after the last. So postures, and with them position limits and clearances, are those of one
+period; where velocities and accelerations of the ramps are not, the ramps are made longer.
 """
 
 from dataclasses import dataclass
@@ -101,8 +101,8 @@ class ExcitationRun:
         units = ["rad"] * n if units is None else units
         names = ["t", *(f"{letter}_{i + 1}" for letter in "qva" for i in range(n))]
         lines = [
-            f"# {self.periods} periods of {self.trajectory.period:g} s from t = {self.ramp:g} s on, "
-            f"from rest to rest; {rate:g} samples per second",
+            f"# {self.periods} periods of {self.trajectory.period:g} s from t = {self.ramp:g} s "
+            f"on, from rest to rest; {rate:g} samples per second",
             f"# units: t in s; q_1 .. q_{n} in {', '.join(units)}; v per s; a per s^2",
             ",".join(names),
         ]
@@ -146,6 +146,6 @@ def rest_to_rest(
     _, v, a = trajectory.motion(np.linspace(0.0, trajectory.period, _RAMP_SAMPLES))
     share = max((np.abs(v) / velocity).max(), (np.abs(a) / acceleration).max())
     raise InputError(
-        f"excitation: no ramp of up to {longest:g} s keeps the limits of velocity and acceleration; "
-        f"one period takes {100.0 * share:.3g} % of them, must be less than 100 %"
+        f"excitation: no ramp of up to {longest:g} s keeps the limits of velocity and "
+        f"acceleration; one period takes {100.0 * share:.3g} % of them, must be less than 100 %"
     )

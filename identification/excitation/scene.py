@@ -5,6 +5,7 @@ as their convex hulls.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import (
@@ -21,12 +22,11 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.model import locate_model
-from identification.excitation.cell import Cell, Obstacle
-from identification.model.subject import Subject
+from identification.excitation.cell import Cell, Obstacle, load_cell
+from identification.model.subject import Subject, tool_frame_of
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.reading import read_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -113,8 +113,8 @@ class RobotScene:
         self._plant, self._scene = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         file = locate_model(subject.block, subject.folder)
         read_model(self._plant, file, subject.block.options(subject.folder))
-        self._last = self._tool_body(subject)
-        chain, self._coordinates = chain_from_plant(self._plant, self._last.body_frame())
+        tool = tool_frame_of(self._plant, subject.block)
+        chain, self._coordinates = chain_from_plant(self._plant, tool)
         self._dimension = chain.dimension
         self.obstacles = [(obstacle, self._add(obstacle)) for obstacle in cell.obstacles]
         self.shapes = self._find_shapes(subject)
@@ -139,18 +139,24 @@ class RobotScene:
         Args:
             q: Joint positions [rad or m], shape (K, N).
         """
-        table = self._distances(q)
+        table = self.distances(q)
         if not self.pairs:
             return Clearance(np.full(len(q), np.inf), "")
         worst = int(np.argmin(table.min(axis=0)))
         return Clearance(table.min(axis=1), self.pairs[worst].name)
 
-    def _distances(self, q: np.ndarray) -> np.ndarray:
-        """Return the distances of all pairs [m], shape (K, pairs)."""
+    def distances(self, q: np.ndarray, numbers: np.ndarray | None = None) -> np.ndarray:
+        """Return the distances of pairs [m], shape (K, n).
+
+        Args:
+            q: Joint positions [rad or m], shape (K, N).
+            numbers: Which of the pairs, n of them; all by default.
+        """
         plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
         scene_context = self._scene.GetMyMutableContextFromRoot(self._context)
         port = self._scene.get_query_output_port()
-        pairs = [(pair.first, pair.second) for pair in self.pairs]
+        chosen = self.pairs if numbers is None else [self.pairs[i] for i in numbers]
+        pairs = [(pair.first, pair.second) for pair in chosen]
         table = np.empty((len(q), len(pairs)))
         still = np.zeros(self._dimension)
         for row, positions in zip(table, q, strict=True):
@@ -160,17 +166,10 @@ class RobotScene:
             row[:] = [query.ComputeSignedDistancePairClosestPoints(a, b).distance for a, b in pairs]
         return table
 
-    def _tool_body(self, subject: Subject) -> RigidBody:
-        name = subject.block.tool_frame if subject.block is not None else ""
-        if self._plant.HasFrameNamed(name):
-            return self._plant.GetFrameByName(name).body()
-        return self._plant.get_body(BodyIndex(self._plant.num_bodies() - 1))
-
     def _add(self, obstacle: Obstacle) -> GeometryId:
-        x, y, z, roll, pitch, yaw = obstacle.pose()
-        pose = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, y, z])
         source, frame = self._plant.get_source_id(), self._scene.world_frame_id()
-        instance = GeometryInstance(pose, _drake_shape(obstacle), f"cell_{obstacle.name}")
+        pose, shape = obstacle_shape(obstacle)
+        instance = GeometryInstance(pose, shape, f"cell_{obstacle.name}")
         instance.set_proximity_properties(ProximityProperties())
         return self._scene.RegisterGeometry(source, frame, instance)
 
@@ -180,7 +179,7 @@ class RobotScene:
         plain = plant.CreateDefaultContext()
         groups = [(WORLD, plant.world_frame())]
         groups += list(enumerate(link_frames(plant, self._coordinates)))
-        left_out = _tool_of_parameters(subject)
+        left_out = left_out_tool(subject)
         found = []
         for link, frame in groups:
             by_role: dict[Role, list[PlacedShape]] = {Role.kProximity: [], Role.kIllustration: []}
@@ -237,21 +236,39 @@ class RobotScene:
             return
         lower, upper = np.clip(position_limits, -_FULL_TURN, _FULL_TURN).T
         q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, self._dimension))
-        touching = np.all(self._distances(q) < clearance, axis=0)
+        touching = np.all(self.distances(q) < clearance, axis=0)
         self.pairs = [p for p, joined in zip(self.pairs, touching, strict=True) if not joined]
 
 
-def _drake_shape(obstacle: Obstacle) -> Shape:
+def cell_of(subject: Subject, cell: Cell | str | Path | None) -> Cell:
+    """Return the cell of a robot.
+
+    Args:
+        subject: The robot.
+        cell: One, or its file; None for the one shipped with the robot's model, or an empty one.
+
+    Raises:
+        InputError: If the file cannot be read or does not fit; one line that names it.
+    """
+    if isinstance(cell, Cell):
+        return cell
+    return load_cell(cell, subject.name if subject.block is None else subject.block.model)
+
+
+def obstacle_shape(obstacle: Obstacle) -> tuple[RigidTransform, Shape]:
+    """Return pose in the world and shape of an obstacle, for Drake."""
+    x, y, z, roll, pitch, yaw = obstacle.pose()
+    pose = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, y, z])
     if obstacle.kind == "box":
-        return Box(*obstacle.size)
+        return pose, Box(*obstacle.size)
     if obstacle.kind == "sphere":
-        return Sphere(obstacle.radius)
+        return pose, Sphere(obstacle.radius)
     length = float(np.linalg.norm(obstacle.end - obstacle.start))
     kind = Capsule if obstacle.kind == "capsule" else Cylinder
-    return kind(obstacle.radius, length)
+    return pose, kind(obstacle.radius, length)
 
 
-def _tool_of_parameters(subject: Subject) -> str:
+def left_out_tool(subject: Subject) -> str:
     """Return the name of the body that the subject is without."""
     if subject.tool or subject.parameters is None:
         return ""

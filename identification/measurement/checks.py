@@ -168,6 +168,14 @@ def _check_torques(record: Record, robot: MeasuredRobot) -> None:
                     f"for {length} samples from t = {record.t[begin]:.6g} s; must be the torque "
                     "that acts (move more slowly, or raise the limit of what records it)"
                 )
+            begin, count = _pile(tau, extreme)
+            if count:
+                raise InputError(
+                    f"{record.source}: tau of {name} is clipped at {extreme:.5g} {unit}: there in "
+                    f"{count} samples, first at t = {record.t[begin]:.6g} s, and hardly ever just "
+                    "below; must be the torque that acts (move more slowly, or raise the limit of "
+                    "what records it)"
+                )
 
 
 def _plateau(values: np.ndarray, extreme: float) -> tuple[int, int]:
@@ -181,6 +189,20 @@ def _plateau(values: np.ndarray, extreme: float) -> tuple[int, int]:
     if lengths[longest] < _PLATEAU or not flat:
         return 0, 0
     return int(begins[longest]), int(lengths[longest])
+
+
+def _pile(values: np.ndarray, extreme: float) -> tuple[int, int]:
+    """Return where a noisy signal first is at an extreme value that it often has, and how often.
+
+    Clipping after the noise leaves no plateaus, but many samples at the limit. Both are 0 where
+    the values next to it are as frequent, as in signals that are rounded.
+    """
+    digit = 1e-9 * np.ptp(values)
+    levels, counts = np.unique(np.round(np.abs(values - extreme) / digit), return_counts=True)
+    often = counts[0] >= 2 * _PLATEAU and counts[0] > _FLAT * counts[1 : 1 + _PLATEAU].max()
+    if levels[0] != 0.0 or not often:
+        return 0, 0
+    return int(np.argmax(np.abs(values - extreme) <= digit)), int(counts[0])
 
 
 def _runs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,10 +18,11 @@ _POSTURES = 50
 class Servo:
     """A position controller for each joint, as robots have it.
 
-    ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` at the ticks, held in between, with
-    ``K_p = J omega^2``, ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and
-    the torque ``tau_ff`` of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The
-    velocity is the difference quotient of the encoder's positions.
+    ``tau_d = sat(tau_ff + K_p (q_d - q) + K_d (q_d' - q'))`` with ``K_p = J omega^2``,
+    ``K_d = 2 zeta J omega`` for the least inertia J that a drive feels, and the torque ``tau_ff``
+    of a rigid robot and its friction, ``f_c sign(q_d') + f_v q_d'``. The feedback acts at the ticks
+    and is held in between, on the difference quotient of the encoder's positions; the drives
+    carry on ``tau_ff`` between the ticks.
 
     Friction that is not fed forward holds the robot back at every reversal until the deviation has
     grown by ``2 f_c / K_p``. The motion then has edges, which the bandwidth of
@@ -66,23 +67,6 @@ class Servo:
         """
         return inertia * self.bandwidth**2, 2.0 * self.damping * inertia * self.bandwidth
 
-    def known_torque(
-        self,
-        subject: Subject,
-        motion: tuple[np.ndarray, np.ndarray, np.ndarray],
-        friction: tuple[np.ndarray, np.ndarray],
-    ) -> np.ndarray:
-        """Return ``tau_ff`` along a motion, shape (K, N) [Nm or N].
-
-        Args:
-            subject: The robot.
-            motion: Positions, velocities and accelerations, each (K, N).
-            friction: ``f_c`` and ``f_v`` as they usually are, each (N,).
-        """
-        v = motion[1]
-        resistance = friction[0] * np.sign(v) + friction[1] * v
-        return self.feedforward * rigid_torques(subject, *motion) + self.friction * resistance
-
 
 def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
     """Return the least inertia that each drive feels along a motion, shape (N,) [kg m^2 or kg].
@@ -102,6 +86,17 @@ def drive_inertia(subject: Subject, q: np.ndarray) -> np.ndarray:
     postures = q[:: max(1, len(q) // _POSTURES)]
     compliance = [np.diag(np.linalg.inv(np.array(function(posture)))) for posture in postures]
     return 1.0 / np.max(compliance, axis=0)
+
+
+def friction_torques(v: np.ndarray, coulomb: np.ndarray, viscous: np.ndarray) -> np.ndarray:
+    """Return the torques ``f_c sign(v) + f_v v`` against friction, shape (K, N) [Nm or N].
+
+    Args:
+        v: Velocities, shape (K, N).
+        coulomb: ``f_c`` [Nm or N], shape (N,).
+        viscous: ``f_v`` [Nm s/rad or N s/m], shape (N,).
+    """
+    return coulomb * np.sign(v) + viscous * v
 
 
 def rigid_torques(subject: Subject, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:

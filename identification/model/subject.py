@@ -138,7 +138,7 @@ def _delta_subject(name: str, robot: DeltaRobot) -> Subject:
 
 def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> Subject:
     plant, _ = read_robot(block, folder)
-    chain, _ = chain_from_plant(plant, _tool_frame(plant, block))
+    chain, _ = chain_from_plant(plant, tool_frame_of(plant, block))
     parameters = _parameter_file(locate_model(block, folder))
     if parameters is not None and not tool:
         chain = without_tool(chain, parameters)
@@ -167,8 +167,13 @@ def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> S
     )
 
 
-def _tool_frame(plant: MultibodyPlant, block: RobotBlock) -> Frame:
-    """Return the frame that the block names, of a model without it the last body's."""
+def tool_frame_of(plant: MultibodyPlant, block: RobotBlock) -> Frame:
+    """Return the frame that a block names, of a model without it that of the last body.
+
+    Args:
+        plant: Plant with the robot.
+        block: Which robot.
+    """
     if block.tool_frame == RobotBlock().tool_frame and not plant.HasFrameNamed(block.tool_frame):
         return plant.get_body(BodyIndex(plant.num_bodies() - 1)).body_frame()
     return tool_frame(plant, block)

@@ -11,9 +11,9 @@ import pytest
 
 from experiments.catalog import scenario_catalog
 from experiments.cli import main
-from experiments.results.metrics import Metrics
-from experiments.results.provenance import PROJECT_ROOT
 from pfsc_drake import InputError
+from reporting.metrics import Metrics
+from reporting.provenance import PROJECT_ROOT
 
 
 @dataclass

@@ -10,7 +10,6 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.scenario import Scenario
-from experiments.progress import ProgressListener
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
@@ -19,6 +18,7 @@ from pfsc_drake.control.margins.delay import delay_margin
 from pfsc_drake.control.margins.disc import DiscMargin, common_disc_margin, disc_margins
 from pfsc_drake.control.margins.modes import Modes, modes
 from pfsc_drake.errors import InputError
+from reporting.progress import ProgressListener
 
 # instants at which all corners of the box are tried: the weakest ones
 _CORNER_INSTANTS = 2

@@ -7,16 +7,16 @@ from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.pages.report import Report, report_page, write_report
 from experiments.preparation import naming
-from experiments.progress import ProgressListener
-from experiments.results.folder import check_folder, open_results
-from experiments.results.provenance import standard_attributes
 from experiments.studies.margins.analysis import MarginAnalysis, analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.picture import draw_margins
 from experiments.studies.margins.words import margins_json, metrics_of, sentences
 from pfsc_drake.yaml.typed import load_typed
+from reporting.folder import check_folder, open_results
+from reporting.page import Report, report_page, write_report
+from reporting.progress import ProgressListener
+from reporting.provenance import standard_attributes
 
 
 @dataclass(frozen=True)

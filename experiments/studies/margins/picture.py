@@ -5,7 +5,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from experiments.figures.style import (
+from experiments.studies.margins.analysis import Case, MarginAnalysis
+from experiments.studies.margins.words import GOOD_DAMPING, GOOD_DISC
+from reporting.style import (
     ALERT,
     COLOURS,
     REFERENCE,
@@ -16,8 +18,6 @@ from experiments.figures.style import (
     place_legend,
     render,
 )
-from experiments.studies.margins.analysis import Case, MarginAnalysis
-from experiments.studies.margins.words import GOOD_DAMPING, GOOD_DISC
 
 # 1/s; faster modes are of no interest, and would press the others together
 _FASTEST = 400.0

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.results.metrics import Metrics
 from experiments.studies.margins.analysis import Case, MarginAnalysis, Place
 from pfsc_drake.control.margins.disc import DiscMargin
+from reporting.metrics import Metrics
 
 # disc margin and damping ratio from which on a loop is robust and well damped by custom
 GOOD_DISC, GOOD_DAMPING = 0.75, 0.3

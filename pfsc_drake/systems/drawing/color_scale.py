@@ -3,11 +3,11 @@
 from pydrake.geometry import Rgba
 
 # red, green, blue of the lowest value, of zero, and of the highest
-_LOW, _ZERO, _HIGH = (0.05, 0.2, 0.9), (1.0, 1.0, 1.0), (0.9, 0.1, 0.05)
+_LOW, _ZERO, _HIGH = (0.0, 0.35, 1.0), (0.12, 0.12, 0.12), (1.0, 0.15, 0.0)
 
 
 def signed_color(value: float, largest: float) -> Rgba:
-    """Return the colour of a value: blue below zero, white at zero, red above.
+    """Return the colour of a value: blue below zero, dark at zero, red above.
 
     Args:
         value: The value, in any unit.

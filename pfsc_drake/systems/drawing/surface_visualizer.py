@@ -46,11 +46,7 @@ class SurfaceVisualizer(LeafSystem):
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
 
     def _draw_surface(self, context: Context) -> EventStatus:
-        vertices, faces = _triangles(self._skin)
-        both = np.vstack([faces, faces[:, ::-1]])
-        self._meshcat.SetTriangleMesh(f"{_ROOT}/skin", vertices.T, both.T, _SKIN)
-        for i, line in enumerate(self._lines):
-            self._meshcat.SetLine(f"{_ROOT}/line_{i}", line.T, 1.0, _LINE)
+        draw_surface(self._meshcat, _ROOT, self._skin, self._lines)
         draw_frame(self._meshcat, f"{_ROOT}/frame")
         return EventStatus.Succeeded()
 
@@ -61,6 +57,24 @@ class SurfaceVisualizer(LeafSystem):
         position, axes = self._place(point)
         X_WF = RigidTransform(RotationMatrix.ProjectToRotationMatrix(axes), position)
         self._meshcat.SetTransform(f"{_ROOT}/frame", X_WF, context.get_time())
+
+
+def draw_surface(
+    meshcat: Meshcat, root: str, skin: np.ndarray, lines: Sequence[np.ndarray]
+) -> None:
+    """Draw a surface that one can see through.
+
+    Args:
+        meshcat: Where to draw.
+        root: Meshcat path of what is drawn.
+        skin: Points of the surface on a grid [m], shape (rows, columns, 3).
+        lines: Lines on it [m], each (points, 3).
+    """
+    vertices, faces = _triangles(skin)
+    both = np.vstack([faces, faces[:, ::-1]])
+    meshcat.SetTriangleMesh(f"{root}/skin", vertices.T, both.T, _SKIN)
+    for i, line in enumerate(lines):
+        meshcat.SetLine(f"{root}/line_{i}", line.T, 1.0, _LINE)
 
 
 def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments.figures import style as figure_style
 from experiments.figures.all import draw_figures, render_figures
 from experiments.results.run_log import RunLog
+from reporting import style as figure_style
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
 NAMES = [

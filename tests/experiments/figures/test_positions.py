@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.figures.positions import draw_positions
-from experiments.figures.style import ALERT
+from reporting.style import ALERT
 
 # axis i of the log moves from 0 to i - 1 rad
 ENDS = np.array([[-1.0, 1.0], [-9.0, 9.0], [-9.0, 2.2], [-9.0, 2.0], [-9, np.inf], [-99, 99.0]])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.results.metrics import Metrics
 from experiments.results.run_log import RunLog
+from reporting.metrics import Metrics
 
 
 @pytest.fixture(name="make_run")

@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from experiments.results.provenance import PROJECT_ROOT, git_revision, standard_attributes
 from experiments.results.run_log import RunLog, Signal
 from pfsc_drake import InputError
+from reporting.provenance import PROJECT_ROOT, git_revision, standard_attributes
 
 
 def make_log() -> RunLog:

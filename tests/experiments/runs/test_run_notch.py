@@ -11,6 +11,7 @@ from experiments.cli import main
 STIFFNESS, DISPLACEMENT = 500.0, np.array([-0.0025, 0.0055, 0.0])
 CLEARANCE = 0.002
 BARE = ("--no-figures", "--no-recording")
+NOISE, TARING = 0.1, 20  # N; samples, whose mean noise stays in the reading for good
 END = 0.9  # s, 0.4 s of which it moves
 
 
@@ -52,7 +53,7 @@ def test_sensor_measures_the_contact(log):
     resting = (log["t"] > 0.3) & (log["t"] < 0.5)
     assert force(log)[resting].min() > 1.0
     measured, real = (log[name][resting, :3] for name in ("wrench_measured", "wrench_ext"))
-    assert np.abs(measured.mean(axis=0) - real.mean(axis=0)).max() < 0.05
+    assert np.abs(measured.mean(axis=0) - real.mean(axis=0)).max() < 3 * NOISE / np.sqrt(TARING)
     late = log["t"] > 0.05
     error = (log["wrench_measured"] - log["wrench_ext"])[late, :3]
     assert np.sqrt(np.mean(error**2)) < 0.3
@@ -71,7 +72,7 @@ def test_forces_are_those_of_a_spring_to_the_taught_path(log):
 def test_ball_stays_in_the_notch(log):
     """Beyond the clearance the soft shell gives by less than a millimetre."""
     distance = np.linalg.norm(log["notch_position"], axis=1)
-    assert distance[0] < 1e-9
+    assert distance[0] < 1e-5  # bristles of the drives' friction bend as the ball is let go
     assert distance.max() < CLEARANCE + 1e-3
 
 
@@ -95,7 +96,7 @@ def test_a_push_is_measured_with_the_contact(tmp_path):
     pushed = run(tmp_path, "pfc_delta_notch", 0.4, push)
     late = pushed["t"] > 0.3
     real, measured = (pushed[name][late, :3] for name in ("wrench_ext", "wrench_measured"))
-    assert np.abs(measured.mean(axis=0) - real.mean(axis=0)).max() < 0.05
+    assert np.abs(measured.mean(axis=0) - real.mean(axis=0)).max() < 3 * NOISE / np.sqrt(TARING)
     # downwards into the notch, which bears it but for what bends the spring
     assert 0.0 < real.mean(axis=0)[2] < 4.0
 

@@ -5,8 +5,12 @@ import json
 import h5py
 import numpy as np
 import pytest
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces
 
 from experiments.cli import main
+from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.reading import read_model
 
 FORCE, APPROACH, DAMPING = 20.0, 6.0, 300.0  # N, N, N s/m, of the scenario
 
@@ -41,6 +45,26 @@ def test_it_touches_down_and_presses(log, out):
     assert metrics["touch_down_overshoot"]["value"] < 0.3
     assert metrics["contact_losses"]["value"] == 0.0
     assert metrics["max_force_error"]["value"] < 2.0
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.2, 0.45), (0.51, 0.7), (0.9, 1.4)])
+def test_what_is_logged_as_torque_is_what_moves_the_robot(log, begin, end):
+    """Drake's inverse dynamics of the logged motion, approaching, touching down and pressing."""
+    plant = MultibodyPlant(0.0)
+    read_model(plant, resolve_model("comau_racer_1_4"))
+    context, weight = plant.CreateDefaultContext(), MultibodyForces(plant)
+    during = np.flatnonzero((log["t"] > begin) & (log["t"] < end))
+    v_dot = np.gradient(log["v_J"], log["t"], axis=0)
+    needed = []
+    for k in during:
+        plant.SetPositions(context, log["q_J"][k])
+        plant.SetVelocities(context, log["v_J"][k])
+        plant.CalcForceElementsContribution(context, weight)
+        needed.append(plant.CalcInverseDynamics(context, v_dot[k], weight))
+    acting = log["tau_d"] - log["tau_f"] + log["tau_ext"]
+    difference = acting[during].mean(axis=0) - np.mean(needed, axis=0)
+    # half a step of the plant lies between what is logged of friction and what acts
+    np.testing.assert_allclose(difference, 0.0, atol=1.0)
 
 
 def test_it_stands_as_far_off_the_taught_surface_as_the_workpiece(log):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.results.metrics import Metrics
 from experiments.sweep.rows import COMPLETED, DIED, FAULT, RunRow
+from reporting.metrics import Metrics
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import shlex
 import pytest
 
 from experiments.catalog.scenario_file import read_scenario
-from experiments.results.folder import open_results
 from experiments.sweep.definition import RECORD, SweepDefinition, SweepRecord, fingerprint
 from experiments.sweep.rows import FAILED, RunRow
 from pfsc_drake import InputError
+from reporting.folder import open_results
 
 DEFINITION = SweepDefinition("arm", ("a=0:1", "b=[1, 2],x"), ("c=3",), 0.5, 7, 2, "0123")
 

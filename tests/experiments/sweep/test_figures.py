@@ -5,12 +5,12 @@ import struct
 import numpy as np
 import pytest
 
-from experiments.figures.style import DPI, WIDTH
 from experiments.sweep.figures import MAX_PANELS, draw_sweep
 from experiments.sweep.rows import RunRow
 from experiments.sweep.samples import draw_samples, parse_variations
 from experiments.sweep.summary import measure_spreads
 from experiments.sweep.table import table_columns
+from reporting.style import DPI, WIDTH
 
 
 def drawn(samples, rows, metric="max_path_deviation"):

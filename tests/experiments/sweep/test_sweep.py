@@ -13,12 +13,12 @@ from pyarrow import parquet
 from rich.console import Console
 
 from experiments.cli import main
-from experiments.results.folder import check_folder
 from experiments.sweep import cluster
 from experiments.sweep.cluster import open_cluster
 from experiments.sweep.definition import RECORD
 from experiments.sweep.summary import MACHINE_METRICS
 from experiments.sweep.sweep import define_sweep, run_sweep
+from reporting.folder import check_folder
 
 VARY = ("reference.velocity=0.5:1.5", "controller.law=elastic,rigid")
 METRIC = "static_path_deviation"

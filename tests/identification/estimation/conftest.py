@@ -71,3 +71,9 @@ def measure(comau):
         return measured(motion, tau, noise * comau.noise, seed=seed, **options)
 
     return of_motion
+
+
+@pytest.fixture(scope="session")
+def measure_torques():
+    """Return a function that gives what is measured of torques."""
+    return measured

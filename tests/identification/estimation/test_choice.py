@@ -64,6 +64,17 @@ def test_stribeck_is_found(comau, data):
     assert plain.variance_factor > result.variance_factor
 
 
+def test_friction_of_another_day(comau, measure, other_trajectory):
+    """10 % more in all joints is no other form, and hides none."""
+    other = other_trajectory.motion(other_trajectory.sample_times(100.0))
+    more = 0.1 * comau.subject.coulomb * np.sign(other[1])
+    for extra, kinds in ((np.zeros_like, []), (stribeck, ["stribeck"])):
+        motion = measure(1, extra=extra(comau.motion[1]))
+        judged_on = measure(2, motion=other, extra=extra(other[1]) + more)
+        choice = choose_friction(comau.regressor, comau.base, motion, judged_on)
+        assert [term.kind for term in choice.model.terms] == kinds
+
+
 def test_asymmetry_is_found(comau, data):
     choice = choose_friction(comau.regressor, comau.base, *data(two_directions))
     assert {(term.joint, term.kind) for term in choice.model.terms} == {(2, "offset"), (3, "slant")}
@@ -94,6 +105,11 @@ def test_bad_input(comau, data, measure):
     motion, other = data(np.zeros_like)
     with pytest.raises(InputError, match="friction term 'bumpy'"):
         choose_friction(comau.regressor, comau.base, motion, other, kinds=["bumpy"])
+    with pytest.raises(InputError, match="no kind to choose from; allowed: stribeck"):
+        choose_friction(comau.regressor, comau.base, motion, other, kinds=[])
+    same = tuple(values[:, [1, 1, 1, 1, 1, 1]] for values in comau.motion)
+    with pytest.raises(InputError, match="cannot be told apart"):
+        choose_friction(comau.regressor, comau.base, measure(motion=same), other)
     with pytest.raises(InputError, match="regressor without friction"):
         bare = Regressor(comau.subject, friction=False)
         choose_friction(bare, comau.base, motion, other)

@@ -47,6 +47,16 @@ def test_spread_is_as_predicted(runs):
     assert test.median_ratio == pytest.approx(1.0, abs=0.15)
 
 
+def test_mean_of_the_runs(comau, runs):
+    """Its errors are not larger than what is said of them; nor much smaller."""
+    errors = (runs.mean - comau.truth) / np.sqrt(np.diag(runs.covariance_of_mean))
+    assert np.abs(errors).max() < 4.0
+    assert 0.6 < np.sqrt(np.mean(errors**2)) < 1.2
+    wider = np.maximum(runs.standard_deviation, runs.predicted_standard_deviation)
+    deviation = np.sqrt(np.diag(runs.covariance_of_mean))
+    np.testing.assert_allclose(deviation, wider / np.sqrt(7.0))
+
+
 def test_friction_that_is_another_in_each_run(comau, measure):
     """Noise explains the spread of a run, not what changes between them."""
     rng = np.random.default_rng(0)
@@ -55,7 +65,11 @@ def test_friction_that_is_another_in_each_run(comau, measure):
     for seed in range(4):
         extra = sign * 0.1 * comau.subject.coulomb * rng.normal(size=6)
         estimates.append(estimate(comau.regressor, comau.base, measure(seed, extra=extra)))
-    assert Repetitions(tuple(estimates)).spread_test().p_value < 1e-6
+    runs = Repetitions(tuple(estimates))
+    assert runs.spread_test().p_value < 1e-6
+    bodies = runs.spread_test(friction=False)
+    assert bodies.degrees_of_freedom == 3 * 40
+    assert bodies.p_value > 0.001
 
 
 def test_what_does_not_belong_together(comau, measure, runs):
@@ -66,6 +80,7 @@ def test_what_does_not_belong_together(comau, measure, runs):
     with pytest.raises(InputError, match="run 2 is of 53 parameters of comau"):
         Repetitions((runs.estimates[0], other))
     single = Repetitions(runs.estimates[:1])
+    np.testing.assert_allclose(single.covariance_of_mean, runs.estimates[0].covariance)
     assert np.isnan(single.parameter_rows()[0].relative_deviation)
     with pytest.raises(InputError, match="one run; at least two"):
         single.spread_test()

@@ -9,6 +9,8 @@ from scipy.stats import chi2
 from identification.estimation.friction import FrictionModel, FrictionTerm
 from identification.estimation.least_squares import estimate
 from identification.estimation.validation import compare_with_truth, predict
+from identification.model.base import base_parameters
+from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
 
@@ -53,6 +55,23 @@ def test_prediction_with_friction_terms(comau, measure, other):
     np.testing.assert_allclose(fitted.base_parameters[-2:], 0.0, atol=1e-3)
     prediction = predict(fitted, comau.regressor, measure(5, motion=other, noise=1e-5))
     assert np.all(prediction.explained > 0.999999)
+
+
+def test_friction_of_another_day(comau, result, measure, measure_torques, other):
+    """10 % more in all joints, which a prediction that is adapted does not mind."""
+    extra = 0.1 * comau.subject.coulomb * np.sign(other[1])
+    motion = measure(5, motion=other, extra=extra)
+    plain = predict(result, comau.regressor, motion)
+    adapted = predict(result, comau.regressor, motion, adapt_friction=True)
+    assert plain.variance_factor.max() > 2.0
+    np.testing.assert_allclose(adapted.variance_factor, 1.0, atol=0.2)
+    bare = Regressor(comau.subject, friction=False)
+    stiff = measure_torques(
+        comau.motion, bare.matrix(*comau.motion) @ comau.parameters[:66], comau.noise
+    )
+    without = estimate(bare, base_parameters(bare), stiff)
+    with pytest.raises(InputError, match="friction is to be adapted"):
+        predict(without, bare, stiff, adapt_friction=True)
 
 
 def test_truth(comau, result):

@@ -98,3 +98,15 @@ def test_torques_in_other_units(record, robot):
 def test_another_robot(record, robot):
     other = replace(robot, joint_names=("lift", "swing"))
     refused(record, other, "joints swing, lift; must be those of crane: lift, swing")
+
+
+def test_noise_that_is_clipped_with_the_torque(record, robot):
+    noise = 2.0 * np.random.default_rng(4).normal(size=record.tau.shape)
+    lowest = [record.tau[:, 0].min(), -500.0]
+    clipped = np.clip(record.tau + noise, lowest, [200.0, 500.0])
+    message = r"tau of swing is clipped at -.* Nm: there in \d+ samples, .*hardly ever just below"
+    refused(replace(record, tau=clipped), robot, message)
+    # rounded to steps that are finer or coarser than the noise it is not
+    for resolution in (0.01, 0.5, 5.0):
+        sound = np.round((record.tau + noise) / resolution) * resolution
+        check_record(replace(record, tau=sound), robot)

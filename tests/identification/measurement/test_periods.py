@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.excitation.fourier import FourierTrajectory
 from identification.measurement.periods import average, differentiate
+from identification.measurement.record import Record
 from pfsc_drake.errors import InputError
 
 
@@ -42,8 +44,6 @@ def test_the_first_period_and_the_rest_are_left_out(record):
 
 
 def test_the_spread_tells_the_variance(series, robot):
-    from identification.measurement.record import Record
-
     t = np.arange(6 * 400) * 0.005
     q = series.motion(t)[0]
     noise = np.random.default_rng(3).normal(size=(2, *q.shape)) * [[[1e-4, 2e-4]], [[3.0, 0.5]]]
@@ -90,3 +90,26 @@ def test_bandwidth_out_of_range(record, bandwidth):
 def test_a_gap_is_not_averaged_over(record):
     keep = np.delete(np.arange(record.t.size), slice(700, 710))
     refused(replace(record, t=record.t[keep], q=record.q[keep], tau=record.tau[keep]), "gap of")
+
+
+def test_derivatives_of_noisy_positions(robot):
+    """Of a Fourier excitation, with the errors that noise leaves below the bandwidth.
+
+    White noise of variance ``s^2`` has ``2 s^2 / (P K)`` in each harmonic of an average over P
+    periods of K samples; a derivative multiplies it by ``w^2``.
+    """
+    rng = np.random.default_rng(5)
+    motion = FourierTrajectory([0.2, 1.0], *rng.uniform(0.2, 1.0, (2, 2, 3)), 10.0, (1, 3, 5))
+    t, noise = np.arange(50_000) * 1e-3, 1e-4
+    clean = motion.motion(t)
+    q = clean[0] + noise * rng.normal(size=(t.size, 2))
+    tau = 3.0 * clean[2] + rng.normal(size=q.shape)
+    averaged = average(Record(t, q, tau, robot.joint_names, motion.period))
+    assert averaged.bandwidth_hz == 2.0 and averaged.periods == 4
+    omega = 2.0 * np.pi * np.arange(1, 21) / motion.period
+    for order, found in enumerate((averaged.q, averaged.v, averaged.a)):
+        error = np.sqrt(np.mean((found - clean[order][:10_000]) ** 2, axis=0))
+        expected = noise * np.sqrt(2.0 / (4 * 10_000) * np.sum(omega ** (2 * order)))
+        np.testing.assert_allclose(error, expected, rtol=0.5)
+        scale = np.abs(clean[order]).max(axis=0)
+        assert np.all(error < 1e-4 * scale)

@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from experiments.results.metrics import Metric, Metrics
-from experiments.results.units import NARROW_SPACE, format_quantity
 from pfsc_drake import InputError
+from reporting.metrics import Metric, Metrics
+from reporting.units import NARROW_SPACE, format_quantity
 
 
 @pytest.mark.parametrize(

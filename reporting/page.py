@@ -8,13 +8,13 @@ from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
-from experiments.figures.style import Figure
-from experiments.results.folder import ResultsFolder
-from experiments.results.manifest import FIGURES
-from experiments.results.metrics import Metric, Metrics
-from experiments.results.units import NARROW_SPACE, format_quantity
+from reporting.folder import ResultsFolder
+from reporting.manifest import FIGURES
+from reporting.metrics import Metric, Metrics
+from reporting.style import Figure
+from reporting.units import NARROW_SPACE, format_quantity
 
-TEMPLATE = Path(__file__).resolve().parent / "report_template.html"
+TEMPLATE = Path(__file__).resolve().parent / "page_template.html"
 MAX_CARDS = 8
 
 _SYMBOLS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥"}
@@ -71,7 +71,7 @@ def report_page(
         scenario_yaml_text: The scenario as resolved.
         metrics: All of them. Those with a target become cards, or the first few if none has one.
         figures: In reading order.
-        log_attributes: What identifies the run, see :mod:`experiments.results.provenance`.
+        log_attributes: What identifies the run, see :mod:`reporting.provenance`.
         recording: Path of the Meshcat page, relative to this one.
         fault: Why the run was stopped; None if it completed.
         interrupted: Whether the user stopped it.

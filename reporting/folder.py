@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from experiments.results.manifest import (
+from pfsc_drake.errors import InputError
+from reporting.manifest import (
     FIGURES,
     GROWING,
     MANIFEST,
@@ -19,7 +20,6 @@ from experiments.results.manifest import (
     listed_results,
     manifest_text,
 )
-from pfsc_drake.errors import InputError
 
 # where a file system knows no locks on folders, nothing is locked
 _NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
@@ -41,7 +41,7 @@ class ResultsFolder:
             path: Of the folder.
             kind: Kind of results, e.g. ``run``.
             handle: Descriptor of the open folder.
-            checksums: Of the results in it, see :func:`experiments.results.manifest.manifest_text`.
+            checksums: Of the results in it, see :func:`reporting.manifest.manifest_text`.
         """
         self.path = path
         self._kind = kind
@@ -59,7 +59,7 @@ class ResultsFolder:
         :meth:`explain_problems`.
 
         Args:
-            name: See :mod:`experiments.results.manifest`: a result's, or ``figures/NAME.png``.
+            name: See :mod:`reporting.manifest`: a result's, or ``figures/NAME.png``.
             content: Of the file; text becomes UTF-8.
             growing: Whether it is still added to: at every moment it is there as it was or as it
                 is now.

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from experiments.progress import ProgressDisplay
+from reporting.progress import ProgressDisplay
 
 
 def plain_lines(duration: float | None, step: float, count: int) -> list[str]:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.results.run_log import FloatArray
+FloatArray = NDArray[np.float64]
 
 matplotlib.use("Agg")
 

@@ -5,9 +5,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from experiments.figures.style import Figure
-from experiments.pages.report import report_page
-from experiments.results.metrics import Metrics
+from reporting.metrics import Metrics
+from reporting.page import report_page
+from reporting.style import Figure
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
 

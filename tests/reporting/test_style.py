@@ -6,7 +6,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from experiments.figures.style import (
+from reporting.style import (
     STYLE,
     fitting_unit,
     is_dwarfed,

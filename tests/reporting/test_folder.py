@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.results.folder import check_folder, open_results
-from experiments.results.manifest import MANIFEST, RESULTS
-from experiments.results.provenance import PROJECT_ROOT, standard_attributes
 from experiments.results.run_log import RunLog
 from pfsc_drake import InputError
+from reporting.folder import check_folder, open_results
+from reporting.manifest import MANIFEST, RESULTS
+from reporting.provenance import PROJECT_ROOT, standard_attributes
 
 
 @pytest.fixture(name="out")
@@ -194,7 +194,7 @@ def test_no_folder(tmp_path):
 def test_one_process_at_a_time(out):
     code = (
         "import sys; from pathlib import Path;"
-        "from experiments.results.folder import open_results\n"
+        "from reporting.folder import open_results\n"
         "with open_results(Path(sys.argv[1]), 'run') as results:\n"
         "    results.write('log.h5', 'of the other process'); print('taken', flush=True)\n"
         "    sys.stdin.read()\n"

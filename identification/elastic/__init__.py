@@ -1,0 +1,1 @@
+"""Stiffness, damping and motor inertia of elastic joints."""

@@ -1,0 +1,267 @@
+"""Experiments with the motors and links of a simulated elastic robot, as Drake diagrams."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.controllers import PidController
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import LinearSystem, MatrixGain, Multiplexer
+
+from diagrams.signal_log import SignalLog, add_log
+from identification.elastic.torques import Multisine, random_steps, zippered_multisine
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.run_in import rest_to_rest
+from identification.measurement.experiment import check_effort
+from identification.measurement.imperfections import Imperfections
+from identification.measurement.record import Record
+from identification.measurement.servo import (
+    Servo,
+    drive_inertia,
+    friction_torques,
+    rigid_torques,
+)
+from identification.measurement.sources import add_curves, add_lines, add_sines, add_sum
+from identification.measurement.station import add_feed_forward
+from identification.model.subject import Subject
+from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.physics.friction import bristles_for_step
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.rotor_coupling import RotorMount
+from pfsc_drake.systems.physics.joint_friction import JointFriction
+from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+
+RATE = 1000.0  # samples per second
+_STEP = 0.25e-3  # s, of the integration
+_CHUNK = 0.25  # s, after which progress is told
+# RMS of what shakes locked joints, well above friction, and moving ones, of the largest torque
+_LOCKED, _MOVING = 0.15, 0.05
+_HOLD = 0.25  # s
+
+SetState = Callable[[Context], None]
+
+
+def simulate_locked(
+    subject: Subject,
+    faults: Imperfections,
+    *,
+    duration: float = 10.0,
+    steps: bool = False,
+    share: float = _LOCKED,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Record:
+    """Return what is measured while the links are held and the drives shake the joints.
+
+    All joints at once, each a motor with friction on a visco-elastic joint to a link at rest.
+
+    Args:
+        subject: A robot with elastic joints; its friction has to be known.
+        faults: Noise of the torques, encoders and noise of the positions.
+        duration: [s].
+        steps: Whether torques jump between random levels, else sums of sines from 4 to 90 Hz.
+        share: Of the drives' largest torques, RMS of the sines, highest of the steps.
+        seed: Of all random numbers.
+        progress: Told the fraction done and what is done.
+
+    Raises:
+        InputError: If joints are rigid, friction is unknown, or an option is out of range.
+    """
+    chain, coulomb, viscous = _elastic(subject, faults)
+    n, random = subject.dimension, np.random.default_rng(seed)
+    builder = DiagramBuilder()
+    inverse = np.diag(1.0 / chain.D_M)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    A = np.block([[zero, one], [-inverse * chain.K_s, -inverse * chain.K_d]])
+    B = np.block([[zero, zero], [inverse, inverse]])
+    inputs = LinearSystem(A, B, np.eye(2 * n), np.zeros((2 * n, 2 * n)), 0.0)
+    plant = builder.AddNamedSystem("motors", inputs)
+    state = plant.get_output_port()
+    t = np.arange(round(duration * RATE) + 1) / RATE
+    size = share * subject.effort_limit
+    if steps:
+        drive = add_lines(builder, "drive_torque", t, random_steps(size, _HOLD, t, random))
+    else:
+        drive = _add_multisine(builder, zippered_multisine(size, duration, random))
+    resistance = _add_friction(builder, chain, coulomb, viscous, state, np.eye(2 * n)[n:])
+    both = builder.AddNamedSystem("torques", Multiplexer([n, n]))
+    builder.Connect(drive, both.get_input_port(0))
+    builder.Connect(resistance, both.get_input_port(1))
+    builder.Connect(both.get_output_port(), plant.get_input_port())
+    log = add_log(builder, {"state": state, "torque": drive}, 1.0 / RATE)
+    signals = _simulate(builder.Build(), log, lambda _: None, duration, progress)
+    q_M = signals["state"][:, :n]
+    return _measured(subject, faults, (np.zeros_like(q_M), q_M, signals["torque"]), random)
+
+
+def simulate_excited(
+    subject: Subject,
+    trajectory: FourierTrajectory,
+    faults: Imperfections,
+    *,
+    periods: int = 2,
+    share: float = _MOVING,
+    servo: Servo | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Record:
+    """Return what is measured while the robot follows an excitation and its joints are shaken.
+
+    The servo acts on the motors, without delay; sines of 4 to 90 Hz add to its torques. The plant
+    is the full model (2.64), with the coupling of rotors where it is known how they sit.
+
+    Args:
+        subject: A robot with elastic joints; its friction has to be known.
+        trajectory: Excitation, within the limits of the robot.
+        faults: Noise of the torques, encoders and noise of the positions.
+        periods: How often the excitation is run.
+        share: Of the drives' largest torques, RMS of the sines.
+        servo: The controller.
+        seed: Of all random numbers.
+        progress: Told the fraction done and what is done.
+
+    Raises:
+        InputError: If joints are rigid, friction is unknown, the excitation is of another robot
+            or beyond its limits, or drives are asked for more than they have.
+    """
+    chain, coulomb, viscous = _elastic(subject, faults)
+    servo, n, random = servo or Servo(), subject.dimension, np.random.default_rng(seed)
+    if trajectory.dimension != n:
+        raise InputError(
+            f"excitation: of {trajectory.dimension} joints; {subject.name} has {n} joints"
+        )
+    run = rest_to_rest(
+        trajectory, subject.velocity_limit, subject.acceleration_limit, periods=periods, rate=RATE
+    )
+    t, q, v, a = run.sample(RATE)
+    rigid = rigid_torques(subject, q, v, a)
+    check_effort(subject, rigid + friction_torques(v, coulomb, viscous))
+    mounts = subject.mounts or [RotorMount(0, np.eye(3)[2], np.inf)] * n
+    builder = DiagramBuilder()
+    with compiled_when_bound():
+        plant = builder.AddNamedSystem("plant", FullElasticPlant(chain, mounts))
+    joint_state = plant.GetOutputPort("joint_state")
+    motor = builder.AddNamedSystem("motor_state", MatrixGain(np.eye(4 * n)[2 * n :]))
+    builder.Connect(joint_state, motor.get_input_port())
+    K_p, K_d = servo.gains(drive_inertia(subject, q))
+    control = builder.AddNamedSystem("servo", PidController(K_p, np.zeros(n), K_d))
+    builder.Connect(motor.get_output_port(), control.get_input_port_estimated_state())
+    reference = add_curves(builder, "reference", t, np.hstack([q, v]))
+    builder.Connect(reference, control.get_input_port_desired_state())
+    known = add_feed_forward(builder, servo, t, v, rigid, (coulomb, viscous))
+    shaking = _add_multisine(
+        builder, zippered_multisine(share * subject.effort_limit, trajectory.period, random)
+    )
+    drive = add_sum(builder, "servo_torque", control.get_output_port_control(), known)
+    drive = add_sum(builder, "drive_torque", drive, shaking)
+    builder.Connect(drive, plant.GetInputPort("drive_torque"))
+    velocity = np.eye(2 * n)[n:]
+    resistance = _add_friction(builder, chain, coulomb, viscous, motor.get_output_port(), velocity)
+    builder.Connect(resistance, plant.GetInputPort("resistance"))
+    log = add_log(builder, {"state": joint_state, "torque": drive}, 1.0 / RATE)
+    # motors at rest on the excitation, links where they hang
+    start = np.concatenate([q[0] - rigid[0] / chain.K_s, np.zeros(n), q[0], np.zeros(n)])
+
+    def set_state(root: Context) -> None:
+        plant.set_joint_state(plant.GetMyMutableContextFromRoot(root), start)
+
+    signals = _simulate(builder.Build(), log, set_state, run.duration - run.ramp, progress)
+    first = round(run.ramp * RATE)
+    kept = slice(first, first + round(periods * trajectory.period * RATE))
+    q_J, _, q_M, _ = np.split(signals["state"][kept], 4, axis=1)
+    check_effort(subject, signals["torque"])
+    record = _measured(subject, faults, (q_J, q_M, signals["torque"][kept]), random)
+    return replace(record, period=trajectory.period)
+
+
+def _elastic(subject: Subject, faults: Imperfections) -> tuple[SerialChain, np.ndarray, np.ndarray]:
+    """Return the chain and the friction of a robot that fits."""
+    chain = subject.chain
+    if chain is None or not chain.is_elastic or not np.all(chain.D_M > 0.0):
+        raise InputError(
+            f"{subject.name}: joints that are not elastic; a robot all of whose joints have finite "
+            "stiffness and rotors is required"
+        )
+    if subject.coulomb is None or subject.viscous is None:
+        raise InputError(f"{subject.name}: friction is not known; must be")
+    if not np.all(np.isfinite(subject.effort_limit)):
+        raise InputError(f"{subject.name}: effort limits of the drives are not known; must be")
+    faults.check_size(subject.dimension)
+    return chain, subject.coulomb, subject.viscous
+
+
+def _add_multisine(builder: DiagramBuilder, sines: Multisine) -> OutputPort:
+    omega = 2.0 * np.pi * sines.frequency
+    return add_sines(builder, "shaking", sines.amplitude, omega, sines.phase)
+
+
+def _add_friction(
+    builder: DiagramBuilder,
+    chain: SerialChain,
+    coulomb: np.ndarray,
+    viscous: np.ndarray,
+    state: OutputPort,
+    rows: np.ndarray,
+) -> OutputPort:
+    bristles = bristles_for_step(coulomb, viscous, chain.D_M, _STEP)
+    friction = builder.AddNamedSystem("friction", JointFriction(bristles))
+    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(rows))
+    builder.Connect(state, velocity.get_input_port())
+    builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+    return friction.GetOutputPort("resistance")
+
+
+def _simulate(
+    diagram: Diagram,
+    log: SignalLog,
+    set_state: SetState,
+    duration: float,
+    progress: Progress | None,
+) -> dict[str, np.ndarray]:
+    """Return the logged signals."""
+    simulator = Simulator(diagram)
+    config = SimulatorConfig(
+        integration_scheme="runge_kutta3", max_step_size=_STEP, use_error_control=False
+    )
+    ApplySimulatorConfig(config, simulator)
+    root = simulator.get_mutable_context()
+    set_state(root)
+    simulator.Initialize()
+    ends = np.append(np.arange(_CHUNK, duration, _CHUNK), duration)
+    for end in ends:
+        simulator.AdvanceTo(end)
+        if progress is not None:
+            progress(end / duration, "simulating the elastic joints")
+    return log.read(root)[1]
+
+
+def _measured(
+    subject: Subject,
+    faults: Imperfections,
+    true: tuple[np.ndarray, np.ndarray, np.ndarray],
+    random: np.random.Generator,
+) -> Record:
+    """Return the record of true link positions, motor positions and torques."""
+    turn = np.array([2.0 * np.pi if unit == "rad" else 1.0 for unit in subject.joint_units])
+    with np.errstate(divide="ignore"):
+        resolution = np.where(
+            faults.encoder_increments > 0.0, turn / faults.encoder_increments, 0.0
+        )
+    coarse = resolution > 0.0
+    positions = []
+    for q in true[:2]:
+        seen = q + faults.position_noise * random.normal(size=q.shape)
+        seen[:, coarse] = resolution[coarse] * np.round(seen[:, coarse] / resolution[coarse])
+        positions.append(seen)
+    tau = true[2] + faults.torque_noise * random.normal(size=true[2].shape)
+    return Record(
+        np.arange(len(tau)) / RATE,
+        positions[0],
+        tau,
+        tuple(subject.joint_names),
+        q_motor=positions[1],
+        source=f"simulated {subject.name}",
+    )

@@ -1,0 +1,190 @@
+"""From one random motion to the local optimum next to it, within the limits at all times.
+
+The solver knows of limits at some instants. Where its motion exceeds one in between, the instant of
+the worst excess is added and it goes on from there (exchange method of semi-infinite programming).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.excitation.fourier import fourier_basis
+from identification.excitation.problem import ExcitationProblem
+from identification.excitation.program import ExcitationProgram
+
+# instants per period of the highest harmonic: at first, and where excesses are looked for
+_COARSE_JOINTS, _COARSE_POSTURES, _FINE = 10, 12, 100
+_SAMPLES = 20  # of the criterion per period of the highest harmonic
+_MOST_ROUNDS = 8
+
+_START_SHARE = 0.7  # of the joint limits that a random motion takes
+_START_OFFSET = 0.4  # of the reach, largest distance of its middle from that of the limits
+_POSTURES = 500
+_MOST_TRIALS = 4
+_FROM_NEAR = 0.4  # part of the way to a random motion
+# what may be missing of limits, relative, before an instant is added
+_ENOUGH = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class LocalOptimum:
+    """End of one local search.
+
+    Attributes:
+        seed: Of the random motion at its start.
+        coefficients: Of the motion, shape (N, 2M + 1).
+        value: The figure to be small, see :class:`ExcitationCost`.
+        excess: Largest excess of a limit, relative (of the position limits' range and so on) or in
+            m for clearances; not positive where all are kept.
+        limit: Which one.
+        rounds: How often the solver ran.
+    """
+
+    seed: int
+    coefficients: np.ndarray
+    value: float
+    excess: float
+    limit: str
+    rounds: int
+
+
+class LocalSearch:
+    """Searches of one robot's problem.
+
+    Args:
+        problem: Of the robot.
+    """
+
+    def __init__(self, problem: ExcitationProblem) -> None:
+        highest = max(problem.harmonics)
+        least = -(-problem.kernels.forward.size2_out(0) // problem.dimension)
+        self.problem = problem
+        self._program = ExcitationProgram(problem, max(_SAMPLES * highest, 2 * least))
+        self._fine = _instants(problem, _FINE)
+        self._bases = fourier_basis(self._fine, problem.period, problem.harmonics)
+        posture = problem.posture
+        self._torque = problem.torque.map(len(self._fine))
+        self._posture = None if posture is None else posture.function.map(len(self._fine))
+
+    def run(
+        self,
+        seed: int,
+        iterations: int,
+        posture: np.ndarray | None = None,
+        near: np.ndarray | None = None,
+    ) -> LocalOptimum:
+        """Return the optimum next to a random motion.
+
+        Args:
+            seed: Of the random motion.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
+            posture: That the random motion is about [rad or m], shape (N,); or random, too.
+            near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
+        """
+        random = np.random.default_rng(seed)
+        for _ in range(_MOST_TRIALS):
+            start = random_motion_about(self.problem, random, posture)
+            if near is not None:
+                start = near + _FROM_NEAR * (start - near)
+            optimum = self.improve(start, seed, iterations)
+            # now and then the way to allowed postures ends with a joint at rest
+            if np.isfinite(optimum.value):
+                break
+        return optimum
+
+    def improve(self, coefficients: np.ndarray, seed: int, iterations: int) -> LocalOptimum:
+        """Return the optimum next to a motion.
+
+        Args:
+            coefficients: Of the motion, shape (N, 2M + 1).
+            seed: That it has come from.
+            iterations: Of the solver, at most; a quarter of them once instants have been added.
+        """
+        problem = self.problem
+        joint_times = _instants(problem, _COARSE_JOINTS)
+        posture_times = _instants(problem, _COARSE_POSTURES)
+        left, rounds = iterations, 0
+        while True:
+            rounds += 1
+            solution = self._program.solve(coefficients, joint_times, posture_times, left)
+            coefficients = solution.coefficients
+            joints, postures = self._excesses(coefficients)
+            worst = max((*joints, *postures), key=lambda item: item[1].max())
+            excess = float(worst[1].max())
+            left = max(iterations // 4, 1)
+            if excess <= _ENOUGH or rounds == _MOST_ROUNDS:
+                return LocalOptimum(seed, coefficients, solution.value, excess, worst[0], rounds)
+            joint_times = self._with_peaks(joint_times, [values for _, values in joints])
+            posture_times = self._with_peaks(posture_times, [values for _, values in postures])
+
+    def _excesses(
+        self, coefficients: np.ndarray
+    ) -> tuple[list[tuple[str, np.ndarray]], list[tuple[str, np.ndarray]]]:
+        """Return by how much each limit is exceeded at all fine instants, each (K, n)."""
+        limits = self.problem.limits
+        q, v, a = (basis @ coefficients.T for basis in self._bases)
+        joints = [
+            ("position", np.abs((q - limits.middle) / limits.reach) - 1.0),
+            ("velocity", np.abs(v / limits.velocity) - 1.0),
+            ("acceleration", np.abs(a / limits.acceleration) - 1.0),
+        ]
+        tau = np.array(self._torque(q.T, v.T, a.T)).T
+        others = [("effort", np.abs(tau / limits.effort) - 1.0)]
+        if self._posture is not None:
+            assert self.problem.posture is not None
+            g = np.array(self._posture(q.T)).T
+            names = self.problem.posture.names
+            others += [(name, -g[:, [i]]) for i, name in enumerate(names)]
+        return joints, others
+
+    def _with_peaks(self, times: np.ndarray, excesses: list[np.ndarray]) -> np.ndarray:
+        """Return instants with those added where a limit is exceeded most, for a while each."""
+        added = [times]
+        for values in np.concatenate(excesses, axis=1).T:
+            before, after = np.roll(values, 1), np.roll(values, -1)
+            peak = (values > _ENOUGH / 2.0) & (values >= before) & (values > after)
+            added.append(self._fine[peak])
+        return np.unique(np.concatenate(added))
+
+
+def random_motion_about(
+    problem: ExcitationProblem, random: np.random.Generator, posture: np.ndarray | None = None
+) -> np.ndarray:
+    """Return coefficients of a random motion within the joint limits, shape (N, 2M + 1).
+
+    Args:
+        problem: Of the robot.
+        random: Source of the numbers.
+        posture: Its middle [rad or m], shape (N,); by default a random one that is allowed.
+    """
+    limits = problem.limits
+    middle = _random_posture(problem, random) if posture is None else posture
+    coefficients = np.empty(problem.shape)
+    coefficients[:, 0] = middle
+    coefficients[:, 1:] = random.normal(size=(problem.dimension, problem.shape[1] - 1))
+    bases = fourier_basis(_instants(problem, _FINE), problem.period, problem.harmonics)
+    room = limits.reach - np.abs(middle - limits.middle)
+    largest = [room, limits.velocity, limits.acceleration]
+    shares = [
+        np.abs(basis[:, 1:] @ coefficients[:, 1:].T).max(axis=0) / most
+        for basis, most in zip(bases, largest, strict=True)
+    ]
+    coefficients[:, 1:] *= (_START_SHARE / np.max(shares, axis=0))[:, None]
+    return coefficients
+
+
+def _random_posture(problem: ExcitationProblem, random: np.random.Generator) -> np.ndarray:
+    """Return the best of some random postures, in what it may not be below."""
+    limits = problem.limits
+    offsets = _START_OFFSET * random.uniform(-1.0, 1.0, (_POSTURES, problem.dimension))
+    postures = limits.middle + offsets * limits.reach
+    if problem.posture is None:
+        return postures[0]
+    least = problem.posture.values(postures).min(axis=1)
+    fit = np.flatnonzero(least > 0.0)
+    return postures[fit[0] if fit.size else np.argmax(least)]
+
+
+def _instants(problem: ExcitationProblem, per_period: int) -> np.ndarray:
+    count = per_period * max(problem.harmonics)
+    return np.arange(count) * problem.period / count

@@ -1,0 +1,102 @@
+"""Processes of this machine that search side by side."""
+
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from pfsc_drake.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Common = TypeVar("Common")
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_LOOPBACK = "127.0.0.1"
+_SETTINGS = {
+    # what watches the processes takes time from them
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    # nothing to look at from elsewhere
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
+
+class SideBySide(Protocol):
+    """Runs tasks, each in a process of its own."""
+
+    def __call__(
+        self, function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
+    ) -> Iterator[Result]:
+        """Yield results in the order in which they are ready.
+
+        Args:
+            function: Of a module, to be called with ``common`` and each task.
+            common: Sent to every process once.
+            tasks: What to do.
+        """
+
+
+@contextmanager
+def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
+    """Give what runs tasks, until the end of the context.
+
+    Args:
+        workers: Number of processes; one for each core by default, 1 for no others than this.
+        most: Number of processes that there is work for.
+
+    Raises:
+        InputError: If there are to be processes and Dask is not installed, or their number is
+            below 1.
+    """
+    if workers is not None and workers < 1:
+        raise InputError(f"workers = {workers}; must be 1 or more")
+    if workers == 1:
+        yield lambda function, common, tasks: (function(common, task) for task in tasks)
+        return
+    with _processes(workers, most) as client:
+        from distributed import as_completed
+
+        def run(
+            function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
+        ) -> Iterator[Result]:
+            # of its own name: what is common to two batches is gone with the first one
+            shared = client.scatter(common, broadcast=True, hash=False)
+            futures = [client.submit(function, shared, task, pure=False) for task in tasks]
+            for future in as_completed(futures, loop=client.loop):
+                yield future.result()
+
+        yield run
+
+
+@contextmanager
+def _processes(workers: int | None, most: int) -> Iterator["Client"]:
+    try:
+        import dask
+        from dask.system import CPU_COUNT
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise InputError(
+            f"{error.name} is not installed; allowed: make setup, the extra 'sweep', or one worker"
+        ) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with (
+        TemporaryDirectory(prefix="pfsc_drake_workers_", ignore_cleanup_errors=True) as folder,
+        dask.config.set(_SETTINGS),
+        LocalCluster(
+            n_workers=min(workers or CPU_COUNT, most),
+            threads_per_worker=1,
+            processes=True,
+            host=_LOOPBACK,
+            dashboard_address=f"{_LOOPBACK}:0",
+            scheduler_kwargs={"dashboard": False},
+            local_directory=folder,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client

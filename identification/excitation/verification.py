@@ -1,0 +1,155 @@
+"""Whether a motion keeps all limits at all times, told by other means than the search's.
+
+Joint limits hold between samples, too: by a bound of the second derivative. Torques are those of
+the model with the sign of the velocities itself. Distances are those of Drake's engine, see
+:mod:`~identification.excitation.swept_clearance`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from identification.excitation.balls import ends, points_of_last_link
+from identification.excitation.cell import Cell
+from identification.excitation.clearance import delta_posture_limits, height_of
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.limits import Given, JointLimits, chosen_limits, used_shares
+from identification.excitation.problem import believed_parameters
+from identification.excitation.scene import RobotScene, cell_of
+from identification.excitation.swept_clearance import SweptClearance, swept_clearance
+from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+
+_INSTANTS = 10_000  # per period
+# what counts as the limit, relative to it
+_ROUNDING = 1e-9
+_UNSURE = 0.002  # m, of distances between instants
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """How much of the limits one period of a motion takes.
+
+    Attributes:
+        shares: ``position`` (of the way from the middle to a limit), ``velocity``,
+            ``acceleration``, ``effort``: largest share per joint, 1 being the limit, each (N,).
+        margins: Least distances to the other limits by name [m or 1]: heights above the cell's
+            ``tool_above``; of a DELTA robot what its workspace asks for.
+        clearance: Distances to obstacles and between links; None of robots without.
+        asked: Distance that is asked for [m].
+        problems: What is not kept, one sentence each.
+    """
+
+    shares: Mapping[str, np.ndarray]
+    margins: Mapping[str, float]
+    clearance: SweptClearance | None
+    asked: float
+    problems: list[str]
+
+    def missing(self, name: str) -> float:
+        """Return by how much a posture limit falls short [m or 1]; distances are one for all."""
+        if name in self.margins:
+            return -self.margins[name]
+        return 0.0 if self.clearance is None else self.asked - self.clearance.guaranteed
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether all limits are kept."""
+        return not self.problems
+
+
+def verify(
+    regressor: Regressor,
+    parameters: np.ndarray,
+    limits: JointLimits,
+    trajectory: FourierTrajectory,
+    cell: Cell | None = None,
+    scene: RobotScene | None = None,
+) -> Verification:
+    """Return how much of the limits a motion takes.
+
+    Args:
+        regressor: Of the robot; with the sign of the velocities itself in Coulomb friction.
+        parameters: Believed ones, for the torques, shape (n,).
+        limits: Of the joints.
+        trajectory: The motion.
+        cell: What stands around a serial robot; None to leave that out.
+        scene: The same for Drake; made anew if there is a cell alone.
+    """
+    subject = regressor.subject
+    t = np.arange(_INSTANTS) * trajectory.period / _INSTANTS
+    motion = trajectory.motion(t)
+    tau = regressor.matrix(*motion) @ parameters
+    shares = dict(used_shares(limits, motion, tau))
+    between = _between_samples(trajectory, t[1])
+    largest = (limits.reach, limits.velocity, limits.acceleration)
+    for i, key in enumerate(("position", "velocity", "acceleration")):
+        shares[key] = shares[key] + between[i] / largest[i]
+    problems = [
+        f"{key} of {subject.joint_names[j]}: {100.0 * share[j]:.4g} % of the limit"
+        for key, share in shares.items()
+        for j in np.flatnonzero(share > 1.0 + _ROUNDING)
+    ]
+    margins: dict[str, float] = {}
+    clearance = None
+    asked = 0.0 if cell is None else cell.clearance
+    if subject.delta is not None:
+        workspace = delta_posture_limits(subject.delta)
+        least = workspace.values(motion[0]).min(axis=0)
+        margins = dict(zip(workspace.names, least.tolist(), strict=True))
+    elif cell is not None and subject.chain is not None and subject.block is not None:
+        scene = scene or RobotScene(subject, cell)
+        if np.isfinite(cell.tool_above):
+            tips = ends(subject)
+            places = points_of_last_link(subject.chain, list(tips.values())).sample(motion[0])
+            heights = places[..., 2].min(axis=0) - cell.tool_above
+            margins = dict(zip(map(height_of, tips), heights.tolist(), strict=True))
+        clearance = swept_clearance(subject.chain, scene, trajectory, cell.clearance, _UNSURE)
+        if clearance.least < asked - _ROUNDING or clearance.guaranteed < asked - _UNSURE:
+            problems.append(
+                f"distance of {clearance.pair}: {clearance.least:.4g} m at t = "
+                f"{clearance.time:.4g} s; {asked:g} m are asked for"
+            )
+    problems += [
+        f"{name}: falls short by {-margin:.4g}"
+        for name, margin in margins.items()
+        if margin < -_ROUNDING
+    ]
+    return Verification(shares, margins, clearance, asked, problems)
+
+
+def verify_excitation(
+    subject: Subject,
+    trajectory: FourierTrajectory,
+    limits: JointLimits | Mapping[str, Given] | None = None,
+    cell: Cell | str | Path | None = None,
+) -> Verification:
+    """Return how much of a robot's limits a motion takes.
+
+    Args:
+        subject: The robot.
+        trajectory: The motion.
+        limits: Of the joints where not those of the model, see
+            :func:`~identification.excitation.limits.chosen_limits`.
+        cell: What stands around a serial robot; None for what is shipped with it.
+
+    Raises:
+        InputError: If the motion has too few or too many joints, or a limit is out of range.
+    """
+    if trajectory.dimension != subject.dimension:
+        raise InputError(
+            f"excitation: of {trajectory.dimension} joints; {subject.name} has {subject.dimension}"
+        )
+    joints, around = chosen_limits(subject, limits), cell_of(subject, cell)
+    return verify(Regressor(subject), believed_parameters(subject), joints, trajectory, around)
+
+
+def _between_samples(trajectory: FourierTrajectory, step: float) -> np.ndarray:
+    """Return by how much q, v, a may be larger between samples than at them, shape (3, N)."""
+    w = 2.0 * np.pi / trajectory.period * np.array(trajectory.harmonics)
+    amplitudes = np.hypot(trajectory.a, trajectory.b)
+    # the second derivative of v's harmonics is w^2 times them
+    return np.array([amplitudes @ w ** (order + 1) for order in range(3)]) * step**2 / 8.0

@@ -1,0 +1,70 @@
+"""Robots, their regressors and small problems, each made once."""
+
+import numpy as np
+import pytest
+
+from identification.excitation.cell import load_cell
+from identification.excitation.fourier import FourierTrajectory, shipped_excitation
+from identification.excitation.limits import chosen_limits
+from identification.excitation.problem import excitation_problem
+from identification.excitation.scene import RobotScene
+from identification.model.base import base_parameters
+from identification.model.regressor import Regressor
+from identification.model.subject import load_subject
+from pfsc_drake.robot.models.files import models_directory
+
+THREE_AXES = models_directory() / "comau_racer_1_4" / "comau_racer_1_4_3r.sdf"
+
+
+@pytest.fixture(scope="session")
+def comau():
+    return load_subject("comau_racer_1_4")
+
+
+@pytest.fixture(scope="session")
+def comau_cell():
+    return load_cell(None, "comau_racer_1_4")
+
+
+@pytest.fixture(scope="session")
+def comau_scene(comau, comau_cell):
+    return RobotScene(comau, comau_cell)
+
+
+@pytest.fixture(scope="session")
+def regressor(comau):
+    return Regressor(comau)
+
+
+@pytest.fixture(scope="session")
+def base(regressor):
+    return base_parameters(regressor)
+
+
+@pytest.fixture(scope="session")
+def printed():
+    """Tab. C.2."""
+    return FourierTrajectory.load(shipped_excitation())
+
+
+@pytest.fixture(scope="session")
+def arm():
+    """Three axes, 15 inertial base parameters, rotors and friction."""
+    return load_subject(THREE_AXES)
+
+
+@pytest.fixture(scope="session")
+def delta():
+    return load_subject("festo_expt_45")
+
+
+@pytest.fixture(scope="session")
+def arm_problem(arm):
+    return excitation_problem(arm, chosen_limits(arm), period=5.0, harmonics=(1, 2))
+
+
+@pytest.fixture
+def random_motion():
+    """Coefficients of three joints and two harmonics."""
+    random = np.random.default_rng(3)
+    return random.normal(size=(3, 5)) * 0.4

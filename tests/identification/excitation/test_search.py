@@ -1,0 +1,168 @@
+"""Searches for excitations of small robots, and what cannot be searched for."""
+
+import numpy as np
+import pytest
+
+from identification.excitation.cell import Cell, Obstacle
+from identification.excitation.criterion import information
+from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.local_search import LocalSearch, random_motion_about
+from identification.excitation.processes import side_by_side
+from identification.excitation.search import search
+from identification.excitation.verification import verify_excitation
+from identification.model.base import base_parameters
+from identification.model.regressor import Regressor
+from identification.model.subject import load_subject
+from pfsc_drake.errors import InputError
+
+POST = Obstacle(
+    name="post", kind="cylinder", start=np.array([0, 1, 0]), end=np.array([0, 1, 1]), radius=0.1
+)
+CELL = Cell([POST], tool_above=0.3, self_collision=False)
+QUICK = {"period": 5.0, "harmonics": (1, 2), "starts": 2, "workers": 1, "iterations": 40}
+
+
+@pytest.fixture(scope="module")
+def found_and_told(arm):
+    told = []
+    found = search(arm, cell=CELL, progress=lambda *args: told.append(args), **QUICK)
+    return found, told
+
+
+@pytest.fixture(scope="module")
+def found(found_and_told):
+    return found_and_told[0]
+
+
+@pytest.fixture(scope="module")
+def figures(arm):
+    regressor = Regressor(arm)
+    base = base_parameters(regressor)
+    return lambda motion: information(regressor, base, motion)
+
+
+def test_is_much_better_than_random_motions(found, figures, arm_problem):
+    motions = [random_motion_about(arm_problem, np.random.default_rng(i)) for i in range(10)]
+    others = [
+        figures(FourierTrajectory.from_coefficients(c, 5.0, (1, 2))).log_determinant
+        for c in motions
+    ]
+    assert found.information.log_determinant > max(others) + 20.0
+    assert found.information == figures(found.trajectory)
+
+
+def test_keeps_all_limits_of_the_cell(arm, found):
+    t = np.random.default_rng(0).uniform(0.0, 5.0, 1000)
+    q, v, a = found.trajectory.motion(t)
+    assert np.all((q >= arm.position_limits[:, 0]) & (q <= arm.position_limits[:, 1]))
+    assert np.all(np.abs(v) <= arm.velocity_limit)
+    assert np.all(np.abs(a) <= arm.acceleration_limit)
+    again = verify_excitation(arm, found.trajectory, cell=CELL)
+    assert again.problems == found.verification.problems == []
+    assert again.clearance.guaranteed >= 0.018
+
+
+def test_condition_number(arm, found):
+    by_condition = search(arm, "condition", cell=CELL, **QUICK)
+    assert by_condition.information.condition_number < found.information.condition_number
+    assert by_condition.information.log_determinant < found.information.log_determinant
+
+
+def test_delta(delta):
+    found = search(delta, limits={"acceleration": 30.0}, **QUICK)
+    assert found.information.base_parameters == 10
+    assert found.information.log_determinant > 70.0
+    assert found.verification.problems == []
+    q = found.trajectory.motion(np.linspace(0.0, 5.0, 50))[0]
+    for row in q:  # every posture is in the workspace
+        robot = delta.delta
+        np.testing.assert_allclose(
+            robot.joint_coordinates(robot.tool_position(row)), row, atol=1e-9
+        )
+
+
+CRANE = """\
+<robot name="crane">
+  <link name="base"/>
+  <link name="beam"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="hook"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.005" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="swing" type="revolute"><parent link="base"/><child link="beam"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="2" effort="50"/></joint>
+  <joint name="lift" type="prismatic"><parent link="beam"/><child link="hook"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.5" velocity="1" effort="100"/></joint>
+</robot>
+"""
+
+
+def test_model_file_with_a_slide_and_no_shapes(tmp_path):
+    file = tmp_path / "crane.urdf"
+    file.write_text(CRANE)
+    crane = load_subject(file)
+    cell = Cell([POST], tool_above=-0.2)
+    found = search(crane, cell=cell, limits={"acceleration": 10.0}, **QUICK)
+    assert found.warnings == ["crane: the model has no shapes; collisions are not checked"]
+    assert found.verification.keeps_all
+    q, _, _ = found.trajectory.motion(np.linspace(0.0, 5.0, 500))
+    height = -0.4 * np.sin(q[:, 0]) + q[:, 1] * np.cos(q[:, 0])
+    margin = found.verification.margins["height of the tool point"]
+    assert height.min() == pytest.approx(-0.2 + margin, abs=1e-3)
+    assert height.min() >= -0.2
+
+
+def test_is_the_same_again(arm_problem):
+    ends = [LocalSearch(arm_problem).run(seed, 5).coefficients for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert not np.allclose(ends[0], ends[2])
+
+
+def test_progress(found_and_told):
+    _, told = found_and_told
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert "1 of 2 starts, best log det" in told[1][1]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"criterion": "E"}, "criterion = 'E'; must be one of D, condition"),
+        ({"starts": 0}, "starts = 0"),
+        ({"workers": 0}, "workers = 0; must be 1 or more"),
+        ({"period": 0.0}, "period = 0.0 s"),
+        ({"harmonics": ()}, "harmonics"),
+        ({"harmonics": (1,)}, r"harmonics = \[1\]: too few to show all 22 base .* link_3.Izz"),
+        ({"parameters": np.ones(3)}, r"parameters: shape \(3,\); must be 39 finite numbers"),
+        ({"cell": "nowhere.yaml"}, "nowhere.yaml"),
+        ({"limits": {"velocity": {"elbow": 1.0}}}, "no joint 'elbow'"),
+        ({"limits": {"effort": 1.0}}, "hardest to keep is the effort limit of joint_2"),
+        (
+            {"cell": Cell(tool_above=9.0, self_collision=False)},
+            "hardest to keep is the height of the flange",
+        ),
+        ({"posture": [0.0, 9.0, 0.0]}, "posture: joint_2 = 9; must be within its limits"),
+        ({"posture": [0.0, 0.0]}, "must be 3 finite numbers"),
+        ({"torque_noise": [1.0, 0.0, 1.0]}, "torque_noise"),
+    ],
+)
+def test_refuses(arm, change, says):
+    with pytest.raises(InputError, match=says):
+        search(arm, **{"cell": CELL} | QUICK | change)
+
+
+def test_refuses_a_posture_in_collision(arm):
+    # joint 1 turns the arm towards the post
+    with pytest.raises(InputError, match=r"posture: .* and post are .* m apart; must be at least"):
+        search(arm, cell=CELL, posture=[np.pi / 2, np.pi / 4, 0.0], **QUICK)
+
+
+def add(common, task):
+    return common + task
+
+
+def test_processes():
+    with side_by_side(2, 3) as run:
+        assert sorted(run(add, 10, [1, 2, 3])) == [11, 12, 13]
+        assert list(run(add, 20, [1])) == [21]
