@@ -28,7 +28,7 @@ from pfsc_drake.errors import InputError
 # of the distance from the prior, in units of squared standard deviations
 PRIOR_WEIGHT = 0.1
 # no combination of parameters counts as known better than to this part of the prior's size
-_MOST_CERTAIN = 1e5
+_MOST_CERTAIN = 1e6
 _TERMS = np.array(linear_terms())
 
 
@@ -54,7 +54,7 @@ def least_squares(
     depend on, whatever its weight. With ``P_0 = L L'`` the unknown of each link is
     ``L^-1 P L^-T``, of the order of one; and all are counted from a set that fits the
     measurements without being consistent, so that the cost is of the order of chi squared. What is
-    known to better than 1e-5 of that unit counts as known to 1e-5.
+    known to better than 1e-6 of that unit counts as known to 1e-6.
 
     Args:
         A: Weighted so that b has the unit matrix for its covariance, shape (k, n).

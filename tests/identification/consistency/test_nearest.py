@@ -133,3 +133,15 @@ def test_bounds_that_contradict_each_other(comau_base, comau_bounds, printed):
     refused("total_mass = .300.0, 400.0.; the links have", comau_base, mean, C, comau_bounds)
     comau_bounds.links.pop()
     refused("5 links; must be 6 links", comau_base, mean, C, comau_bounds)
+
+
+@pytest.mark.parametrize("relative", [1e-8, 1e-5, 1e-2])
+def test_measurements_of_any_certainty(relative, comau, comau_base, comau_bounds):
+    values = comau_base.values(true_parameters(comau))
+    deviation = relative * np.abs(values)
+    noisy = values + deviation * np.random.default_rng(0).normal(size=values.size)
+    found = nearest_consistent(comau_base, noisy, np.diag(deviation**2), comau_bounds)
+    np.testing.assert_allclose(found.base_values, values, rtol=0.2, atol=1e-5 + relative)
+    assert all(
+        np.linalg.eigvalsh(pseudo_inertia(link))[0] > 0.0 for link in links(found.parameters)
+    )
