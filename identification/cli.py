@@ -63,10 +63,20 @@ def excite_command(
     periods: Annotated[int, typer.Option(min=1, help="How often it is to be run.")] = 5,
     starts: Annotated[int, typer.Option(min=1, help="Random motions to start from.")] = 16,
     seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
+    limits: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=VALUES",
+            help="velocity, acceleration or effort of all joints, one number or one for each: "
+            "acceleration=30 or velocity=1,1,2. Default: those of the model",
+        ),
+    ] = None,
     cell: Annotated[Path | None, typer.Option(help="What stands around the robot (YAML).")] = None,
     tool: Tool = False,
 ) -> None:
     """Find a motion that shows all parameters within all limits."""
+    from identification.excitation.limits import chosen_limits
     from identification.excitation.search import search
     from identification.model.subject import load_subject
     from identification.steps import RECORDING, save_excitation
@@ -76,12 +86,27 @@ def excite_command(
         console = Console()
         subject = load_subject(robot, tool=tool)
         folder = out or Path("out") / f"{subject.name}_excitation"
+        within = chosen_limits(
+            subject,
+            {
+                name: [_number(value, "--limit") for value in values.split(",")]
+                for name, values in _pairs(limits, "--limit")
+            },
+        )
         numbers = [_integer(number, "--harmonics") for number in harmonics.split(",")]
         with fraction_display(console, "excitation") as progress:
             found = search(
-                subject, criterion, numbers, period, starts, seed, cell=cell, progress=progress
+                subject,
+                criterion,
+                numbers,
+                period,
+                starts,
+                seed,
+                within,
+                cell,
+                progress=progress,
             )
-        save_excitation(subject, found, folder, periods)
+        save_excitation(subject, found, folder, periods, within)
         console.print(
             f"log det {found.information.log_determinant:.2f}, condition number "
             f"{found.information.condition_number:.0f}, {found.information.base_parameters} "

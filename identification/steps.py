@@ -16,6 +16,7 @@ from identification.estimation.results import save_estimate as save_estimate
 from identification.estimation.validation import predict
 from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.limits import JointLimits
 from identification.excitation.recording import record_excitation
 from identification.excitation.run_in import rest_to_rest
 from identification.excitation.search import SearchResult
@@ -38,7 +39,9 @@ EXCITATION, RUN, RECORDING = "excitation.yaml", "excitation.csv", "excitation.ht
 _RATE = 1000.0  # Hz, of the motion for a robot's controller
 
 
-def save_excitation(subject: Subject, found: SearchResult, folder: Path, periods: int) -> None:
+def save_excitation(
+    subject: Subject, found: SearchResult, folder: Path, periods: int, limits: JointLimits
+) -> None:
     """Write an excitation: coefficients, motion from rest to rest, and a page that plays it.
 
     Args:
@@ -46,6 +49,7 @@ def save_excitation(subject: Subject, found: SearchResult, folder: Path, periods
         found: What was found.
         folder: Where; made if it is not there.
         periods: How often the motion is run.
+        limits: For the way from rest to the motion and back.
     """
     make_folder(folder)
     trajectory, joints = found.trajectory, subject.joint_names
@@ -53,7 +57,7 @@ def save_excitation(subject: Subject, found: SearchResult, folder: Path, periods
         folder / EXCITATION, subject.name, f"{found.criterion}-optimal", joints, found.figures
     )
     run = rest_to_rest(
-        trajectory, subject.velocity_limit, subject.acceleration_limit, periods=periods, rate=_RATE
+        trajectory, limits.velocity, limits.acceleration, periods=periods, rate=_RATE
     )
     run.export_csv(folder / RUN, _RATE, list(subject.joint_units))
     cell = None if subject.chain is None else load_cell(None, subject.name)

@@ -15,6 +15,7 @@ from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.limits import chosen_limits
 from identification.excitation.recording import record_excitation
 from identification.excitation.search import search
 from identification.findings import Findings
@@ -162,7 +163,7 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
     with open_results(out, "identification") as results:
         say = _stepwise(circle.robot, progress)
         found = search(subject, starts=circle.starts, seed=_SEED, progress=say)
-        save_excitation(subject, found, out / "excitation", periods=5)
+        save_excitation(subject, found, out / "excitation", 5, chosen_limits(subject))
         other = _other_motion(subject, circle, say)
         faults = shipped_imperfections(subject.name).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
