@@ -3,8 +3,10 @@
 Terms are added to Coulomb and viscous friction one after the other. A candidate is estimated on one
 motion, its width included, and judged on another one: the decrease of the squared weighted errors,
 summed over sections of the motion, must be larger than chance explains, whatever the number of
-candidates, and be worth a parameter. The best one stays. In the end each term goes that is no
-longer worth it, now that others are there.
+candidates, and be worth a parameter. The best one stays if its factor differs from zero, too, by
+more than the noise of the first motion explains: a needless term changes all parameters a little,
+which helps every other time. In the end each term goes that is no longer worth it, now that others
+are there.
 
 Friction is not the same every day, and what matters here is its form. Before errors are squared,
 the sizes of Coulomb and viscous friction are therefore adapted to the motion that is judged on.
@@ -13,7 +15,6 @@ the sizes of Coulomb and viscous friction are therefore adapted to the motion th
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -26,13 +27,10 @@ from identification.estimation.friction import (
     FrictionModel,
     FrictionTerm,
 )
+from identification.estimation.further_columns import FurtherColumns
 from identification.estimation.identifiability import factorize
-from identification.estimation.information import (
-    SLOW,
-    Information,
-    MeasuredMotion,
-    information,
-)
+from identification.estimation.information import SLOW, MeasuredMotion, information
+from identification.estimation.least_squares import estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
@@ -49,7 +47,7 @@ _WIDTHS = np.geomspace(0.02, 0.8, 8)
 _WIDTH_TOLERANCE = 1e-3  # of the logarithm
 # least part of a column outside the span of the others, squared
 _INDEPENDENT = 1e-7
-_REMEMBERED, _REMEMBERED_ERRORS = 128, 8  # terms with their products, models with theirs
+_REMEMBERED = 8  # models with their errors
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class FrictionChoice:
         model: Terms beside Coulomb and viscous friction; none if these do.
         judgements: On all candidates, sorted by joints; those that are chosen are judged against
             the model without them, the others as one more term.
-        threshold: That significances must exceed.
+        threshold: That significances must exceed, and factors in standard deviations.
     """
 
     model: FrictionModel
@@ -132,47 +130,31 @@ def choose_friction(
         for joint in range(subject.dimension)
         for kind in kinds
     ]
-    search = _Search(_Data(systems[0], motion.v), _Data(systems[1], other.v), candidates)
+
+    def deviations(model: FrictionModel) -> float:
+        """Return the factor of the last term in units of its standard deviation."""
+        found = estimate(regressor, base, motion, model, slow)
+        return float(abs(found.base_parameters[-1]) / found.standard_deviation[-1])
+
+    data = [
+        FurtherColumns(system, v) for system, v in zip(systems, (motion.v, other.v), strict=True)
+    ]
+    search = _Search(data[0], data[1], candidates, deviations)
     return search.run(progress or (lambda _fraction, _what: None))
-
-
-class _Data:
-    """A weighted linear system with the velocities for further columns."""
-
-    def __init__(self, system: Information, v: np.ndarray) -> None:
-        shape = system.torques.shape
-        self.X, self.b = system.weighted()
-        self.by_joint = self.X.reshape(*shape, -1)
-        self.torques = self.b.reshape(shape)
-        self.weights, self.v = system.weights, np.asarray(v)
-        self.base = system.base
-        self.products = lru_cache(maxsize=_REMEMBERED)(self._products)
-
-    def column(self, term: FrictionTerm) -> np.ndarray:
-        """Return the weighted column of a term in its joint, shape (K,)."""
-        column: np.ndarray = term.column(self.v[:, term.joint]) * self.weights[:, term.joint]
-        return column
-
-    def _products(self, term: FrictionTerm) -> "_Products":
-        column, joint = self.column(term), term.joint
-        return _Products(
-            column, self.by_joint[:, joint].T @ column, float(self.torques[:, joint] @ column)
-        )
-
-
-class _Products(NamedTuple):
-    """A weighted column (K,), and its products with the columns X (n_b,) and the torques."""
-
-    column: np.ndarray
-    columns: np.ndarray
-    torques: float
 
 
 class _Search:
     """Estimates models with further columns, from products that are computed once."""
 
-    def __init__(self, training: _Data, test: _Data, candidates: Sequence[FrictionTerm]) -> None:
+    def __init__(
+        self,
+        training: FurtherColumns,
+        test: FurtherColumns,
+        candidates: Sequence[FrictionTerm],
+        deviations: Callable[[FrictionModel], float],
+    ) -> None:
         self._training, self._test, self._candidates = training, test, list(candidates)
+        self._deviations = deviations
         self._normal, self._right = training.X.T @ training.X, training.X.T @ training.b
         self._square = float(training.b @ training.b)
         self._fastest = np.abs(training.v).max(axis=0)
@@ -182,27 +164,35 @@ class _Search:
         self._adaptable = [
             np.linalg.qr(test.by_joint[:, j, columns])[0] for j, columns in enumerate(self._own)
         ]
-        self._errors = lru_cache(maxsize=_REMEMBERED_ERRORS)(self._errors_of)
+        self._errors = lru_cache(maxsize=_REMEMBERED)(self._errors_of)
 
     def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
         """Return the choice."""
-        model, kept = FrictionModel(), self._candidates
+        model = FrictionModel()
+        refused: set[str] = set()  # once only, so that the search ends
         while True:
             progress(len(model.terms) / len(self._candidates), "choosing friction terms")
-            judged = [self._judge_added(model, term) for term in kept if not model.has(term)]
-            better = [judgement for judgement in judged if judgement.chosen]
-            if not better:
+            judged = [
+                self._judge_added(model, term) for term in self._candidates if not model.has(term)
+            ]
+            better = [found for found in judged if found.chosen and found.term.name not in refused]
+            better.sort(key=lambda judgement: -judgement.improvement)
+            best = next((found.term for found in better if self._is_sure(model, found.term)), None)
+            if best is None:
                 break
-            best = max(better, key=lambda judgement: judgement.improvement)
-            model = self._with_best_widths(model.with_term(best.term))
-            dropped = self._first_needless(model)
-            if dropped is not None:
-                # once only, so that the search ends
-                model = self._with_best_widths(model.without(dropped))
-                kept = [term for term in kept if term.name != dropped.name]
-        judged += [self._judge_present(model, term) for term in model.terms]
+            model = self._with_best_widths(model.with_term(best))
+            needless = self._first_needless(model)
+            if needless is not None:
+                model = self._with_best_widths(model.without(needless))
+                refused.add(needless.name)
+        judged = [replace(judgement, chosen=False) for judgement in judged]
+        judged += [replace(self._judge_present(model, term), chosen=True) for term in model.terms]
         judged.sort(key=lambda judgement: judgement.term.joint)
         return FrictionChoice(model, tuple(judged), self.threshold)
+
+    def _is_sure(self, model: FrictionModel, term: FrictionTerm) -> bool:
+        """Return whether the factor of one more term differs from zero for sure."""
+        return self._deviations(model.with_term(term)) > self.threshold
 
     def _judge_added(self, model: FrictionModel, term: FrictionTerm) -> Judgement:
         term = self._with_best_width(model, term)
@@ -279,7 +269,7 @@ class _Search:
         return errors
 
     def _friction_columns(self, j: int) -> list[int]:
-        names = self._test.base.short_names
+        names = self._test.names
         return [names.index(f"joint_{j + 1}.{name}") for name in ("f_c", "f_v")]
 
     def _friction_square(self) -> np.ndarray:

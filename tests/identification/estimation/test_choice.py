@@ -32,10 +32,10 @@ def saturated(v):
 def data(comau, measure, other_trajectory):
     other = other_trajectory.motion(other_trajectory.sample_times(100.0))
 
-    def of_friction(extra, seed=0):
+    def of_friction(extra, seed=0, **options):
         return (
-            measure(seed, extra=extra(comau.motion[1])),
-            measure(seed + 1000, motion=other, extra=extra(other[1])),
+            measure(seed, extra=extra(comau.motion[1]), **options),
+            measure(seed + 1000, motion=other, extra=extra(other[1]), **options),
         )
 
     return of_friction
@@ -48,6 +48,12 @@ def test_plain_friction_stays_plain(comau, data):
         assert choice.model.terms == ()
         assert len(choice.judgements) == 5 * 6
         assert max(judged.significance for judged in choice.judgements) < choice.threshold
+
+
+def test_coloured_noise_is_no_friction(comau, data):
+    for seed in range(6):
+        motions = data(np.zeros_like, seed, colour=0.9)
+        assert choose_friction(comau.regressor, comau.base, *motions).model.terms == ()
 
 
 def test_stribeck_is_found(comau, data):
