@@ -29,7 +29,8 @@ from pfsc_drake.errors import InputError
 
 KNOTS = 3e-3  # s, distance in the test function
 _LEAST_KNOTS = 3.0  # sampling times
-_MEMORY = 0.1  # s, after which what the equation leaves over no longer correlates
+_MEMORY = 0.1  # s, after which what the equation leaves over no longer correlates, or
+_STRETCHES, _FEWEST_STRETCHES = 40, 12  # of this length that there are to be
 _LOST = 0.2  # of the torsion's variance that may be noise
 _SINGULAR = 1e-9
 _FEWEST = 200  # samples
@@ -89,7 +90,9 @@ def estimate_joint(
     """Return stiffness, damping, motor inertia and friction of a joint.
 
     The covariance holds whatever the equation leaves over, correlated or not, and is right for
-    many samples.
+    many samples. It does not hold how friction differs from Coulomb's: where the motor reverses
+    often and friction takes a third of the torque, as it may in locked joints, inertias are
+    off by up to some tenths of a percent.
 
     Args:
         signals: Of the joint.
@@ -125,7 +128,10 @@ def estimate_joint(
     left = equation.tau - equation.Y @ values
     # what the noise of the positions adds to the scores has been taken out of their mean
     scores = equation.Y * left[:, None] + equation.noise @ values * equation.used[:, None]
-    spread = long_run_covariance(scores, max(1, round(_MEMORY / signals.step)))
+    length = _memory(signals.step, function.half, equation.samples)
+    # as few stretches as there are, the parameters take more of their spread than of samples
+    stretches = equation.samples / length
+    spread = long_run_covariance(scores, length) * stretches / (stretches - values.size)
     inverse = np.linalg.inv(normal)
     covariance = inverse @ spread @ inverse
     if viscous is not None:
@@ -143,6 +149,12 @@ def estimate_joint(
     )
     check_estimate(where, estimate)
     return estimate
+
+
+def _memory(step: float, half: int, samples: int) -> int:
+    """Return the samples after which what the equation leaves over no longer correlates."""
+    longest = min(round(_MEMORY / step), samples // _STRETCHES)
+    return max(longest, min(2 * half, samples // _FEWEST_STRETCHES))
 
 
 def _check_torsion(where: str, unit: str, equation: MotorEquation) -> None:

@@ -38,7 +38,7 @@ RATE = 1000.0  # samples per second
 _STEP = 0.25e-3  # s, of the integration
 _CHUNK = 0.25  # s, after which progress is told
 # RMS of what shakes locked joints, well above friction, and moving ones, of the largest torque
-_LOCKED, _MOVING = 0.15, 0.05
+_LOCKED, _MOVING = 0.2, 0.05
 _HOLD = 0.25  # s
 
 SetState = Callable[[Context], None]
@@ -68,7 +68,8 @@ def simulate_locked(
         progress: Told the fraction done and what is done.
 
     Raises:
-        InputError: If joints are rigid, friction is unknown, or an option is out of range.
+        InputError: If joints are rigid, friction is unknown, an option is out of range, or drives
+            are asked for more than they have.
     """
     chain, coulomb, viscous = _elastic(subject, faults)
     n, random = subject.dimension, np.random.default_rng(seed)
@@ -93,6 +94,7 @@ def simulate_locked(
     builder.Connect(both.get_output_port(), plant.get_input_port())
     log = add_log(builder, {"state": state, "torque": drive}, 1.0 / RATE)
     signals = _simulate(builder.Build(), log, lambda _: None, duration, progress)
+    check_effort(subject, signals["torque"])
     q_M = signals["state"][:, :n]
     return _measured(subject, faults, (np.zeros_like(q_M), q_M, signals["torque"]), random)
 

@@ -137,6 +137,14 @@ def test_bad_experiments(arm, faults):
     refused("joints that are not elastic", simulate_locked, rigid, faults)
     refused("friction is not known", simulate_locked, replace(arm, viscous=None), faults)
     refused("rms = .* must be positive", simulate_locked, arm, faults, share=0.0)
+    refused(
+        "asks motor_. for .* within the drive's",
+        simulate_locked,
+        arm,
+        faults,
+        duration=1.0,
+        share=0.6,
+    )
     refused("at least 12 are required", simulate_locked, arm, faults, duration=0.1)
     two = FourierTrajectory(np.zeros(2), np.ones((2, 1)), np.ones((2, 1)), 2.0, (1,))
     refused("of 2 joints", simulate_excited, arm, two, faults)
