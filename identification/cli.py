@@ -167,7 +167,7 @@ def estimate_command(
     ] = None,
     skip: Annotated[int, typer.Option(min=0, help="Periods at the start to leave out.")] = 1,
     bandwidth: Annotated[
-        float | None, typer.Option(help="Of the motion [Hz]. Default: 20 / period")
+        float | None, typer.Option(help="Of the motion [Hz]. Default: what torques tell")
     ] = None,
     plain: Annotated[
         bool, typer.Option("--plain", help="Coulomb and viscous friction only.")

@@ -10,9 +10,9 @@ from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.direct import estimate_consistent
 from identification.consistency.nearest import ConsistentParameters
 from identification.consistency.writing import WrittenModel, write_model
+from identification.estimation.bandwidth import choose_bandwidth
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
-from identification.estimation.results import save_estimate as save_estimate
 from identification.estimation.validation import predict
 from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
@@ -23,7 +23,7 @@ from identification.excitation.search import SearchResult
 from identification.findings import Findings, find_consistent, find_parameters
 from identification.measurement.columns import Reading
 from identification.measurement.experiment import run_experiment
-from identification.measurement.files import write_record
+from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
 from identification.measurement.prepare import read_motion
@@ -138,12 +138,21 @@ def estimate_files(
         reading: What files say in other words or not at all.
         period: Of the excitation [s], if files do not state it.
         skip: Periods at the start that are left out.
-        bandwidth_hz: Of the motion [Hz]; by default ``20 / T_f``.
+        bandwidth_hz: Of the motion [Hz]; by default the least with which the model explains the
+            torques of the first record as well as with any.
         choose: Whether to choose friction beyond Coulomb's and viscous.
         simulated: Whether the robot's model is the truth.
         progress: Told the fraction done and what is done.
     """
     regressor = Regressor(subject)
+    base = base_parameters(regressor)
+    if not records:
+        raise InputError("estimate: no record; at least one is required")
+    if bandwidth_hz is None:
+        first = read_record(records[0], subject, period, reading)
+        bandwidth_hz = choose_bandwidth(
+            regressor, base, first, period, skip, lambda _, phase: progress(0.0, phase)
+        ).bandwidth_hz
     total, motions = len(records) + (validation is not None), []
     for k, path in enumerate([*records, *([validation] if validation else [])]):
         progress(0.5 * k / total, f"reading {path.name}")
@@ -153,7 +162,7 @@ def estimate_files(
     other = motions.pop() if validation is not None else None
     findings = find_parameters(
         regressor,
-        base_parameters(regressor),
+        base,
         motions,
         other,
         choose=choose,

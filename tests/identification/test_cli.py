@@ -1,0 +1,120 @@
+"""The command line from a robot to its model, on the robot with the fewest parameters."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from identification.cli import main
+from identification.model.parameters import true_parameters
+from identification.model.subject import load_subject
+from pfsc_drake.robot.models.files import models_directory
+
+ROBOT = "festo_expt_45"
+
+
+@pytest.fixture(name="work", scope="module")
+def fixture_work(tmp_path_factory):
+    """Two runs of the shipped excitation, and what was estimated of them."""
+    out = tmp_path_factory.mktemp("identification")
+    assert main(["simulate", ROBOT, "--runs", "2", "--out", str(out / "runs")]) == 0
+    records = [str(out / "runs" / f"run_{seed}.h5") for seed in (1, 2)]
+    assert main(["estimate", ROBOT, *records, "--simulated", "--out", str(out / "found")]) == 0
+    return out
+
+
+def metrics(folder):
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    return {name: metric["value"] for name, metric in content.items()}
+
+
+def test_what_was_estimated_can_be_checked_without_the_project(work):
+    """Weighted least squares of the stored regressor, by numpy."""
+    with h5py.File(work / "found" / "identification.h5") as file:
+        Y, tau, weights = (file[name][:] for name in ("regressor", "torques", "weights"))
+        found, sigma = file["base_parameters"][:], file["standard_deviation"][:]
+        covariance = file["covariance"][:]
+        names = [str(name) for name in file["base_parameters"].attrs["short_names"]]
+        repeated = file["repetitions/base_parameters"][:]
+    X, b = (weights[..., None] * Y).reshape(-1, len(found)), (weights * tau).ravel()
+    solution = np.linalg.lstsq(X, b, rcond=None)[0]
+    np.testing.assert_allclose(found, solution, rtol=1e-8)
+    np.testing.assert_allclose(sigma, np.sqrt(np.diag(covariance)))
+    subject = load_subject(ROBOT, tool=False)
+    truth = true_parameters(subject)
+    assert len(names) == len(truth) == 10
+    assert np.abs((found - truth) / sigma).max() < 4.5
+    np.testing.assert_allclose(repeated[0], found)
+
+
+def test_the_page_tells_what_was_found(work):
+    found = metrics(work / "found")
+    assert found["parameters"] == 10
+    assert found["runs"] == 2
+    assert found["truth_p_value"] > 1e-3
+    page = (work / "found" / "report.html").read_text(encoding="utf-8")
+    for words in ("Base parameters", "plate.m_y", "Physically consistent", "Autocorrelation"):
+        assert words in page
+
+
+def test_the_model_is_written_and_can_be_read(work):
+    out = work / "model"
+    assert main(["consistent", ROBOT, str(work / "found"), "--out", str(out)]) == 0
+    again = true_parameters(load_subject(str(out / "parameters.yaml"), tool=False))
+    shipped = yaml.safe_load((models_directory() / ROBOT / "parameters.yaml").read_text())
+    assert shipped
+    truth = true_parameters(load_subject(ROBOT, tool=False))
+    np.testing.assert_allclose(again, truth, rtol=0.02)
+
+
+def test_the_page_can_be_written_again_with_the_robot_moving(work):
+    excitation = models_directory() / ROBOT / "excitation_optimal.yaml"
+    arguments = ["report", ROBOT, str(work / "found"), "--excitation", str(excitation)]
+    validation = ["--validation", str(work / "runs" / "run_2.h5")]
+    assert main([*arguments, *validation, "--out", str(work / "again")]) == 0
+    page = (work / "again" / "report.html").read_text(encoding="utf-8")
+    assert "excitation.html" in page
+    assert (work / "again" / "excitation.html").stat().st_size > 100_000
+    assert metrics(work / "again")["least_explained_not_used"] > 0.99
+
+
+def test_an_excitation_is_found_and_written(tmp_path, capsys):
+    out = tmp_path / "excitation"
+    limits = ["--limit", "acceleration=30", "--harmonics", "1,2", "--period", "5"]
+    assert main(["excite", ROBOT, *limits, "--starts", "1", "--out", str(out)]) == 0
+    assert "log det" in capsys.readouterr().out
+    rows = np.loadtxt(out / "excitation.csv", delimiter=",", comments=("#", "t"))
+    assert rows.shape[1] == 10
+    assert np.abs(rows[[0, -1], 4:]).max() < 1e-9  # from rest to rest
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["simulate", "no_robot"], ["no_robot"]),
+        (["simulate", ROBOT, "--excitation", "missing.yaml"], ["missing.yaml"]),
+        (["estimate", ROBOT, "missing.csv"], ["missing.csv"]),
+        (["estimate", ROBOT, "record.txt"], ["record.txt", "suffix"]),
+        (["estimate", ROBOT, "a.csv", "--unit", "q"], ["--unit", "NAME=VALUE"]),
+        (["estimate", ROBOT, "a.csv", "--scale", "tau=x"], ["--scale", "a number"]),
+        (["consistent", ROBOT, "missing.h5"], ["missing.h5"]),
+        (["excite", ROBOT], ["acceleration"]),
+        (["excite", ROBOT, "--limit", "speed=3"], ["speed"]),
+        (["excite", ROBOT, "--harmonics", "1,x", "--limit", "acceleration=30"], ["--harmonics"]),
+    ],
+)
+def test_wrong_input_is_one_line(tmp_path, monkeypatch, capsys, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    for part in parts:
+        assert part in error
+
+
+def test_an_identification_of_another_robot_is_refused(work, tmp_path, capsys):
+    out = str(tmp_path / "model")
+    assert main(["consistent", "franka_emika_panda", str(work / "found"), "--out", out]) == 2
+    assert "of festo_expt_45; must be of franka_emika_panda" in capsys.readouterr().err
