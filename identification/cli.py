@@ -12,7 +12,20 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from pfsc_drake.errors import InputError, shortened
+from identification.options import (
+    Bounds,
+    Names,
+    Records,
+    Robot,
+    Scales,
+    Simulated,
+    Tool,
+    Units,
+    Validation,
+    read_integer,
+    read_number,
+    read_pairs,
+)
 from reporting.commands import interruptible, run_app, show_page
 from reporting.fraction import fraction_display
 
@@ -21,34 +34,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="From a robot to its model: excitation, experiment, estimation, consistency.",
 )
-Robot = Annotated[
-    str, typer.Argument(help="Shipped robot, SDF or URDF file, or scenario with a robot.")
-]
-Tool = Annotated[
-    bool, typer.Option("--tool/--no-tool", help="Whether the shipped robot carries its tool.")
-]
-Records = Annotated[list[Path], typer.Argument(help="Runs of one excitation: CSV, HDF5 or MAT.")]
-Validation = Annotated[
-    Path | None, typer.Option(help="Record of another motion, to choose friction and to predict.")
-]
-Bounds = Annotated[
-    Path | None, typer.Option(help="What is known of the links (YAML). Default: what is shipped")
-]
-Units = Annotated[
-    list[str] | None,
-    typer.Option("--unit", metavar="SIGNAL=UNIT", help="Unit that a file does not state."),
-]
-Names = Annotated[
-    list[str] | None,
-    typer.Option("--name", metavar="FILE_NAME=SIGNAL", help="What a file calls otherwise."),
-]
-Scales = Annotated[
-    list[str] | None,
-    typer.Option("--scale", metavar="SIGNAL=NUMBER", help="SI units per unit of the file."),
-]
-Simulated = Annotated[
-    bool, typer.Option("--simulated", help="The robot's model is the truth: compare with it.")
-]
 
 
 @app.command("excite")
@@ -89,11 +74,11 @@ def excite_command(
         within = chosen_limits(
             subject,
             {
-                name: [_number(value, "--limit") for value in values.split(",")]
-                for name, values in _pairs(limits, "--limit")
+                name: [read_number(value, "--limit") for value in values.split(",")]
+                for name, values in read_pairs(limits, "--limit")
             },
         )
-        numbers = [_integer(number, "--harmonics") for number in harmonics.split(",")]
+        numbers = [read_integer(number, "--harmonics") for number in harmonics.split(",")]
         with fraction_display(console, "excitation") as progress:
             found = search(
                 subject,
@@ -151,7 +136,7 @@ def simulate_command(
         faults = shipped_imperfections(subject.name)
         faults = faults.realistic() if realistic else faults
         with fraction_display(console, "experiment") as progress:
-            files = simulate_runs(subject, trajectory, faults, folder, runs, seed, progress)
+            files = simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
         for file in files:
             console.print(str(file), soft_wrap=True, highlight=False)
 
@@ -191,8 +176,12 @@ def estimate_command(
         console = Console()
         subject = load_subject(robot, tool=tool)
         folder = out or Path("out") / f"{subject.name}_identification"
-        scale = {name: _number(value, "--scale") for name, value in _pairs(scales, "--scale")}
-        reading = Reading(dict(_pairs(names, "--name")), dict(_pairs(units, "--unit")), scale)
+        scale = {
+            name: read_number(value, "--scale") for name, value in read_pairs(scales, "--scale")
+        }
+        reading = Reading(
+            dict(read_pairs(names, "--name")), dict(read_pairs(units, "--unit")), scale
+        )
         with fraction_display(console, subject.name) as progress:
             findings, other = estimate_files(
                 subject,
@@ -296,27 +285,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _quiet() -> None:
     logging.getLogger("drake").setLevel(logging.CRITICAL)
-
-
-def _pairs(options: list[str] | None, option: str) -> list[tuple[str, str]]:
-    pairs = []
-    for text in options or []:
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise InputError(f"{option} {shortened(text)}: allowed: NAME=VALUE")
-        pairs.append((name, value))
-    return pairs
-
-
-def _number(text: str, option: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{option} {shortened(text)}: allowed: a number") from None
-
-
-def _integer(text: str, option: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise InputError(f"{option} {shortened(text)}: allowed: integers, e.g. 1,3,5") from None

@@ -1,7 +1,7 @@
 """The steps of an identification on files, as the command line has them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,8 @@ from identification.measurement.prepare import read_motion
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
-from identification.model.subject import Subject
+from identification.model.subject import Subject, load_subject
+from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.models.files import models_directory
@@ -81,8 +82,18 @@ def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
     return FourierTrajectory.load(shipped)
 
 
+@dataclass(frozen=True)
+class _Experiment:
+    robot: str
+    tool: bool
+    trajectory: FourierTrajectory
+    imperfections: Imperfections | None
+    folder: Path
+
+
 def simulate_runs(
     subject: Subject,
+    robot: str,
     trajectory: FourierTrajectory,
     imperfections: Imperfections | None,
     folder: Path,
@@ -92,8 +103,11 @@ def simulate_runs(
 ) -> list[Path]:
     """Simulate an experiment several times, and return the files with what was measured.
 
+    One run is simulated here, several on all cores.
+
     Args:
         subject: The robot.
+        robot: What it was loaded by.
         trajectory: The excitation.
         imperfections: Of all runs; None for those shipped with the robot.
         folder: Where to write; made if it is not there.
@@ -102,18 +116,37 @@ def simulate_runs(
         progress: Told the fraction done and what is done.
     """
     make_folder(folder)
+    if runs == 1:
+        return [_run(subject, trajectory, imperfections, folder, seed, progress)]
+    experiment = _Experiment(robot, subject.tool, trajectory, imperfections, folder)
+    progress(0.0, f"simulating {runs} runs")
     files = []
-    for run in range(runs):
+    with side_by_side(None, runs) as run:
+        for file in run(_simulate, experiment, range(seed, seed + runs)):
+            files.append(file)
+            progress(len(files) / runs, f"{len(files)} of {runs} runs")
+    return sorted(files, key=lambda file: int(file.stem.split("_")[1]))
 
-        def tell(fraction: float, phase: str, run: int = run) -> None:
-            progress((run + fraction) / runs, f"run {run + 1} of {runs}, {phase}")
 
-        measured = run_experiment(
-            subject, trajectory, imperfections, seed=seed + run, progress=tell
-        )
-        files.append(folder / f"run_{seed + run}.h5")
-        write_record(files[-1], measured.record, subject)
-    return files
+def _simulate(experiment: _Experiment, seed: int) -> Path:
+    """Simulate a run in a process of its own."""
+    subject = load_subject(experiment.robot, tool=experiment.tool)
+    trajectory, faults = experiment.trajectory, experiment.imperfections
+    return _run(subject, trajectory, faults, experiment.folder, seed, lambda _, __: None)
+
+
+def _run(
+    subject: Subject,
+    trajectory: FourierTrajectory,
+    imperfections: Imperfections | None,
+    folder: Path,
+    seed: int,
+    progress: Progress,
+) -> Path:
+    measured = run_experiment(subject, trajectory, imperfections, seed=seed, progress=progress)
+    file = folder / f"run_{seed}.h5"
+    write_record(file, measured.record, subject)
+    return file
 
 
 def estimate_files(

@@ -124,7 +124,7 @@ CIRCLES = (
         },
     ),
 )
-_RUNS, _SEED = 3, 1
+_RUNS, _SEED = 7, 1
 _DESCRIPTION = (
     "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
     "disturbance; from what was measured come its base parameters, the nearest consistent model, "
@@ -167,8 +167,9 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
         other = _other_motion(subject, circle, say)
         faults = shipped_imperfections(subject.name).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
-        records = simulate_runs(subject, trajectory, faults, out / "runs", _RUNS, _SEED, say)
-        unused = simulate_runs(subject, other, faults, out / "validation", 1, 100, say)[0]
+        name = circle.robot
+        records = simulate_runs(subject, name, trajectory, faults, out / "runs", _RUNS, _SEED, say)
+        unused = simulate_runs(subject, name, other, faults, out / "validation", 1, 100, say)[0]
         findings, motion = estimate_files(
             subject, records, unused, Reading(), simulated=True, progress=say
         )

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,17 +24,19 @@ from identification.excitation.problem import (
     excitation_problem,
     tightened,
 )
-from identification.excitation.processes import side_by_side
 from identification.excitation.scene import RobotScene, cell_of
 from identification.excitation.verification import Verification, verify
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
+from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
 # what is kept of limits for what solvers leave of them
 _SHARE, _MARGIN = 0.998, 0.002
+# of the drives' limits; the rest is for the servo, and for a robot that is not as it is believed
+_EFFORT = 0.9
 _MOST_REPAIRS = 3
 _REPAIR = 1.5  # times what was missing
 _ITERATIONS = 40  # of a repair
@@ -129,7 +131,7 @@ def search(
     scene = RobotScene(subject, cell) if is_serial else None
     problem = excitation_problem(
         subject,
-        joints,
+        replace(joints, effort=_EFFORT * joints.effort),
         period=period,
         harmonics=tuple(harmonics),
         criterion=criterion,

@@ -7,12 +7,12 @@ from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.local_search import LocalSearch, random_motion_about
-from identification.excitation.processes import side_by_side
 from identification.excitation.search import search
 from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
+from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 
 POST = Obstacle(

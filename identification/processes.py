@@ -1,4 +1,4 @@
-"""Processes of this machine that search side by side."""
+"""Processes of this machine that work side by side."""
 
 import logging
 import signal
