@@ -1,7 +1,7 @@
 """The circle of an identification: excite, measure, estimate, believe the result, and drive."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.limits import chosen_limits
+from identification.excitation.limits import JointLimits, chosen_limits
 from identification.excitation.recording import record_excitation
 from identification.excitation.search import search
 from identification.findings import Findings
@@ -76,12 +76,17 @@ class Circle:
         robot: Name of a shipped one.
         drives: By what they are called on the page.
         starts: Of the search for an excitation.
+        runs: How often the experiment is made.
+        limits: Of the joints where not those of the model, see
+            :func:`~identification.excitation.limits.chosen_limits`.
         validation: File of another motion beside the robot's model; searched for without.
     """
 
     robot: str
     drives: Mapping[str, Drive]
     starts: int = 4
+    runs: int = 7
+    limits: Mapping[str, float] = field(default_factory=dict)
     validation: str = ""
 
 
@@ -124,7 +129,7 @@ CIRCLES = (
         },
     ),
 )
-_RUNS, _SEED = 7, 1
+_SEED = 1
 _DESCRIPTION = (
     "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
     "disturbance; from what was measured come its base parameters, the nearest consistent model, "
@@ -162,13 +167,16 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
     subject = load_subject(circle.robot, tool=False)
     with open_results(out, "identification") as results:
         say = _stepwise(circle.robot, progress)
-        found = search(subject, starts=circle.starts, seed=_SEED, progress=say)
-        save_excitation(subject, found, out / "excitation", 5, chosen_limits(subject))
-        other = _other_motion(subject, circle, say)
+        limits = chosen_limits(subject, circle.limits)
+        found = search(subject, starts=circle.starts, seed=_SEED, limits=limits, progress=say)
+        save_excitation(subject, found, out / "excitation", 5, limits)
+        other = _other_motion(subject, circle, limits, say)
         faults = shipped_imperfections(subject.name).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
         name = circle.robot
-        records = simulate_runs(subject, name, trajectory, faults, out / "runs", _RUNS, _SEED, say)
+        records = simulate_runs(
+            subject, name, trajectory, faults, out / "runs", circle.runs, _SEED, say
+        )
         unused = simulate_runs(subject, name, other, faults, out / "validation", 1, 100, say)[0]
         findings, motion = estimate_files(
             subject, records, unused, Reading(), simulated=True, progress=say
@@ -199,11 +207,15 @@ def _stepwise(robot: str, progress: Callable[[str], None]) -> Callable[[float, s
 
 
 def _other_motion(
-    subject: Subject, circle: Circle, progress: Callable[[float, str], None]
+    subject: Subject,
+    circle: Circle,
+    limits: JointLimits,
+    progress: Callable[[float, str], None],
 ) -> FourierTrajectory:
     if circle.validation:
         return FourierTrajectory.load(models_directory() / subject.name / circle.validation)
-    return search(subject, starts=1, seed=100, iterations=40, progress=progress).trajectory
+    found = search(subject, starts=1, seed=100, limits=limits, iterations=40, progress=progress)
+    return found.trajectory
 
 
 def _scenarios(circle: Circle, model: Path) -> dict[tuple[str, str], ScenarioFile]:

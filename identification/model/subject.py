@@ -87,9 +87,10 @@ def load_subject(robot: str | Path, tool: bool = False) -> Subject:
 
     Args:
         robot: Name of a shipped model (``comau_racer_1_4``, ``festo_expt_45``,
-            ``franka_emika_panda``), an SDF, URDF or MJCF file, or a scenario, whose ``robot:``
-            block counts. Of a bare model file all links up to the frame ``tool_point`` are taken,
-            or up to the last body where there is no such frame.
+            ``franka_emika_panda``), an SDF, URDF or MJCF file, the parameter file of a DELTA
+            robot, or a scenario, whose ``robot:`` block counts. Of a bare model file all links up
+            to the frame ``tool_point`` are taken, or up to the last body where there is no such
+            frame.
         tool: Whether the tool that the robot's parameter file names stays on the last link. It is
             no part of the robot of Tab. C.3. Robots without such a file keep what they carry.
 
@@ -110,9 +111,12 @@ def load_subject(robot: str | Path, tool: bool = False) -> Subject:
 
 def _robot_block(path: Path) -> RobotBlock:
     data = read_yaml(path)
+    if "geometry" in data and "masses" in data:
+        return RobotBlock(model=str(path.absolute()))
     if not isinstance(data.get("robot"), dict):
         raise InputError(
-            f"{path}: no block 'robot'; allowed: a scenario with one, which names the model"
+            f"{path}: no block 'robot'; allowed: a scenario with one, which names the model, or "
+            "the parameters of a DELTA robot"
         )
     return load_typed(RobotBlock, data["robot"], str(path))
 

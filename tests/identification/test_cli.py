@@ -5,7 +5,6 @@ import json
 import h5py
 import numpy as np
 import pytest
-import yaml
 
 from identification.cli import main
 from identification.model.parameters import true_parameters
@@ -63,8 +62,6 @@ def test_the_model_is_written_and_can_be_read(work):
     out = work / "model"
     assert main(["consistent", ROBOT, str(work / "found"), "--out", str(out)]) == 0
     again = true_parameters(load_subject(str(out / "parameters.yaml"), tool=False))
-    shipped = yaml.safe_load((models_directory() / ROBOT / "parameters.yaml").read_text())
-    assert shipped
     truth = true_parameters(load_subject(ROBOT, tool=False))
     np.testing.assert_allclose(again, truth, rtol=0.02)
 

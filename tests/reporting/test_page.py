@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 
 from reporting.metrics import Metrics
-from reporting.page import report_page
+from reporting.page import Table, report_page
 from reporting.style import Figure
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -166,3 +166,13 @@ def test_commands_and_cards_of_many_runs(run):
     assert command in page.text
     assert "Worst <run>" in page.text
     assert [attributes.get("class") for tag, attributes in page.tags].count("card") == 1
+
+
+def test_tables_have_their_words_and_numbers(run):
+    table = Table("Base", "What <each> is.", ["name", "mean"], [["m_<1>", 1.23456], ["x", -2e-7]])
+    html = report_page(**run, tables=[table], details="Base parameters in full")
+    text = Page(html).text
+    for words in ("Base.", "What <each> is.", "m_<1>", "Base parameters in full"):
+        assert words in text
+    assert '<td class="number">1.235</td>' in html
+    assert '<td class="number">-2e-07</td>' in html
