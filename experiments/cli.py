@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from reporting.page import Report
 
 _LONGEST_AFTER_FAULT = 100.0  # s
+# a study that runs by its name, as a scenario does
+IDENTIFICATION = "identify_comau"
 
 # what several commands take
 ScenarioName = Annotated[
@@ -99,6 +101,8 @@ def run_command(
     from experiments.catalog.scenario_file import read_scenario
     from experiments.run import run_scenario
 
+    if scenario == IDENTIFICATION:
+        study_command(scenario, out or Path("out") / scenario)
     seconds = None if duration is None else _read_duration(duration)
     further = _read_after_fault(after_fault)
     with interruptible():
@@ -217,7 +221,7 @@ def study_command(
         "stiffness": write_study,
         "robustness": write_robustness,
         "tracking": write_tracking,
-        "identify_comau": write_identification,
+        IDENTIFICATION: write_identification,
     }
     if name not in studies:
         raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")

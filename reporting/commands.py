@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
@@ -11,8 +11,10 @@ from rich.markup import escape
 
 from pfsc_drake.errors import InputError
 from reporting.interruption import INTERRUPTED, raised_interruption
-from reporting.page import Report
 from reporting.terminal import one_line, print_error
+
+if TYPE_CHECKING:
+    from reporting.page import Report
 
 WRONG_INPUT = 2
 FAULT = 3
@@ -59,7 +61,7 @@ def fail(message: str) -> int:
     return WRONG_INPUT
 
 
-def show_page(what: str, report: Report) -> int:
+def show_page(what: str, report: "Report") -> int:
     """Say where a page is, or that it could not be written; return the exit status."""
     print_page(Console(), f"Open the {what}", report.path)
     if report.problem is None:

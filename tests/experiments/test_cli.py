@@ -236,3 +236,20 @@ def test_a_warning_is_printed_and_does_not_fail_the_run(fake_run, scenario, caps
     fake_run.outcome.warnings = ["the joints resonate too fast"]
     assert main(["run", str(scenario)]) == 0
     assert "warning: the joints resonate too fast" in capsys.readouterr().out
+
+
+def test_the_identification_runs_by_its_name(monkeypatch, tmp_path, capsys):
+    from experiments.studies import identify
+    from reporting.page import Report
+
+    seen = []
+
+    def write(out, progress):
+        seen.append(out)
+        progress("one line")
+        return Report(out / "report.html", None)
+
+    monkeypatch.setattr(identify, "write_identification", write)
+    assert main(["run", "identify_comau", "--out", str(tmp_path / "found")]) == 0
+    assert seen == [tmp_path / "found"]
+    assert "one line" in capsys.readouterr().out
