@@ -1,7 +1,8 @@
 """The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
 
-``consistent`` writes a model, ``report`` draws the page anew. Exit status: 0 done; 2 the input is
-wrong, one line on stderr; 4 results could not be written; 130 interrupted.
+``consistent`` writes a model, ``report`` draws the page anew, ``elastic`` tells about elastic
+joints. Exit status: 0 done; 2 the input is wrong, one line on stderr; 4 results could not be
+written; 130 interrupted.
 """
 
 import logging
@@ -12,8 +13,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from identification.elastic.command import elastic_command
 from identification.options import (
     Bounds,
+    Excitation,
     Names,
     Records,
     Robot,
@@ -25,6 +28,7 @@ from identification.options import (
     read_integer,
     read_number,
     read_pairs,
+    read_reading,
 )
 from reporting.commands import interruptible, run_app, show_page
 from reporting.fraction import fraction_display
@@ -133,7 +137,7 @@ def simulate_command(
         subject = load_subject(robot, tool=tool)
         folder = out or Path("out") / f"{subject.name}_runs"
         trajectory = load_excitation(subject, excitation)
-        faults = shipped_imperfections(subject.name)
+        faults = shipped_imperfections(subject.family)
         faults = faults.realistic() if realistic else faults
         with fraction_display(console, "experiment") as progress:
             files = simulate_runs(subject, robot, trajectory, faults, folder, runs, seed, progress)
@@ -158,6 +162,7 @@ def estimate_command(
         bool, typer.Option("--plain", help="Coulomb and viscous friction only.")
     ] = False,
     bounds: Bounds = None,
+    excitation: Excitation = None,
     units: Units = None,
     names: Names = None,
     scales: Scales = None,
@@ -165,23 +170,18 @@ def estimate_command(
     tool: Tool = False,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
-    from identification.measurement.columns import Reading
     from identification.model.subject import load_subject
     from identification.pages import write_identification
-    from identification.report.tables import parameter_table, print_table, torque_table
+    from identification.report.tables import parameter_table, torque_table
     from identification.steps import estimate_files
+    from reporting.tables import print_table
 
     with interruptible():
         _quiet()
         console = Console()
         subject = load_subject(robot, tool=tool)
         folder = out or Path("out") / f"{subject.name}_identification"
-        scale = {
-            name: read_number(value, "--scale") for name, value in read_pairs(scales, "--scale")
-        }
-        reading = Reading(
-            dict(read_pairs(names, "--name")), dict(read_pairs(units, "--unit")), scale
-        )
+        reading = read_reading(names, units, scales)
         with fraction_display(console, subject.name) as progress:
             findings, other = estimate_files(
                 subject,
@@ -202,6 +202,7 @@ def estimate_command(
             folder,
             [*records, *([validation] if validation else [])],
             bounds,
+            excitation,
         )
         print_table(console, parameter_table(findings), most=12)
         print_table(console, torque_table(findings))
@@ -252,9 +253,7 @@ def report_command(
     folder: Annotated[Path, typer.Argument(help="Folder with identification.h5.")],
     validation: Validation = None,
     bounds: Bounds = None,
-    excitation: Annotated[
-        Path | None, typer.Option(help="excitation.yaml, to see the robot move.")
-    ] = None,
+    excitation: Excitation = None,
     simulated: Simulated = False,
     tool: Tool = False,
     out: Annotated[Path | None, typer.Option(help="Default: FOLDER_report")] = None,
@@ -269,6 +268,9 @@ def report_command(
         target = out or folder.with_name(f"{folder.name}_report")
         report = write_stored(subject, folder, validation, bounds, excitation, simulated, target)
         raise typer.Exit(show_page("report", report))
+
+
+app.command("elastic")(elastic_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

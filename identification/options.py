@@ -1,11 +1,14 @@
 """Arguments and options that several commands take, and how their text is read."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pfsc_drake.errors import InputError, shortened
+
+if TYPE_CHECKING:
+    from identification.measurement.columns import Reading
 
 Robot = Annotated[
     str, typer.Argument(help="Shipped robot, SDF or URDF file, or scenario with a robot.")
@@ -19,6 +22,9 @@ Validation = Annotated[
 ]
 Bounds = Annotated[
     Path | None, typer.Option(help="What is known of the links (YAML). Default: what is shipped")
+]
+Excitation = Annotated[
+    Path | None, typer.Option(help="excitation.yaml, to see the robot move on the page.")
 ]
 Units = Annotated[
     list[str] | None,
@@ -50,6 +56,20 @@ def read_pairs(options: list[str] | None, option: str) -> list[tuple[str, str]]:
             raise InputError(f"{option} {shortened(text)}: allowed: NAME=VALUE")
         pairs.append((name, value))
     return pairs
+
+
+def read_reading(
+    names: list[str] | None, units: list[str] | None, scales: list[str] | None
+) -> "Reading":
+    """Return what options say of files.
+
+    Raises:
+        InputError: If one is not of its form.
+    """
+    from identification.measurement.columns import Reading
+
+    scale = {name: read_number(value, "--scale") for name, value in read_pairs(scales, "--scale")}
+    return Reading(dict(read_pairs(names, "--name")), dict(read_pairs(units, "--unit")), scale)
 
 
 def read_number(text: str, option: str) -> float:

@@ -20,7 +20,7 @@ from identification.model.subject import Subject
 from identification.report.page import PageContent, write_page
 from identification.steps import RECORDING, bounds_of, consistent_set, stored_findings
 from pfsc_drake.errors import InputError
-from reporting.folder import open_results
+from reporting.folder import ResultsFolder, open_results
 from reporting.page import Report
 
 
@@ -31,6 +31,7 @@ def write_identification(
     folder: Path,
     inputs: Sequence[Path],
     bounds: Path | None,
+    excitation: Path | None,
 ) -> Report:
     """Write ``identification.h5`` and a page.
 
@@ -41,6 +42,7 @@ def write_identification(
         folder: Where.
         inputs: Files that it is from.
         bounds: What is known of the links; None for what is shipped, if anything.
+        excitation: Coefficients of the motion, to see the robot move.
     """
     with open_results(folder, "identification", inputs) as results:
         save_estimate(folder / FILE_NAME, findings.estimate, findings.runs)
@@ -49,6 +51,7 @@ def write_identification(
             findings,
             other_t=None if other is None else other.t,
             consistent=_consistent(subject, findings, bounds),
+            recording=_recording(subject, excitation, results),
             warnings=_warnings(findings),
         )
         return write_page(results, content)
@@ -77,19 +80,23 @@ def write_stored(
     other = None if validation is None else read_motion(validation, Regressor(subject))
     findings = stored_findings(subject, source, other, simulated)
     with open_results(folder, "identification") as results:
-        recording = None
-        if excitation is not None:
-            cell = None if subject.chain is None else load_cell(None, subject.name)
-            page = record_excitation(subject, FourierTrajectory.load(excitation), cell=cell)
-            recording = RECORDING if results.write(RECORDING, page) else None
         content = PageContent(
             subject,
             findings,
             other_t=None if other is None else other.t,
             consistent=_consistent(subject, findings, bounds),
-            recording=recording,
+            recording=_recording(subject, excitation, results),
         )
         return write_page(results, content)
+
+
+def _recording(subject: Subject, file: Path | None, results: ResultsFolder) -> str | None:
+    """Write the page that plays an excitation, and return its name; None without one."""
+    if file is None:
+        return None
+    cell = None if subject.chain is None else load_cell(None, subject.family)
+    page = record_excitation(subject, FourierTrajectory.load(file), cell=cell)
+    return RECORDING if results.write(RECORDING, page) else None
 
 
 def _consistent(

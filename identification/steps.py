@@ -61,7 +61,7 @@ def save_excitation(
         trajectory, limits.velocity, limits.acceleration, periods=periods, rate=_RATE
     )
     run.export_csv(folder / RUN, _RATE, list(subject.joint_units))
-    cell = None if subject.chain is None else load_cell(None, subject.name)
+    cell = None if subject.chain is None else load_cell(None, subject.family)
     record_excitation(subject, trajectory, folder / RECORDING, cell)
 
 
@@ -73,7 +73,7 @@ def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
     """
     if file is not None:
         return FourierTrajectory.load(file)
-    shipped = models_directory() / subject.name / "excitation_optimal.yaml"
+    shipped = models_directory() / subject.family / "excitation_optimal.yaml"
     if not shipped.is_file():
         raise InputError(
             f"--excitation: none is shipped for {subject.name}; make one with: "
@@ -254,7 +254,7 @@ def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
     Raises:
         InputError: If there is neither, or the file cannot be read.
     """
-    return load_bounds(subject.name if file is None else file)
+    return load_bounds(subject.family if file is None else file)
 
 
 def consistent_set(

@@ -171,7 +171,7 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
         found = search(subject, starts=circle.starts, seed=_SEED, limits=limits, progress=say)
         save_excitation(subject, found, out / "excitation", 5, limits)
         other = _other_motion(subject, circle, limits, say)
-        faults = shipped_imperfections(subject.name).realistic()
+        faults = shipped_imperfections(subject.family).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
         name = circle.robot
         records = simulate_runs(
@@ -186,7 +186,7 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
         model = write_consistent(subject, consistent, out / "model")
         progress(f"{circle.robot}: model written, {len(model.files)} files")
         rows = run_side_by_side(_scenarios(circle, out / "model"), _said(circle, progress))
-        cell = load_cell(None, subject.name)
+        cell = load_cell(None, subject.family)
         results.write(RECORDING, record_excitation(subject, trajectory, cell=cell))
         content = _content(circle, subject, findings, consistent, rows, results)
         return write_page(results, content(None if motion is None else motion.t))
@@ -213,7 +213,7 @@ def _other_motion(
     progress: Callable[[float, str], None],
 ) -> FourierTrajectory:
     if circle.validation:
-        return FourierTrajectory.load(models_directory() / subject.name / circle.validation)
+        return FourierTrajectory.load(models_directory() / subject.family / circle.validation)
     found = search(subject, starts=1, seed=100, limits=limits, iterations=40, progress=progress)
     return found.trajectory
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.elastic.joint_estimate import JointEstimate
 from pfsc_drake.errors import InputError
+from reporting.page import Table
 
 COLUMNS = ("joint", "parameter", "value", "standard_deviation", "relative_percent", "unit")
 _UNITS = {
@@ -39,6 +40,20 @@ def table_rows(estimates: Sequence[JointEstimate]) -> list[tuple[str, str, float
         for e in estimates
         for name in e.parameters
     ]
+
+
+def joint_table(estimates: Sequence[JointEstimate]) -> Table:
+    """Return the parameters of joints with their standard deviations.
+
+    Args:
+        estimates: Of the joints.
+    """
+    rows: list[list[str | float]] = [
+        [joint, name, value, deviation, 100.0 * deviation / abs(value) if value else np.inf, unit]
+        for joint, name, value, deviation, unit in table_rows(estimates)
+    ]
+    head = ["joint", "parameter", "value", "standard deviation", "in %", "unit"]
+    return Table("Elastic joints", "On the joint side.", head, rows)
 
 
 def write_table(path: str | Path, estimates: Sequence[JointEstimate]) -> None:

@@ -99,7 +99,7 @@ def run_experiment(
             time, or the motion cannot be simulated.
     """
     servo, random = servo or Servo(), np.random.default_rng(seed)
-    faults = shipped_imperfections(subject.name) if imperfections is None else imperfections
+    faults = shipped_imperfections(subject.family) if imperfections is None else imperfections
     faults.check_size(subject.dimension)
     usual = _usual_friction(subject)
     coulomb, viscous = faults.friction(*usual, random)

@@ -81,6 +81,11 @@ class Subject:
         """Number of joints N."""
         return self.robot.dimension
 
+    @property
+    def family(self) -> str:
+        """Name under which data of the robot are shipped, whichever of its models this is."""
+        return self.name if self.parameters is None else self.parameters.name
+
 
 def load_subject(robot: str | Path, tool: bool = False) -> Subject:
     """Return the robot of a name or a file.

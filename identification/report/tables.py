@@ -2,10 +2,6 @@
 
 from collections.abc import Sequence
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table as TerminalTable
-
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.choice import FrictionChoice
 from identification.estimation.least_squares import Estimate
@@ -107,23 +103,3 @@ def consistent_table(found: ConsistentParameters, units: Sequence[str]) -> Table
     ]
     caption = f"Every link is a body of positive density; chi squared {found.chi_squared:.4g}."
     return Table("Physically consistent parameters", caption, ["parameter", "value", "unit"], rows)
-
-
-def print_table(console: Console, table: Table, most: int | None = None) -> None:
-    """Print a table.
-
-    Args:
-        console: Where.
-        table: Which.
-        most: Rows to print at most; None for all.
-    """
-    shown = TerminalTable(title=table.title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    numbers = {k for row in table.rows for k, cell in enumerate(row) if not isinstance(cell, str)}
-    for k, name in enumerate(table.head):
-        shown.add_column(name, justify="right" if k in numbers else "left")
-    for row in table.rows[:most]:
-        shown.add_row(*(escape(x) if isinstance(x, str) else f"{x:.4g}" for x in row))
-    console.print(shown)
-    if most is not None and len(table.rows) > most:
-        console.print(f"... {len(table.rows) - most} more on the page", style="dim")
-    console.print()

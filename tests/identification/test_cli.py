@@ -1,5 +1,6 @@
 """The command line from a robot to its model, on the robot with the fewest parameters."""
 
+import csv
 import json
 
 import h5py
@@ -115,3 +116,21 @@ def test_an_identification_of_another_robot_is_refused(work, tmp_path, capsys):
     out = str(tmp_path / "model")
     assert main(["consistent", "franka_emika_panda", str(work / "found"), "--out", out]) == 2
     assert "of festo_expt_45; must be of franka_emika_panda" in capsys.readouterr().err
+
+
+def test_elastic_joints_are_estimated_from_a_simulated_experiment(tmp_path, capsys):
+    out, robot = tmp_path / "elastic", "comau_racer_1_4_elastic"
+    assert main(["elastic", robot, "--locked", "--viscous", "0", "--out", str(out)]) == 0
+    assert "stiffness" in capsys.readouterr().out
+    found = {}
+    with (out / "elastic_joints.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            found.setdefault(row["parameter"], []).append(float(row["value"]))
+    chain = load_subject(robot).chain
+    np.testing.assert_allclose(found["stiffness"], chain.K_s, rtol=3e-3)
+    np.testing.assert_allclose(found["inertia"], chain.D_M, rtol=5e-3)
+    # a file from elsewhere gives the same
+    again = ["elastic", robot, str(out / "record.h5"), "--locked", "--out", str(tmp_path / "b")]
+    assert main(again) == 0
+    text = [(folder / "elastic_joints.csv").read_text() for folder in (out, tmp_path / "b")]
+    assert text[0] == text[1]

@@ -1,0 +1,79 @@
+"""``python -m identification elastic``: stiffness, damping and rotor inertia of each joint."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from identification.options import Names, Robot, Scales, Units, read_number, read_reading
+from reporting.commands import interruptible
+from reporting.fraction import fraction_display
+
+
+def elastic_command(
+    robot: Robot,
+    record: Annotated[
+        Path | None,
+        typer.Argument(
+            help="CSV, HDF5 or MAT with positions of links and motors, and torques. Without: a "
+            "simulated experiment, which is written beside the results"
+        ),
+    ] = None,
+    locked: Annotated[
+        bool, typer.Option("--locked", help="The links were held, and the motors shaken.")
+    ] = False,
+    viscous: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUES",
+            help="Viscous friction of the drives where links were held, one number or one for "
+            "each [Nm s/rad]; 0 takes it for damping of the joint.",
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_elastic")] = None,
+    seed: Annotated[int, typer.Option(help="Of a simulated experiment.")] = 1,
+    units: Units = None,
+    names: Names = None,
+    scales: Scales = None,
+) -> None:
+    """Estimate the elastic joints of a robot from signals of motors and links."""
+    from identification.elastic.estimate import estimate_joints
+    from identification.elastic.experiment import simulate_excited, simulate_locked
+    from identification.elastic.table import joint_table, write_table
+    from identification.measurement.files import read_record, write_record
+    from identification.measurement.imperfections import shipped_imperfections
+    from identification.model.subject import load_subject
+    from identification.steps import load_excitation, make_folder
+    from reporting.tables import print_table
+
+    with interruptible():
+        console, subject = Console(), load_subject(robot)
+        folder = out or Path("out") / f"{subject.name}_elastic"
+        reading = read_reading(names, units, scales)
+        if record is not None:
+            measured = read_record(record, subject, None, reading, still=locked)
+            make_folder(folder)
+        else:
+            make_folder(folder)
+            faults = shipped_imperfections(subject.family)
+            with fraction_display(console, subject.name) as progress:
+                if locked:
+                    measured = simulate_locked(subject, faults, seed=seed, progress=progress)
+                else:
+                    motion = load_excitation(subject, None)
+                    measured = simulate_excited(
+                        subject, motion, faults, seed=seed, progress=progress
+                    )
+            write_record(folder / "record.h5", measured, subject)
+        known = None
+        if locked:
+            numbers = [read_number(x, "--viscous") for x in (viscous or "0").split(",")]
+            known = np.full(subject.dimension, numbers[0]) if len(numbers) == 1 else numbers
+        found = estimate_joints(
+            measured, subject, locked=locked, viscous=None if known is None else np.array(known)
+        )
+        write_table(folder / "elastic_joints.csv", found)
+        print_table(console, joint_table(found))
+        console.print(f"Written to {folder / 'elastic_joints.csv'}", soft_wrap=True)
