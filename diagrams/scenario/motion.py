@@ -10,6 +10,7 @@ from diagrams.scenario.checks import (
     require_between,
     require_numbers,
 )
+from pfsc_drake.control.law.swing import Swing
 
 # beyond, durations have no digits left, or none at all
 _VELOCITIES = (1e-6, 1e3)  # m/s
@@ -50,12 +51,14 @@ class ReferenceParameters:
         velocity: Largest velocity, 1e-6 to 1e3 [m/s].
         acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
+        swings: How the path or surface itself moves along its normals (5.1), (5.2).
     """
 
     points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
     velocity: float = 0.1
     acceleration: float = 1.0
     dwell: float = 0.3
+    swings: list[Swing] = dc.field(default_factory=list)
     places: list[list[float]] = dc.field(default_factory=list)
     second: SecondReference | None = None
 

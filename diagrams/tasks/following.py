@@ -15,11 +15,15 @@ from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.posture import add_posture_reference
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.swing import SwingingReference
+from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
+from pfsc_drake.systems.control.swinging_manifold import SwingingManifold
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 # what an observer tells, for the log
@@ -85,6 +89,7 @@ def add_place(
         ReferenceGenerator(task.motion, order, linearization.num_outputs),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), generator.GetOutputPort("reference")
+    desired = _swung(builder, following, desired, order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     period = following.scenario.controller.sampling_time
     place = task.add_place(builder, tool_pose, desired, period)
@@ -94,6 +99,28 @@ def add_place(
         "manifold_point": place.manifold_point,
     }
     return PlaceOnManifold(place.projector, desired, signals)
+
+
+def _swung(
+    builder: DiagramBuilder, following: Following, desired: OutputPort, order: int
+) -> OutputPort:
+    """Return the reference on a manifold that moves, if it does."""
+    swings, linearization = following.scenario.reference.swings, following.law.linearization
+    if not swings:
+        return desired
+    manifold, m = linearization.manifold, linearization.num_outputs
+    allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
+    require(not manifold.follows_time, "reference.swings", f"{len(swings)} given", allowed)
+    across = indices(manifold.coordinates, Kind.TRANSVERSAL)
+    try:
+        swinging = SwingingReference(swings, across.start, across.stop - across.start, m, order)
+    except InputError as error:
+        raise InputError(f"reference.{error}") from None
+    system = builder.AddNamedSystem(
+        "swinging_manifold", SwingingManifold(swinging, (order + 1) * m)
+    )
+    builder.Connect(desired, system.GetInputPort("reference"))
+    return system.GetOutputPort("reference")
 
 
 def add_law(

@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from experiments.figures.forces import shade_pushes
 from experiments.results.run_log import FloatArray, RunLog
@@ -238,8 +239,11 @@ def _draw_with_references(
         error = values - reference
     draw_components(panel, log.time, MILLI * values, labels)
     if _is_used(log, f"{name}_d"):
-        desired = [f"{label} desired" for label in labels]
-        draw_components(panel, log.time, MILLI * log[f"{name}_d"].values, desired, "--")
+        # one entry of the legend for all components, which share their colours
+        unnamed = [f"_{label}" for label in labels]
+        draw_components(panel, log.time, MILLI * log[f"{name}_d"].values, unnamed, "--")
+        label = f"${symbol}^d$ (desired)"
+        panel.add_line(Line2D([], [], color=REFERENCE, linestyle="--", label=label))
     return error
 
 

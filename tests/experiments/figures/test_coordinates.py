@@ -104,7 +104,9 @@ def test_transversal_with_a_desired_offset_and_motors(compliant_log):
     compliant_log.add("xi_M", np.full((201, 2), 3e-3), "m")
     compliant_log.add("xi_measured", np.tile([3e-3, 4e-3], (201, 1)), "m")
     position, _, distance = draw_transversal(compliant_log).canvas.axes
-    np.testing.assert_allclose(lines(position)[r"$\xi_2$ desired"], 3.0)
+    assert r"$\xi^d$ (desired)" in lines(position)
+    dashed = {line.get_label(): line.get_ydata() for line in position.lines}
+    np.testing.assert_allclose(dashed[r"_$\xi_2$"], 3.0)
     np.testing.assert_allclose(
         lines(distance)[r"of the motors $\|\xi_M\|$"], 3.0 * np.sqrt(2.0), rtol=1e-12
     )

@@ -1,0 +1,61 @@
+"""References that swing, against finite differences and a closed form."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.control.law.swing import Swing, SwingingReference
+from pfsc_drake.errors import InputError
+
+SWING = Swing(coordinate=2, amplitude=0.02, frequency=0.5, begin=0.4, ramp=0.8)
+# outputs: eta, xi_1, xi_2, and three angles
+ROWS = {"first": 1, "transversal": 2, "outputs": 6, "order": 4}
+
+
+def test_derivatives_are_those_of_the_value():
+    reference, h = SwingingReference([SWING], **ROWS), 1e-5
+    for time in (0.5, 0.9, 1.19, 1.3, 2.7):
+        values = reference.at(time)
+        differences = (reference.at(time + h) - reference.at(time - h))[:-1] / (2.0 * h)
+        np.testing.assert_allclose(differences, values[1:], rtol=1e-6, atol=2e-6)
+        assert not np.delete(values, 2, axis=1).any()
+
+
+def test_it_is_a_sine_from_the_ramp_on():
+    reference = SwingingReference([SWING], **ROWS)
+    omega, t = np.pi, 3.0
+    angle = omega * (t - 0.4)
+    expected = [0.02 * omega**k * np.sin(angle + k * np.pi / 2.0) for k in range(5)]
+    np.testing.assert_allclose(reference.at(t)[:, 2], expected, rtol=1e-10)
+
+
+def test_it_rests_before_and_begins_without_a_jump():
+    reference = SwingingReference([SWING], **ROWS)
+    assert not reference.at(0.4).any()
+    assert np.abs(reference.at(0.4 + 1e-7)).max() < 1e-6
+    before, after = reference.at(1.2 - 1e-7), reference.at(1.2 + 1e-7)
+    np.testing.assert_allclose(before, after, rtol=1e-3, atol=1e-6)
+
+
+def test_swings_of_one_coordinate_add_up():
+    both = SwingingReference([SWING, SWING], **ROWS).at(2.0)
+    np.testing.assert_allclose(both, 2.0 * SwingingReference([SWING], **ROWS).at(2.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ({"coordinate": 3}, "coordinate = 3"),
+        ({"amplitude": 0.0}, "amplitude = 0.0"),
+        ({"frequency": -1.0}, "frequency"),
+        ({"ramp": 0.0}, "ramp"),
+        ({"begin": float("nan")}, "begin"),
+    ],
+)
+def test_wrong_swings_are_refused(change, part):
+    with pytest.raises(InputError, match=part):
+        Swing(**change)
+
+
+def test_a_coordinate_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match=r"swings\[0\]: coordinate = 2; there is 1"):
+        SwingingReference([SWING], first=2, transversal=1, outputs=6, order=2)

@@ -1,0 +1,59 @@
+"""Guidance by a hand (Sec. 5.2), through the command line, shortened."""
+
+import h5py
+import numpy as np
+import pytest
+
+from experiments.cli import main
+
+CENTER, RADIUS = np.array([0.83, 0.0, 0.9]), 0.15  # (5.3)
+
+
+def run(folder, scenario, duration, *changes):
+    arguments = ["run", scenario, "--out", str(folder), "--duration", str(duration)]
+    changes = [text for change in changes for text in ("--set", change)]
+    assert main([*arguments, "--no-figures", "--no-recording", *changes]) == 0
+    with h5py.File(folder / "log.h5") as file:
+        return {name: dataset[:] for name, dataset in file.items()}
+
+
+def test_the_tool_is_held_on_a_circle_whose_radius_swings(tmp_path):
+    """Place of the tool in the world against the radius over time, not the law's coordinates."""
+    log = run(tmp_path, "vf_dynamic_circle", 4.0)
+    t, from_center = log["t"], log["y_t"] - CENTER
+    late = t > 1.5
+    wanted = RADIUS + 0.02 * np.sin(2.0 * np.pi * 0.5 * (t - 0.5))
+    error = np.linalg.norm(from_center[:, :2], axis=1) - wanted
+    assert np.abs(error[late]).max() < 1e-3
+    assert np.abs(from_center[:, 2]).max() < 1e-3
+    assert log["eta"][-1] > 0.1  # led by the hand
+
+
+def test_the_hand_cannot_push_the_tool_off_a_hard_path(tmp_path):
+    places = "{time: 0.8, position: [0.05, 0, 0]}, {time: 2.5, position: [0.3, 0.05, 0]}"
+    leaning = f"hand.waypoints=[{places}]"
+    log = run(tmp_path, "vf_hard_spline", 3.0, leaning)
+    assert np.linalg.norm(log["xi"], axis=1).max() < 0.4e-3
+    assert log["eta"][-1] > 0.2
+    assert np.abs(log["manifold_force"][:, 1:3]).max() > 10.0
+
+
+def test_the_hand_pulls_the_tool_off_a_soft_path(tmp_path):
+    """At rest the stiffness of Tab. 4.3 bears the hand."""
+    still = (
+        "hand.waypoints=[{time: 0.8, position: [0, 0, 0]}, {time: 1.5, position: [0, -0.06, 0]}]"
+    )
+    log = run(tmp_path, "vf_soft_circle", 3.5, still, "hand.tremor=0")
+    late = log["t"] > 3.0
+    force = log["manifold_force"][late, 1].mean()
+    assert abs(force) > 20.0
+    assert log["xi"][late, 0].mean() == pytest.approx(force / 5000.0, rel=0.05)
+    sunk = (log["y_t"][late] - CENTER)[:, 2].mean()
+    assert sunk == pytest.approx(-abs(force) / 5000.0, rel=0.1)
+
+
+def test_a_surface_has_no_second_coordinate_to_swing(tmp_path, capsys):
+    change = "reference.swings=[{coordinate: 2}]"
+    arguments = ["run", "sfc_comau_paraboloid", "--out", str(tmp_path), "--set", change]
+    assert main(arguments) == 2
+    assert "reference.swings[0]: coordinate = 2; there is 1" in capsys.readouterr().err
