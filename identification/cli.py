@@ -28,6 +28,7 @@ from identification.options import (
     read_integer,
     read_number,
     read_pairs,
+    read_range,
     read_reading,
 )
 from reporting.commands import interruptible, run_app, show_page
@@ -204,7 +205,7 @@ def estimate_command(
             bounds,
             excitation,
         )
-        print_table(console, parameter_table(findings), most=12)
+        print_table(console, parameter_table(findings, words=False), most=12)
         print_table(console, torque_table(findings))
         raise typer.Exit(show_page("report", report))
 
@@ -217,12 +218,23 @@ def consistent_command(
     ],
     out: Annotated[Path | None, typer.Option(help="Default: out/ROBOT_model")] = None,
     bounds: Bounds = None,
+    total_mass: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW:HIGH",
+            help="Mass of all links [kg], of a robot of which nothing else is known.",
+        ),
+    ] = None,
+    margin: Annotated[
+        float, typer.Option(help="With it: how far bodies reach beyond their joints [m].")
+    ] = 0.1,
     direct: Annotated[
         bool, typer.Option("--direct", help="In one step from the first run's torques.")
     ] = False,
     tool: Tool = False,
 ) -> None:
     """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
+    from identification.consistency.bounds import bounds_from_geometry
     from identification.model.subject import load_subject
     from identification.steps import (
         bounds_of,
@@ -237,7 +249,11 @@ def consistent_command(
         subject = load_subject(robot, tool=tool)
         folder = out or Path("out") / f"{subject.name}_model"
         findings = stored_findings(subject, identification, None, simulated=False)
-        found = consistent_set(findings, bounds_of(subject, bounds), direct)
+        if total_mass is None:
+            known = bounds_of(subject, bounds)
+        else:
+            known = bounds_from_geometry(subject, read_range(total_mass, "--total-mass"), margin)
+        found = consistent_set(findings, known, direct)
         written = write_consistent(subject, found, folder)
         console.print(
             f"chi squared {found.chi_squared:.4g} of {len(found.base_values)} base parameters",

@@ -84,6 +84,18 @@ def read_number(text: str, option: str) -> float:
         raise InputError(f"{option} {shortened(text)}: allowed: a number") from None
 
 
+def read_range(text: str, option: str) -> tuple[float, float]:
+    """Return the two numbers of an option.
+
+    Raises:
+        InputError: If it is not ``LOW:HIGH``.
+    """
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise InputError(f"{option} {shortened(text)}: allowed: LOW:HIGH")
+    return read_number(low, option), read_number(high, option)
+
+
 def read_integer(text: str, option: str) -> int:
     """Return the integer of an option.
 

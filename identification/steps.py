@@ -254,7 +254,15 @@ def bounds_of(subject: Subject, file: Path | None) -> PhysicalBounds:
     Raises:
         InputError: If there is neither, or the file cannot be read.
     """
-    return load_bounds(subject.family if file is None else file)
+    if file is not None:
+        return load_bounds(file)
+    try:
+        return load_bounds(subject.family)
+    except InputError:
+        raise InputError(
+            f"{subject.name}: nothing is known of its links; write --bounds FILE, or of a chain "
+            "--total-mass LOW:HIGH [kg]"
+        ) from None
 
 
 def consistent_set(

@@ -1,5 +1,6 @@
 """Tables of an identification, for pages and terminals."""
 
+import math
 from collections.abc import Sequence
 
 from identification.consistency.nearest import ConsistentParameters
@@ -9,12 +10,17 @@ from identification.findings import Findings
 from reporting.page import Table
 
 
-def parameter_table(findings: Findings) -> Table:
-    """Return Tab. C.3: each base parameter with its standard deviations."""
+def parameter_table(findings: Findings, words: bool = True) -> Table:
+    """Return Tab. C.3: each base parameter with its standard deviations.
+
+    Args:
+        findings: What was estimated.
+        words: Whether to say what each is a combination of, or only what leads it.
+    """
     rows: list[list[str | float]] = [
         [
             str(row.number),
-            row.combination,
+            row.combination if words else row.name,
             row.mean,
             row.unit,
             row.relative_deviation,
@@ -23,12 +29,11 @@ def parameter_table(findings: Findings) -> Table:
         ]
         for row in findings.runs.parameter_rows(findings.truth)
     ]
-    return Table(
-        "Base parameters",
-        "Mean of the runs; standard deviation of one run in % of it, of the runs and predicted.",
-        ["", "parameter", "mean", "unit", "of the runs in %", "predicted in %", "true"],
-        rows,
+    caption = (
+        "Mean of the runs; standard deviation of one run in % of it, of the runs and predicted."
     )
+    head = ["", "parameter", "mean", "unit", "of the runs in %", "predicted in %", "true"]
+    return _known("Base parameters", caption, head, rows)
 
 
 def torque_table(findings: Findings) -> Table:
@@ -61,7 +66,19 @@ def torque_table(findings: Findings) -> Table:
         "that it is from and on one that was not used; share of the torques' variance that it "
         "explains."
     )
-    return Table("Torques", caption, head, rows)
+    return _known("Torques", caption, head, rows)
+
+
+def _known(
+    title: str, caption: str, head: Sequence[str], rows: Sequence[Sequence[str | float]]
+) -> Table:
+    """Return a table without the columns of which nothing is known."""
+    kept = [
+        k
+        for k in range(len(head))
+        if any(isinstance(row[k], str) or not math.isnan(float(row[k])) for row in rows)
+    ]
+    return Table(title, caption, [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
 def weakness_table(estimate: Estimate) -> Table:

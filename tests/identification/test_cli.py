@@ -118,6 +118,22 @@ def test_an_identification_of_another_robot_is_refused(work, tmp_path, capsys):
     assert "of festo_expt_45; must be of franka_emika_panda" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (["--total-mass", "5"], "--total-mass 5: allowed: LOW:HIGH"),
+        (["--total-mass", "1:x"], "--total-mass x: allowed: a number"),
+        (["--total-mass", "1:5"], "festo_expt_45: no chain of links"),
+        (["--bounds", "missing.yaml"], "missing.yaml"),
+    ],
+)
+def test_wrong_bounds_are_one_line(work, tmp_path, capsys, options, part):
+    out = ["--out", str(tmp_path / "model")]
+    assert main(["consistent", ROBOT, str(work / "found"), *options, *out]) == 2
+    error = capsys.readouterr().err
+    assert part in error and error.count("\n") == 1
+
+
 def test_elastic_joints_are_estimated_from_a_simulated_experiment(tmp_path, capsys):
     out, robot = tmp_path / "elastic", "comau_racer_1_4_elastic"
     assert main(["elastic", robot, "--locked", "--viscous", "0", "--out", str(out)]) == 0
