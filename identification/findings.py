@@ -89,12 +89,21 @@ def find_parameters(
         estimates.append(estimate(regressor, base, motion, friction))
     runs = Repetitions(tuple(estimates))
     prediction = None if validation is None else predict(estimates[0], regressor, validation)
-    known = None
-    if truth is not None:
-        extra = np.zeros(estimates[0].base.rank - base.rank)  # terms that the robot does not have
-        known = np.concatenate([base.values(truth), extra])
+    known = None if truth is None else true_base(estimates[0], truth)
     tell(1.0, "done")
     return Findings(runs, choice, prediction, known)
+
+
+def true_base(found: Estimate, parameters: np.ndarray) -> np.ndarray:
+    """Return what an estimate would be without errors, shape (n_b,).
+
+    Args:
+        found: The estimate; the robot has no terms of friction beyond Coulomb's and viscous.
+        parameters: True parameters of the robot, shape (n,).
+    """
+    return np.concatenate(
+        [found.robot_base.values(parameters), np.zeros(len(found.friction.terms))]
+    )
 
 
 def find_consistent(runs: Repetitions, bounds: PhysicalBounds) -> ConsistentParameters:

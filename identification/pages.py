@@ -8,9 +8,9 @@ import numpy as np
 from identification.consistency.bounds import PhysicalBounds
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
-from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.recording import record_excitation
+from identification.excitation.scene import cell_of
 from identification.findings import Findings
 from identification.measurement.drift import friction_trend
 from identification.measurement.periods import AveragedMotion
@@ -94,8 +94,7 @@ def _recording(subject: Subject, file: Path | None, results: ResultsFolder) -> s
     """Write the page that plays an excitation, and return its name; None without one."""
     if file is None:
         return None
-    cell = None if subject.chain is None else load_cell(None, subject.family)
-    page = record_excitation(subject, FourierTrajectory.load(file), cell=cell)
+    page = record_excitation(subject, FourierTrajectory.load(file), cell=cell_of(subject, None))
     return RECORDING if results.write(RECORDING, page) else None
 
 

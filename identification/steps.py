@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.direct import estimate_consistent
 from identification.consistency.nearest import ConsistentParameters
@@ -14,23 +12,24 @@ from identification.estimation.bandwidth import choose_bandwidth
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
 from identification.estimation.validation import predict
-from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits
 from identification.excitation.recording import record_excitation
 from identification.excitation.run_in import rest_to_rest
+from identification.excitation.scene import cell_of
 from identification.excitation.search import SearchResult
-from identification.findings import Findings, find_consistent, find_parameters
+from identification.findings import Findings, find_consistent, find_parameters, true_base
 from identification.measurement.columns import Reading
 from identification.measurement.experiment import run_experiment
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
-from identification.measurement.prepare import read_motion
+from identification.measurement.prepare import prepare_motion
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
+from identification.output import make_folder
 from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
@@ -42,7 +41,7 @@ _RATE = 1000.0  # Hz, of the motion for a robot's controller
 
 def save_excitation(
     subject: Subject, found: SearchResult, folder: Path, periods: int, limits: JointLimits
-) -> None:
+) -> str:
     """Write an excitation: coefficients, motion from rest to rest, and a page that plays it.
 
     Args:
@@ -51,6 +50,9 @@ def save_excitation(
         folder: Where; made if it is not there.
         periods: How often the motion is run.
         limits: For the way from rest to the motion and back.
+
+    Returns:
+        The page.
     """
     make_folder(folder)
     trajectory, joints = found.trajectory, subject.joint_names
@@ -61,8 +63,7 @@ def save_excitation(
         trajectory, limits.velocity, limits.acceleration, periods=periods, rate=_RATE
     )
     run.export_csv(folder / RUN, _RATE, list(subject.joint_units))
-    cell = None if subject.chain is None else load_cell(None, subject.family)
-    record_excitation(subject, trajectory, folder / RECORDING, cell)
+    return record_excitation(subject, trajectory, folder / RECORDING, cell_of(subject, None))
 
 
 def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
@@ -181,17 +182,15 @@ def estimate_files(
     base = base_parameters(regressor)
     if not records:
         raise InputError("estimate: no record; at least one is required")
-    if bandwidth_hz is None:
-        first = read_record(records[0], subject, period, reading)
-        bandwidth_hz = choose_bandwidth(
-            regressor, base, first, period, skip, lambda _, phase: progress(0.0, phase)
-        ).bandwidth_hz
     total, motions = len(records) + (validation is not None), []
     for k, path in enumerate([*records, *([validation] if validation else [])]):
         progress(0.5 * k / total, f"reading {path.name}")
-        motions.append(
-            read_motion(path, regressor, period, reading, skip=skip, bandwidth_hz=bandwidth_hz)
-        )
+        record = read_record(path, subject, period, reading)
+        if bandwidth_hz is None:
+            bandwidth_hz = choose_bandwidth(
+                regressor, base, record, period, skip, lambda _, phase: progress(0.0, phase)
+            ).bandwidth_hz
+        motions.append(prepare_motion(record, regressor, skip=skip, bandwidth_hz=bandwidth_hz))
     other = motions.pop() if validation is not None else None
     findings = find_parameters(
         regressor,
@@ -228,10 +227,7 @@ def stored_findings(
         )
     ]
     prediction = None if other is None else predict(first, Regressor(subject), other)
-    truth = None
-    if simulated:
-        extra = np.zeros(len(first.friction.terms))
-        truth = np.concatenate([first.robot_base.values(true_parameters(subject)), extra])
+    truth = true_base(first, true_parameters(subject)) if simulated else None
     return Findings(Repetitions(tuple(runs)), None, prediction, truth)
 
 
@@ -283,15 +279,3 @@ def consistent_set(
 def write_consistent(subject: Subject, found: ConsistentParameters, folder: Path) -> WrittenModel:
     """Write the model of a consistent set, without friction that models do not have."""
     return write_model(subject, found.parameters[: len(true_parameters(subject))], folder)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder with its parents.
-
-    Raises:
-        InputError: If that is not possible.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None

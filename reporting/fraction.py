@@ -5,7 +5,9 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import TimeRemainingColumn
+
+from reporting.progress import make_bar
 
 _PLAIN_STEP = 0.1  # of the whole, between plain lines of one phase
 
@@ -21,17 +23,9 @@ def fraction_display(console: Console, title: str) -> Iterator[Callable[[float, 
     if not console.is_terminal:
         yield _plain(console, title)
         return
-    with Progress(
-        SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
-        TextColumn("[bold]{task.description}"),
-        BarColumn(bar_width=None),
-        TextColumn("{task.fields[phase]}"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    ) as bar:
-        task = bar.add_task(escape(title), total=1.0, phase="")
-        yield lambda fraction, phase: bar.update(task, completed=fraction, phase=escape(phase))
+    with make_bar(console, TimeRemainingColumn()) as bar:
+        task = bar.add_task(escape(title), total=1.0, status="")
+        yield lambda fraction, phase: bar.update(task, completed=fraction, status=escape(phase))
 
 
 def _plain(console: Console, title: str) -> Callable[[float, str], None]:

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
     SpinnerColumn,
     TaskID,
     TextColumn,
@@ -17,6 +18,24 @@ from rich.progress import (
 
 PLAIN_LINES = 10  # plain lines per run of known length
 ROUNDING = 1e-9  # relative
+
+
+def make_bar(console: Console, *further: ProgressColumn) -> Progress:
+    """Returns a bar that is gone when it stops; its tasks have the field ``status``.
+
+    Args:
+        console: Where to write.
+        further: What is behind the status.
+    """
+    return Progress(
+        SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
+        TextColumn("[bold]{task.description}"),
+        BarColumn(bar_width=None),
+        TextColumn("{task.fields[status]}"),
+        *further,
+        console=console,
+        transient=True,
+    )
 
 
 class ProgressListener(Protocol):
@@ -56,15 +75,7 @@ class ProgressDisplay:
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:
-            self._bar = Progress(
-                SpinnerColumn("dots" if self._console.encoding.startswith("utf") else "line"),
-                TextColumn("[bold]{task.description}"),
-                BarColumn(bar_width=None),
-                TextColumn("{task.fields[status]}"),
-                TimeRemainingColumn(),
-                console=self._console,
-                transient=True,
-            )
+            self._bar = make_bar(self._console, TimeRemainingColumn())
             self._task = self._bar.add_task(escape(self._title), total=self._duration, status="")
             self._bar.start()
         return self

@@ -13,10 +13,8 @@ from experiments.studies.side_by_side import run_side_by_side
 from experiments.sweep.rows import COMPLETED, RunRow
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
-from identification.excitation.cell import load_cell
-from identification.excitation.fourier import FourierTrajectory
+from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import JointLimits, chosen_limits
-from identification.excitation.recording import record_excitation
 from identification.excitation.search import search
 from identification.findings import Findings
 from identification.measurement.columns import Reading
@@ -33,8 +31,7 @@ from identification.steps import (
     simulate_runs,
     write_consistent,
 )
-from pfsc_drake.robot.models.files import models_directory
-from reporting.folder import ResultsFolder, open_results
+from reporting.folder import open_results
 from reporting.metrics import Metrics
 from reporting.page import Report, Table
 from reporting.style import COLOURS, STYLE, WIDTH, Drawing, Figure, render
@@ -79,7 +76,7 @@ class Circle:
         runs: How often the experiment is made.
         limits: Of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
-        validation: File of another motion beside the robot's model; searched for without.
+        validation: Name of another shipped motion; searched for without.
     """
 
     robot: str
@@ -111,7 +108,7 @@ CIRCLES = (
                 ("controller.friction.source=model",),
             ),
         },
-        validation="excitation.yaml",
+        validation="excitation",
     ),
     Circle(
         "franka_emika_panda",
@@ -169,7 +166,7 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
         say = _stepwise(circle.robot, progress)
         limits = chosen_limits(subject, circle.limits)
         found = search(subject, starts=circle.starts, seed=_SEED, limits=limits, progress=say)
-        save_excitation(subject, found, out / "excitation", 5, limits)
+        page = save_excitation(subject, found, out / "excitation", 5, limits)
         other = _other_motion(subject, circle, limits, say)
         faults = shipped_imperfections(subject.family).realistic()
         trajectory = FourierTrajectory.load(out / "excitation" / EXCITATION)
@@ -186,14 +183,14 @@ def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Rep
         model = write_consistent(subject, consistent, out / "model")
         progress(f"{circle.robot}: model written, {len(model.files)} files")
         rows = run_side_by_side(_scenarios(circle, out / "model"), _said(circle, progress))
-        cell = load_cell(None, subject.family)
-        results.write(RECORDING, record_excitation(subject, trajectory, cell=cell))
-        content = _content(circle, subject, findings, consistent, rows, results)
-        return write_page(results, content(None if motion is None else motion.t))
+        results.write(RECORDING, page)
+        assert motion is not None  # there is one that was not used
+        content = _content(circle, subject, findings, motion.t, consistent, rows)
+        return write_page(results, content)
 
 
 def _stepwise(robot: str, progress: Callable[[str], None]) -> Callable[[float, str], None]:
-    """Return what tells a line at the beginning of a step, and at each half of it."""
+    """Return what tells a line at the beginning of each step."""
     said = ""
 
     def tell(fraction: float, phase: str) -> None:
@@ -213,7 +210,7 @@ def _other_motion(
     progress: Callable[[float, str], None],
 ) -> FourierTrajectory:
     if circle.validation:
-        return FourierTrajectory.load(models_directory() / subject.family / circle.validation)
+        return FourierTrajectory.load(shipped_excitation(subject.family, circle.validation))
     found = search(subject, starts=1, seed=100, limits=limits, iterations=40, progress=progress)
     return found.trajectory
 
@@ -249,10 +246,10 @@ def _content(
     circle: Circle,
     subject: Subject,
     findings: Findings,
+    other_t: np.ndarray,
     consistent: ConsistentParameters,
     rows: Mapping[tuple[str, str], RunRow],
-    results: ResultsFolder,
-) -> Callable[[np.ndarray | None], PageContent]:
+) -> PageContent:
     metrics, table = Metrics(), []
     deviations = np.array(
         [
@@ -269,7 +266,7 @@ def _content(
     head = ["scenario", "metric", *(f"{belief} in mm" for belief in BELIEFS), "ratio"]
     caption = "Largest deviations with laws that believe these models; identified by true."
     picture = _picture(list(circle.drives), deviations)
-    return lambda other_t: PageContent(
+    return PageContent(
         subject,
         findings,
         other_t=other_t,

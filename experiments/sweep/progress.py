@@ -7,10 +7,10 @@ from typing import Self
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
+from rich.progress import Progress, TaskID
 
 from experiments.sweep.rows import COMPLETED
-from reporting.progress import PLAIN_LINES
+from reporting.progress import PLAIN_LINES, make_bar
 
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
 
@@ -37,14 +37,7 @@ class SweepProgress:
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:
-            self._bar = Progress(
-                SpinnerColumn("dots" if self._console.encoding.startswith("utf") else "line"),
-                TextColumn("[bold]{task.description}"),
-                BarColumn(bar_width=None),
-                TextColumn("{task.fields[status]}"),
-                console=self._console,
-                transient=True,
-            )
+            self._bar = make_bar(self._console)
             status = self._status()
             self._task = self._bar.add_task(
                 escape(self._title), total=self._total, completed=self._done, status=status

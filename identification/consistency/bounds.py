@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.model.shipped import shipped_or_own
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.yaml.typed import REQUIRED, load_file
 
@@ -136,13 +136,7 @@ def load_bounds(robot: str | Path) -> PhysicalBounds:
     Raises:
         InputError: If the file cannot be read, or a key is unknown, missing or out of range.
     """
-    path = Path(robot)
-    if not path.suffix:
-        path = models_directory() / path / FILE_NAME
-        if not path.is_file():
-            known = sorted(file.parent.name for file in models_directory().glob(f"*/{FILE_NAME}"))
-            raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
-    return load_file(PhysicalBounds, path)
+    return load_file(PhysicalBounds, shipped_or_own(robot, FILE_NAME))
 
 
 def bounds_from_geometry(

@@ -11,6 +11,7 @@ from pydrake.multibody.tree import RigidBody
 from diagrams.robots.model import locate_model, read_robot
 from diagrams.scenario import RobotParameters as RobotBlock
 from identification.consistency.check import central_inertia, layout_of, link_faults
+from identification.consistency.urdf import INERTIA_ENTRIES
 from identification.model.analytic_base import moved
 from identification.model.parameters import link_parameters, true_parameters
 from identification.model.subject import Subject
@@ -20,14 +21,6 @@ from pfsc_drake.robot.models.model_xml import Element, ModelXml, read_model_xml
 from pfsc_drake.robot.models.visuals import format_numbers
 
 _KINDS = (".urdf", ".sdf")
-_ENTRIES = {
-    "ixx": (0, 0),
-    "ixy": (0, 1),
-    "ixz": (0, 2),
-    "iyy": (1, 1),
-    "iyz": (1, 2),
-    "izz": (2, 2),
-}
 _ROTOR = "drake:rotor_inertia"
 
 
@@ -111,7 +104,7 @@ def _parameters(plant: MultibodyPlant, body: RigidBody) -> np.ndarray:
 
 def _urdf_inertial(own: np.ndarray) -> str:
     mass, center, I_C = central_inertia(own)
-    entries = " ".join(f'{k}="{format_numbers([I_C[e]])}"' for k, e in _ENTRIES.items())
+    entries = " ".join(f'{k}="{format_numbers([I_C[e]])}"' for k, e in INERTIA_ENTRIES.items())
     return (
         f'<inertial><origin xyz="{format_numbers(center)}" rpy="0 0 0"/>'
         f'<mass value="{format_numbers([mass])}"/><inertia {entries}/></inertial>'
@@ -120,7 +113,7 @@ def _urdf_inertial(own: np.ndarray) -> str:
 
 def _sdf_inertial(own: np.ndarray) -> str:
     mass, center, I_C = central_inertia(own)
-    entries = "".join(f"<{k}>{format_numbers([I_C[e]])}</{k}>" for k, e in _ENTRIES.items())
+    entries = "".join(f"<{k}>{format_numbers([I_C[e]])}</{k}>" for k, e in INERTIA_ENTRIES.items())
     return (
         f"<inertial><pose>{format_numbers([*center, 0.0, 0.0, 0.0])}</pose>"
         f"<mass>{format_numbers([mass])}</mass><inertia>{entries}</inertia></inertial>"

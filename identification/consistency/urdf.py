@@ -15,7 +15,8 @@ from pfsc_drake.robot.serial.links import ChainLink
 
 BASE = "base"
 _DRAKE = "https://drake.mit.edu"
-_ENTRIES = {
+# where the attributes of an <inertia> stand in its matrix
+INERTIA_ENTRIES = {
     "ixx": (0, 0),
     "ixy": (0, 1),
     "ixz": (0, 2),
@@ -124,7 +125,7 @@ def _body(model: ET.Element, name: str, parameters: np.ndarray) -> None:
     inertial = ET.SubElement(ET.SubElement(model, "link", name=name), "inertial")
     _place(inertial, RigidTransform(center))
     _numbers(inertial, "mass", value=mass)
-    _numbers(inertial, "inertia", **{key: I_C[entry] for key, entry in _ENTRIES.items()})
+    _numbers(inertial, "inertia", **{key: I_C[entry] for key, entry in INERTIA_ENTRIES.items()})
 
 
 def _transmission(model: ET.Element, joint: str, rotor_inertia: float, gear_ratio: float) -> None:

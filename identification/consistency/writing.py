@@ -12,8 +12,8 @@ from identification.consistency.check import require_consistent
 from identification.consistency.model_edits import edited_model
 from identification.consistency.parameter_files import identified_delta, identified_robot
 from identification.consistency.urdf import urdf_text
-from identification.excitation.fourier import write_text
 from identification.model.subject import Subject
+from identification.output import make_folder, write_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.robot.models.writer import write_sdf
@@ -66,10 +66,7 @@ def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) ->
     parameters = np.asarray(parameters, dtype=float)
     require_consistent(subject, parameters)
     folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
+    make_folder(folder)
     file = folder / PARAMETERS_FILE
     if subject.delta is not None:
         write_text(file, _commented(yaml_dump_typed(identified_delta(subject, parameters))))

@@ -45,7 +45,8 @@ def elastic_command(
     from identification.measurement.files import read_record, write_record
     from identification.measurement.imperfections import shipped_imperfections
     from identification.model.subject import load_subject
-    from identification.steps import load_excitation, make_folder
+    from identification.output import make_folder
+    from identification.steps import load_excitation
     from reporting.tables import print_table
 
     with interruptible():

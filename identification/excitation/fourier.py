@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from identification.output import write_text
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.yaml.reading import dump_yaml
@@ -281,12 +282,3 @@ def check_harmonics(harmonics: Sequence[int]) -> None:
             f"harmonics = {shortened(str(list(harmonics)))}; must be one or more different "
             f"integers from 1 to {_MOST_HARMONICS}"
         )
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file, or say in one line why it cannot be written."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "no name of a file"
-        raise InputError(f"{path}: cannot be written: {reason}") from None

@@ -14,10 +14,11 @@ from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.model import read_robot
 from identification.excitation.balls import ends
 from identification.excitation.cell import Cell
-from identification.excitation.fourier import FourierTrajectory, write_text
+from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun
 from identification.excitation.scene import left_out_tool, obstacle_shape
 from identification.model.subject import Subject, tool_frame_of
+from identification.output import write_text
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

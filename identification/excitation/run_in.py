@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.excitation.fourier import FourierTrajectory, samples_per_period, write_text
+from identification.excitation.fourier import FourierTrajectory, samples_per_period
+from identification.output import write_text
 from pfsc_drake.errors import InputError
 
 # rate of the clock on a ramp of unit length, C^4 at both ends

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from identification.model.analytic_base import analytic_base
+from identification.model.shipped import shipped_or_own
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.yaml.typed import REQUIRED, load_file
 
@@ -97,13 +97,7 @@ def load_printed_identification(
     Raises:
         InputError: If the file cannot be read, or a key is unknown, missing or out of range.
     """
-    path = Path(robot)
-    if not path.suffix:
-        path = models_directory() / path / FILE_NAME
-        if not path.is_file():
-            known = sorted(file.parent.name for file in models_directory().glob(f"*/{FILE_NAME}"))
-            raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
-    return load_file(PrintedIdentification, path)
+    return load_file(PrintedIdentification, shipped_or_own(robot, FILE_NAME))
 
 
 def printed_base(subject: Subject) -> np.ndarray:
