@@ -122,13 +122,12 @@ class SurfaceProjector:
         )
 
     def _clamped(self, t1: float, t2: float) -> Pair:
-        first, second = (
-            value if closed else min(max(value, begin), end)
-            for value, (begin, end), closed in zip(
-                (t1, t2), self._domain, self._closed, strict=True
-            )
-        )
-        return first, second
+        (begin_1, end_1), (begin_2, end_2) = self._domain
+        if not self._closed[0]:
+            t1 = begin_1 if t1 < begin_1 else end_1 if t1 > end_1 else t1
+        if not self._closed[1]:
+            t2 = begin_2 if t2 < begin_2 else end_2 if t2 > end_2 else t2
+        return t1, t2
 
     def _held(self, axis: int, value: float, descent: float) -> bool:
         """Whether f falls beyond the end of an open direction that theta is at."""

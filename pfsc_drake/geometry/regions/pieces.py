@@ -1,0 +1,242 @@
+"""The nearest point of a curved boundary: pieces of it, bounded from below, and a tree of them."""
+
+import heapq
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+# Pieces on each side of a foot that are told to have no other, ...
+_BLOCK = 2
+# ... and their largest extent in radii of one.
+_BLOCK_EXTENT = 2.0 * _BLOCK + 1.0
+# Nearer by less than this is not nearer, m.
+_NOT_NEARER = 1e-12
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of a boundary, in the order of its parameters.
+
+    Each lies within a distance, its sag, of a flat disc about its centre.
+
+    Attributes:
+        centre: On the boundary, [n_1, n_2, 3], m.
+        normal: Unit normals of the discs, [n_1, n_2, 3].
+        radius: Of the discs, [n_1, n_2], m.
+        sag: [n_1, n_2], m.
+        bends: Largest curvature of the boundary on a piece, towards its normal and away from it,
+            [2, n_1, n_2], 1/m; negative where it bends the other way.
+        closed: Whether the last piece of a direction is a neighbour of the first.
+    """
+
+    centre: np.ndarray
+    normal: np.ndarray
+    radius: np.ndarray
+    sag: np.ndarray
+    bends: np.ndarray
+    closed: tuple[bool, bool]
+
+
+class Foot(Protocol):
+    """A place of the boundary to which the distance is a local minimum."""
+
+    @property
+    def distance(self) -> float:
+        """Of the point from there, m."""
+
+    @property
+    def piece(self) -> tuple[int, int] | None:
+        """Numbers of the piece it is on, or None if it is on a border."""
+
+    @property
+    def below(self) -> bool:
+        """Whether the point is on the other side of the boundary than its normal there."""
+
+
+FootType = TypeVar("FootType", bound=Foot)
+
+
+class _Leaf(NamedTuple):
+    number: int
+    x: float
+    y: float
+    z: float
+    n_x: float
+    n_y: float
+    n_z: float
+    radius: float
+    sag: float
+
+
+class _Ball(NamedTuple):
+    number: int
+    x: float
+    y: float
+    z: float
+    radius: float
+
+
+class NearestFoot(Generic[FootType]):
+    """Nearest of all feet on a boundary, by branch and bound.
+
+    Balls around groups of pieces, and the flat discs of single ones, bound the distance from below;
+    Newton's method is started on those pieces alone that may be nearer than what was found. Around
+    a foot the distance has no other minimum as far as it is shorter than the radius of curvature,
+    so that its neighbours need not be tried.
+
+    Args:
+        pieces: All of the boundary.
+        project: Local minimum near the middle of a piece: from a point, m, and the numbers of the
+            piece.
+    """
+
+    def __init__(
+        self,
+        pieces: Pieces,
+        project: Callable[[float, float, float, int, int], FootType],
+    ) -> None:
+        self._project = project
+        self._shape = pieces.radius.shape
+        self._closed = pieces.closed
+        self._alone = [_alone_within(pieces, bend).ravel().tolist() for bend in pieces.bends]
+        self._balls, self._leaves = _tree(pieces)
+
+    def __call__(self, x: float, y: float, z: float) -> FootType:
+        """Nearest foot of a point, m."""
+        balls, leaves, sqrt = self._balls, self._leaves, math.sqrt
+        best: FootType | None = None
+        # what a piece's centre is away, or the foot found
+        least = math.inf
+        shielded: list[tuple[int, int]] = []
+        heap = [(0.0, len(balls) - 1, -1)]
+        columns = self._shape[1]
+        while heap:
+            low, node, piece = heapq.heappop(heap)
+            if best is not None and low >= best.distance - _NOT_NEARER:
+                break
+            if piece >= 0:
+                row, column = divmod(piece, columns)
+                if any(self._beside(row, column, *other) for other in shielded):
+                    continue
+                foot = self._project(x, y, z, row, column)
+                if best is None or foot.distance < best.distance:
+                    best = foot
+                    least = min(least, foot.distance)
+                if foot.piece is not None:
+                    place = foot.piece[0] * columns + foot.piece[1]
+                    if foot.distance < self._alone[foot.below][place]:
+                        shielded.append(foot.piece)
+                continue
+            for number, a, b, c, radius in balls[node]:
+                a, b, c = x - a, y - b, z - c
+                low = sqrt(a * a + b * b + c * c) - radius
+                if low <= least:
+                    heapq.heappush(heap, (low, number, -1))
+            for number, a, b, c, u, v, w, radius, sag in leaves[node]:
+                a, b, c = x - a, y - b, z - c
+                square = a * a + b * b + c * c
+                height = a * u + b * v + c * w
+                aside = square - height * height
+                aside = sqrt(aside) - radius if aside > radius * radius else 0.0
+                low = sqrt(height * height + aside * aside) - sag
+                if low <= least:
+                    heapq.heappush(heap, (low, -1, number))
+                    away = sqrt(square)
+                    if away < least:
+                        least = away
+        assert best is not None
+        return best
+
+    def _beside(self, row: int, column: int, foot_row: int, foot_column: int) -> bool:
+        """Whether a piece is within the block around a foot."""
+        rows, columns = self._shape
+        apart, across = abs(row - foot_row), abs(column - foot_column)
+        if self._closed[0]:
+            apart = min(apart, rows - apart)
+        if self._closed[1]:
+            across = min(across, columns - across)
+        return apart <= _BLOCK and across <= _BLOCK
+
+
+def _tree(pieces: Pieces) -> tuple[list[list[_Ball]], list[list[_Leaf]]]:
+    """Balls around ever larger blocks of neighbouring pieces.
+
+    Returns:
+        For each node the balls in it and the pieces in it, one of both empty; the last is the root.
+    """
+    shape = pieces.radius.shape
+    sizes = np.stack([pieces.radius, pieces.sag], axis=-1)
+    rows = np.concatenate([pieces.centre, pieces.normal, sizes], axis=-1)
+    within: list[Any] = [
+        _Leaf(i, *row) for i, row in enumerate(rows.reshape(-1, rows.shape[-1]).tolist())
+    ]
+    balls: list[list[_Ball]] = []
+    leaves: list[list[_Leaf]] = []
+    stride, blocks = (1, 1), shape
+    while len(within) > 1 or not balls:
+        wider = _wider(pieces.centre, _wider(pieces.centre, stride))
+        first, number = len(balls), np.arange(len(within)).reshape(blocks)
+        step = (wider[0] // stride[0], wider[1] // stride[1])
+        stride = wider
+        centre, radius = _balls(pieces, stride)
+        blocks = radius.shape
+        for row, column in np.ndindex(blocks):
+            part = number[
+                row * step[0] : (row + 1) * step[0], column * step[1] : (column + 1) * step[1]
+            ]
+            members = [within[i] for i in part.ravel().tolist()]
+            balls.append(members if first else [])
+            leaves.append([] if first else members)
+        rows = np.concatenate([centre, radius[..., None]], axis=-1).reshape(-1, 4)
+        within = [_Ball(first + i, *row) for i, row in enumerate(rows.tolist())]
+    return balls, leaves
+
+
+def _wider(centre: np.ndarray, stride: tuple[int, int]) -> tuple[int, int]:
+    """Numbers of pieces along blocks that are twice as long where they are shorter."""
+    extent = []
+    for axis in (0, 1):
+        chords = np.linalg.norm(np.diff(centre, axis=axis), axis=-1)
+        several = stride[axis] < centre.shape[axis]
+        extent.append(stride[axis] * float(chords.mean()) if several else math.inf)
+    shorter = int(np.argmin(extent))
+    return (2 * stride[0], stride[1]) if shorter == 0 else (stride[0], 2 * stride[1])
+
+
+def _balls(pieces: Pieces, stride: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Centres and radii of balls around blocks of pieces, [m_1, m_2, 3] and [m_1, m_2], m."""
+    starts = [np.arange(0, n, k) for n, k in zip(pieces.radius.shape, stride, strict=True)]
+
+    def over_blocks(function: np.ufunc, values: np.ndarray) -> np.ndarray:
+        rows = function.reduceat(values, starts[0], axis=0)
+        return np.asarray(function.reduceat(rows, starts[1], axis=1))
+
+    middle = 0.5 * (over_blocks(np.minimum, pieces.centre) + over_blocks(np.maximum, pieces.centre))
+    own = [np.arange(n) // k for n, k in zip(pieces.radius.shape, stride, strict=True)]
+    away = np.linalg.norm(pieces.centre - middle[np.ix_(*own)], axis=-1)
+    return middle, over_blocks(np.maximum, away + pieces.radius + pieces.sag)
+
+
+def _alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
+    """Distance below which a foot on a piece is the only one of its block, [n_1, n_2], m.
+
+    Along a geodesic f = |y - sigma|^2 / 2 has the second derivative 1 - (y - sigma) . n kappa, and
+    (y - sigma) . n is at most the distance and what the block bends by.
+
+    Args:
+        pieces: All of the boundary.
+        bends: Curvature towards the side of the point, [n_1, n_2], 1/m.
+    """
+    modes = ["wrap" if closed else "nearest" for closed in pieces.closed]
+    size = 2 * _BLOCK + 1
+    bend, most, radius = (
+        maximum_filter(values, size=size, mode=modes)
+        for values in (bends, np.abs(pieces.bends).max(axis=0), pieces.radius)
+    )
+    extent = _BLOCK_EXTENT * radius
+    with np.errstate(divide="ignore"):
+        return np.where(bend > 0.0, 1.0 / bend - 0.5 * most * extent**2, math.inf)

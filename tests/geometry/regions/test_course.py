@@ -1,0 +1,57 @@
+"""Courses of moving regions: values beyond their ends, repetition, largest rates."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.regions.course import CurveCourse
+
+
+def _there_and_back(last=0.0):
+    return rest_to_rest([0.0, 0.1, last], velocity=0.2, acceleration=1.0, dwell=0.3)
+
+
+def test_it_rests_before_and_after():
+    curve = _there_and_back(0.02)
+    course = CurveCourse(curve)
+    assert course.at(-1.0) == 0.0
+    assert course.at(curve.domain[1] + 5.0) == pytest.approx(0.02, abs=1e-15)
+    for clock in np.linspace(*curve.domain, 30):
+        assert course.at(float(clock)) == pytest.approx(curve.derivatives(clock, 0)[0, 0])
+
+
+def test_it_repeats():
+    curve = _there_and_back()
+    course = CurveCourse(curve, repeat=True)
+    for clock in np.linspace(*curve.domain, 30):
+        expected = course.at(float(clock))
+        assert course.at(float(clock) + 3.0 * curve.period) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("velocity", [0.2, 10.0])
+def test_its_largest_rate_is_that_of_samples(velocity):
+    """Also where the fullest speed is that of two ramps, between samples."""
+    curve = rest_to_rest([0.0, 0.1, -0.3], velocity=velocity, acceleration=1.0)
+    course = CurveCourse(curve)
+    rates = np.abs(curve.derivatives(np.linspace(*curve.domain, 20001), 1)[:, 1, 0])
+    assert rates.max() <= course.largest_rate * (1.0 + 1e-12)
+    assert course.largest_rate == pytest.approx(rates.max(), rel=1e-6)
+
+
+def test_its_largest_rate_within_a_piece():
+    """Of 10 u^3 - 15 u^4 + 6 u^5: 15 / 8 in the middle."""
+    curve = PiecewisePolynomialCurve(
+        [0.0, 1.0], [[[0.0], [0.0], [0.0], [10.0], [-15.0], [6.0]]], known_smoothness=5
+    )
+    assert CurveCourse(curve).largest_rate == pytest.approx(15.0 / 8.0)
+
+
+def test_courses_that_are_none():
+    with pytest.raises(InputError, match=r"begins at 0 and ends at 0\.02; both must be the same"):
+        CurveCourse(_there_and_back(0.02), repeat=True)
+    with pytest.raises(InputError, match="dimension 2"):
+        CurveCourse(PiecewisePolynomialCurve.line((0.0, 0.0), (1.0, 0.0)))
+    with pytest.raises(InputError, match="must be at rest there"):
+        CurveCourse(PiecewisePolynomialCurve.line([0.0], [1.0]))
