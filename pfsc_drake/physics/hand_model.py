@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import FRAMES, smooth_step, smooth_step_slope
+from pfsc_drake.physics.wandering import Wander
 
 # from coordinates and their rates, shape (3,) each, to position and velocity in the world
 Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -59,6 +60,8 @@ class HandParameters:
         release: When the hand begins to let go [s]; infinite: never.
         seed: Of the tremor.
         source: Where the numbers are from.
+        wander: Instead of the waypoints, a box whose places the hand goes to at random, as the seed
+            says; null for the waypoints.
     """
 
     waypoints: list[HandWaypoint] = field(default_factory=lambda: [HandWaypoint()])
@@ -75,6 +78,7 @@ class HandParameters:
     release: float = np.inf
     seed: int = 0
     source: str = "assumed"
+    wander: Wander | None = None
 
     def __post_init__(self) -> None:
         for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
@@ -88,12 +92,19 @@ class HandParameters:
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
         _require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
-        times = [waypoint.time for waypoint in self.waypoints]
-        ascending = bool(times) and bool(
+        times = self.places()[0]
+        ascending = times.size > 0 and bool(
             np.all(np.diff(times) > 0.0) and np.all(np.isfinite(times))
         )
-        _require(ascending, "waypoints", times, "one or more with ascending times")
+        _require(ascending, "waypoints", times.tolist(), "one or more with ascending times")
         _require(self.release > times[0], "release", self.release, f"after {times[0]:g} s")
+
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return when the target is where, shapes (k,) [s] and (k, 3) [m]."""
+        if self.wander is not None:
+            return self.wander.places(self.seed)
+        times = np.array([waypoint.time for waypoint in self.waypoints], dtype=float)
+        return times, np.array([waypoint.position for waypoint in self.waypoints])
 
 
 class HandModel:
@@ -120,8 +131,7 @@ class HandModel:
         if parameters.frame == "manifold":
             _require(place is not None, "frame", parameters.frame, "world without a path")
             self._place = place
-        self._times = np.array([waypoint.time for waypoint in parameters.waypoints])
-        self._positions = np.array([waypoint.position for waypoint in parameters.waypoints])
+        self._times, self._positions = parameters.places()
         random = np.random.default_rng(parameters.seed)
         low, high = parameters.tremor_band
         steps = np.arange(_TREMOR_LINES) + random.uniform(size=(3, _TREMOR_LINES))

@@ -95,3 +95,12 @@ def pose_function(robot: RobotModel) -> ca.Function:
     still = [jets.constant(q[i], 1) for i in range(robot.dimension)]
     y, R = (jet.coefficients[0] for jet in robot.tool_pose(still))
     return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))], ["q"], ["pose"])
+
+
+def tool_velocity_function(robot: RobotModel) -> ca.Function:
+    """Return the tool point and its velocity, ``(q, v) -> [y_t, y_t']`` [m, m/s], shape (6,)."""
+    q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
+    moving = [Jet([q[i], v[i]]) for i in range(robot.dimension)]
+    y, _ = robot.tool_pose(moving)
+    motion = ca.densify(ca.vertcat(*y.coefficients[:2]))
+    return ca.Function("tool_velocity", [q, v], [motion], ["q", "v"], ["motion"])

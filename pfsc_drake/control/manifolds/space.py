@@ -1,0 +1,151 @@
+"""All of space as a manifold: a tool that is led freely, with an orientation to keep."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake import jets
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.orientation import (
+    ToolOrientation,
+    orientation_error,
+    quaternion_rotation,
+)
+from pfsc_drake.control.manifolds.orientation_force import (
+    in_axes_of,
+    quaternion_matrix,
+    rotational_force,
+    torque_across_axis,
+)
+from pfsc_drake.geometry import quaternion_to_matrix
+from pfsc_drake.geometry.projection_status import ProjectionStatus
+from pfsc_drake.jets import Jet
+
+_TRANSLATIONAL = tuple(
+    Coordinate(f"eta_{axis}", Kind.TANGENTIAL, f"tau_{axis}") for axis in ("1", "2", "3")
+)
+
+
+@dataclass(frozen=True)
+class SpacePointLayout:
+    """Where the quantities of a point in space lie in a flat array of floats.
+
+    | field        | length | meaning                                                   |
+    |--------------|--------|-----------------------------------------------------------|
+    | `position`   | 3      | tool point, its coordinates and parameters in one, m       |
+    | `alpha`      | 1      | 0: no place is outside the feasible neighbourhood         |
+    | `status`     | 1      | a `ProjectionStatus`                                      |
+    | `quaternion` | 4      | of the orientation to keep, w first; empty if there is none |
+
+    Args:
+        order: Relative degree r of the law that reads it.
+        oriented: Whether there is an orientation.
+    """
+
+    order: int
+    oriented: bool
+
+    @property
+    def position(self) -> slice:
+        """Slice of the tool point, [3], m."""
+        return slice(0, 3)
+
+    theta = eta = memory = position
+
+    @property
+    def alpha(self) -> slice:
+        """Slice of alpha, [1]."""
+        return slice(3, 4)
+
+    @property
+    def status(self) -> slice:
+        """Slice of the status, [1]."""
+        return slice(4, 5)
+
+    @property
+    def quaternion(self) -> slice:
+        """Slice of the quaternion, [4] or empty."""
+        return slice(5, 9 if self.oriented else 5)
+
+    @property
+    def size(self) -> int:
+        """Length of the whole array."""
+        return self.quaternion.stop
+
+
+class SpaceManifold:
+    """All of space as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
+
+    Its coordinates are those of the tool point along the world's axes, all of them tangential, and,
+    with orientation, the ZYX angles of ``R_d' R_e`` against one ``R_d``, or the two of an axis of
+    the tool.
+
+    Args:
+        order: Relative degree r of the law.
+        quaternion: Of ``R_d`` (w, x, y, z), shape (4,); None for no orientation.
+        tool_axis: The axis that alone keeps the orientation, in the tool frame, of any length,
+            shape (3,); None if the whole tool does.
+
+    Attributes:
+        alignment: Rotation whose first column is the axis, shape (3, 3), or None.
+        tool_axis: The axis, of length one, shape (3,), or None.
+
+    Raises:
+        InputError: If the axis has no direction, or no orientation to follow.
+    """
+
+    name = "space"
+    follows_time = False
+
+    def __init__(
+        self,
+        order: int,
+        quaternion: np.ndarray | None = None,
+        *,
+        tool_axis: np.ndarray | None = None,
+    ) -> None:
+        self.layout = SpacePointLayout(order, quaternion is not None)
+        self._quaternion = np.zeros(0) if quaternion is None else np.array(quaternion, dtype=float)
+        tool = ToolOrientation(self.is_oriented, tool_axis, self.name)
+        self.alignment, self.tool_axis = tool.alignment, tool.tool_axis
+        self.coordinates = (*_TRANSLATIONAL, *tool.coordinates)
+
+    @property
+    def is_oriented(self) -> bool:
+        """Whether there is an orientation to keep."""
+        return self.layout.oriented
+
+    def point(self, y_t: Sequence[float]) -> np.ndarray:
+        """Return the manifold's point at a tool point [m], shape (layout.size,)."""
+        return np.array([*y_t, 0.0, float(ProjectionStatus.OK), *self._quaternion])
+
+    def orientation(self, points: np.ndarray) -> np.ndarray:
+        """Return the orientation to keep, shape (samples, 3, 3)."""
+        return quaternion_to_matrix(points[:, self.layout.quaternion])
+
+    def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
+        """Return the tool point and the angles of ``R_d' R_e``, scalar jets [m, rad]."""
+        position = [y[i] for i in range(3)]
+        if not self.is_oriented:
+            return position
+        R_d = quaternion_rotation(jets.constant(point[self.layout.quaternion], y.order))
+        return [*position, *orientation_error(R_e, R_d, self.alignment)]
+
+    def force(
+        self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
+    ) -> ca.SX:
+        """Return the force itself, and (3.44), (3.45) for the angles."""
+        force, torque = wrench[:3], wrench[3:]
+        if not self.is_oriented:
+            return force
+        phi, quaternion = reference[3:], point[self.layout.quaternion]
+        if self.alignment is not None:
+            torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, self.alignment)
+        turned = rotational_force(in_axes_of(quaternion, torque), phi, self.alignment)
+        return ca.vertcat(force, turned)
+
+    def axes(self, point: np.ndarray) -> np.ndarray:
+        """Return the world's axes, shape (3, 3)."""
+        return np.eye(3)

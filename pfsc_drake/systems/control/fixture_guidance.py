@@ -1,0 +1,165 @@
+"""Guidance by hand with virtual fixtures, as a system."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.control.fixtures.guidance import GuidanceStep
+from pfsc_drake.control.fixtures.lead import Lead, Vector
+from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.robot.robot_model import RobotModel, tool_velocity_function
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+class Guidance(Protocol):
+    """Rules that lead a tool, e.g. :class:`ProgramGuidance`."""
+
+    @property
+    def lead(self) -> Lead:
+        """What is between the asked velocity and the tool."""
+
+    def start(self, y: Vector) -> Any:
+        """Return the memory of a tool at rest at y [m]."""
+
+    def step(
+        self,
+        memory: Any,
+        y: Sequence[float],
+        velocity: Sequence[float],
+        force: Vector,
+        active: Sequence[float] | None = None,
+    ) -> GuidanceStep:
+        """Return what to do at a tick."""
+
+
+class FixtureGuidance(LeafSystem):
+    """Leads the tool where a hand pulls it, and nowhere that it must not go, see `Guidance`.
+
+    A force moves the reference after one period, as in :class:`ImpedanceFilter`; where the tool
+    is counts at once. So there is no algebraic loop through drives and force sensor.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
+        wrench (input): ``[force, torque]`` of the hand on the tool, world axes, shape (6,).
+        ready (input): Until it first rises above 0.5, forces count as zero, shape (1,).
+        active (input, optional): Which regions are switched on, above 0.5, shape (M,); all of them
+            if not connected.
+        reference (output): Derivatives 0..p of the reference by rows, shape ((p + 1) m,), of which
+            only the first three columns, those of the tool point, are not zero.
+        record (output): What there is to log, laid out by ``layout``.
+
+    A force that is not finite counts as zero; that the robot stops then is the affair of whoever
+    measures it.
+
+    State:
+        Abstract: memory of the rules, None before the first tick. Discrete: the force of the last
+        tick, shape (3,), and whether ready.
+
+    Args:
+        guidance: The rules.
+        robot: The robot as it is believed, N joints.
+        order: p, highest derivative of the reference.
+        num_outputs: m.
+        layout: Of the record.
+        period: Sampling time [s].
+    """
+
+    def __init__(
+        self,
+        guidance: Guidance,
+        robot: RobotModel,
+        order: int,
+        num_outputs: int,
+        layout: GuidanceRecord,
+        period: float,
+    ) -> None:
+        super().__init__()
+        self._guidance, self._order, self.layout = guidance, order, layout
+        self._num_outputs, self._n = num_outputs, robot.dimension
+        memory = self.DeclareAbstractState(Value(None))
+        force = self.DeclareDiscreteState(4)
+        self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * self._n)
+        self._wrench = self.DeclareVectorInputPort("wrench", 6)
+        self._ready = self.DeclareVectorInputPort("ready", 1)
+        self._active = self.DeclareVectorInputPort("active", layout.num_regions)
+        states = {self.abstract_state_ticket(memory), self.discrete_state_ticket(force)}
+        sources = {self._joint_state.ticket(), self._active.ticket(), *states}
+        self._step = self.DeclareAbstractOutputPort(
+            "step", lambda: Value(None), self._calc_step, prerequisites_of_calc=sources
+        )
+        size = (order + 1) * num_outputs
+        self.DeclareVectorOutputPort(
+            "reference", size, self._calc_reference, prerequisites_of_calc=sources
+        )
+        self.DeclareVectorOutputPort(
+            "record", layout.size, self._calc_record, prerequisites_of_calc=sources
+        )
+        self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        function = BoundFunction(tool_velocity_function(robot))
+        self._q, self._v = function.arguments["q"], function.arguments["v"]
+        self._motion, self._evaluate = function.results["motion"], function.evaluate
+
+    @property
+    def lag(self) -> float:
+        """How much later the tool is where the rules see it [s]."""
+        return self._guidance.lead.lag
+
+    def _tool(self, context: Context) -> list[float]:
+        """Return ``[y_t, y_t']`` as measured."""
+        state = self._joint_state.Eval(context)
+        self._q[:], self._v[:] = state[: self._n], state[self._n : 2 * self._n]
+        self._evaluate()
+        motion: list[float] = self._motion.tolist()
+        return motion
+
+    def _calc_step(self, context: Context, output: AbstractValue) -> None:
+        motion, memory = self._tool(context), context.get_abstract_state(0).get_value()
+        known = math.isfinite(sum(motion))
+        if not known:  # the law stops the robot
+            output.set_value((None, motion))
+            return
+        if memory is None:
+            memory = self._guidance.start((motion[0], motion[1], motion[2]))
+        f_x, f_y, f_z, ready = context.get_discrete_state_vector().value().tolist()
+        force = (f_x, f_y, f_z) if ready else _STILL
+        active = self._active.Eval(context).tolist() if self._active.HasValue(context) else None
+        step = self._guidance.step(memory, motion[:3], motion[3:], force, active)
+        output.set_value((step, motion))
+
+    def _calc_reference(self, context: Context, output: BasicVector) -> None:
+        step, motion = self._step.Eval(context)
+        reference = np.zeros((self._order + 1, self._num_outputs))
+        reference[0, :3] = motion[:3]
+        if step is not None:
+            reference[:, :3] = self._guidance.lead.reference(
+                step.lead, motion[:3], step.velocity, self._order
+            )
+        output.SetFromVector(reference.ravel())
+
+    def _calc_record(self, context: Context, output: BasicVector) -> None:
+        step, _ = self._step.Eval(context)
+        force = context.get_discrete_state_vector().value()[:3]
+        output.SetFromVector(self.layout.row(step, force))
+
+    def _initialize(self, context: Context, state: State) -> EventStatus:
+        state.get_mutable_abstract_state(0).set_value(None)
+        state.get_mutable_discrete_state().set_value(np.zeros(4))
+        return EventStatus.Succeeded()
+
+    def _update(self, context: Context, state: State) -> None:
+        step, _ = self._step.Eval(context)
+        force = self._wrench.Eval(context)[:3]
+        was_ready = context.get_discrete_state_vector().value()[3]
+        ready = max(was_ready, float(self._ready.Eval(context)[0] > 0.5))
+        if not np.isfinite(force).all():
+            force = np.zeros(3)
+        state.get_mutable_discrete_state().set_value(np.array([*force, ready]))
+        if step is not None:
+            state.get_mutable_abstract_state(0).set_value(step.memory)

@@ -1,0 +1,48 @@
+"""Places that a hand goes to at random."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_model import HandModel, HandParameters
+from pfsc_drake.physics.wandering import Wander
+
+BOX = {"low": [0.1, -0.2, 0.5], "high": [0.3, 0.2, 0.9]}
+
+
+def test_places_are_within_the_box_and_the_times_as_far_apart_as_said():
+    wander = Wander(**BOX, begin=0.5, end=20.0, shortest=0.3, longest=0.8)
+    times, places = wander.places(3)
+    assert times[0] == 0.5
+    assert 18.0 < times[-1] < 20.0
+    gaps = np.diff(times)
+    assert gaps.min() >= 0.3
+    assert gaps.max() <= 0.8
+    assert np.all((places >= BOX["low"]) & (places <= BOX["high"]))
+    assert np.ptp(places, axis=0) == pytest.approx([0.2, 0.4, 0.4], rel=0.2)
+
+
+def test_a_hand_goes_there_as_its_seed_says():
+    wander = Wander(**BOX, begin=0.5, end=5.0)
+    hands = [HandModel(HandParameters(wander=wander, seed=seed)) for seed in (1, 1, 2)]
+    times, places = wander.places(1)
+    for time, place in zip(times, places, strict=True):
+        np.testing.assert_allclose(hands[0].target(time)[0], place, atol=1e-12)
+        np.testing.assert_array_equal(hands[0].target(time)[0], hands[1].target(time)[0])
+    assert not np.array_equal(hands[0].target(3.0)[0], hands[2].target(3.0)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({"low": [0.4, 0, 0]}, "low, high"),
+        ({"high": [1.0, 1.0]}, "low, high"),
+        ({"begin": 2.0}, "begin, end"),
+        ({"end": np.inf}, "begin, end"),
+        ({"shortest": 0.0}, "shortest, longest"),
+        ({"longest": 0.1}, "shortest, longest"),
+    ],
+)
+def test_refusals(change, name):
+    with pytest.raises(InputError, match=name):
+        Wander(**BOX | change)

@@ -1,0 +1,166 @@
+"""Guidance as a system: what moves it when, and what it remembers."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import InitializeParams, Simulator
+
+from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
+from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
+from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.geometry.regions.shapes import HalfSpace
+from pfsc_drake.robot.robot_model import tool_velocity_function
+from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
+from tests.control.conftest import BENT, Robot
+
+PERIOD, M = 1e-3, 6
+PARAMETERS, MASS, DAMPING = GuidanceParameters(), 3.0, 90.0
+PULL = np.array([12.0, -5.0, -40.0, 0.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return Robot("comau_racer_1_4")
+
+
+class Bench:
+    """Guidance in a context with a robot that stands still, above a floor close by."""
+
+    def __init__(self, robot, lead, order=2, below=1e-3):
+        self.q, n = np.array(BENT), robot.n
+        motion = np.array(tool_velocity_function(robot.chain)(self.q, np.zeros(n))).ravel()
+        self.y_t = motion[:3]
+        regions = [HalfSpace(self.y_t - [0, 0, below], [0, 0, 1])]
+        nearby = ScheduledRegions(regions, PARAMETERS, PERIOD)
+        admittance = Admittance(MASS, DAMPING, PERIOD)
+        guidance = ProgramGuidance(PARAMETERS, admittance, lead, nearby, [math.inf])
+        self.system = FixtureGuidance(
+            guidance, robot.chain, order, M, GuidanceRecord(len(regions)), PERIOD
+        )
+        self.simulator = Simulator(self.system)
+        self.context = self.simulator.get_mutable_context()
+        self.fix(joint_state=[*self.q, *np.zeros(n)] * 2, wrench=PULL, ready=[1.0])
+
+    def fix(self, **inputs):
+        for name, value in inputs.items():
+            self.system.GetInputPort(name).FixValue(self.context, np.array(value, dtype=float))
+
+    def advance(self, ticks):
+        self.simulator.AdvanceTo(self.context.get_time() + ticks * PERIOD)
+
+    @property
+    def reference(self):
+        return self.system.GetOutputPort("reference").Eval(self.context).reshape(-1, M)
+
+    def record(self, name):
+        row = self.system.GetOutputPort("record").Eval(self.context)
+        return row[self.system.layout.fields[name]]
+
+
+def test_tool_velocity_is_drakes(robot):
+    rng, function = np.random.default_rng(4), tool_velocity_function(robot.chain)
+    q, v, step = np.array(BENT), rng.uniform(-1, 1, robot.n), 1e-7
+    motion = np.array(function(q, v)).ravel()
+    before, here, after = (
+        robot.tool_pose(np.tile([*(q + s * step * v), *np.zeros(robot.n)], 2))[0]
+        for s in (-1.0, 0.0, 1.0)
+    )
+    np.testing.assert_allclose(motion[:3], here, atol=1e-12)
+    np.testing.assert_allclose(motion[3:], (after - before) / (2 * step), atol=1e-7)
+
+
+def test_a_force_moves_the_reference_one_tick_later(robot):
+    bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
+    bench.simulator.Initialize()
+    np.testing.assert_allclose(bench.reference[0, :3], bench.y_t, atol=1e-12)
+    assert not bench.reference[1].any()
+    bench.advance(1)
+    expected = PERIOD * PULL[:2] / (MASS + PERIOD * DAMPING)
+    np.testing.assert_allclose(bench.reference[1, :2], expected, rtol=1e-12)
+    np.testing.assert_array_equal(bench.record("force"), PULL[:3])
+
+
+def test_the_floor_holds_the_reference(robot):
+    """A robot that stands: its rest point does not move on, so that the floor stays 1 mm away."""
+    bench = Bench(robot, ServoLead(5e-3, 0.0, PERIOD))
+    bench.advance(200)
+    downwards = -bench.reference[1, 2]
+    assert downwards == pytest.approx(1e-3 / PARAMETERS.approach_time, rel=1e-9)
+    assert bench.record("near")[0] == 0.0
+    assert bench.record("near")[1] == pytest.approx(1e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_a_filtered_reference_comes_to_rest_on_the_floor(robot, degree):
+    bench = Bench(robot, FilterLead(degree, 3e-3, PERIOD), order=degree)
+    lowest = math.inf
+    for _ in range(40):
+        bench.advance(5)
+        lowest = min(lowest, bench.reference[0, 2] - bench.y_t[2])
+    assert lowest == pytest.approx(-1e-3, abs=2e-6)
+    assert bench.record("mode")[0] == 1.0
+    assert bench.record("labels").tolist() == [1.0]
+    # it slides on along the floor
+    assert bench.reference[1, 0] == pytest.approx(PULL[0] / DAMPING, rel=0.02)
+
+
+def test_nothing_moves_before_the_sensor_is_ready(robot):
+    bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
+    bench.fix(ready=[0.0])
+    bench.advance(20)
+    assert not bench.reference[1].any()
+    bench.fix(ready=[1.0])
+    bench.advance(2)
+    assert bench.reference[1].any()
+    bench.fix(ready=[0.0])  # once is enough
+    before = bench.reference[1, 0]
+    bench.advance(5)
+    assert bench.reference[1, 0] > before
+
+
+def test_a_force_that_is_no_number_counts_as_none(robot):
+    bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
+    bench.advance(20)
+    before = bench.reference[1].copy()
+    bench.fix(wrench=[np.nan] * 6)
+    bench.advance(2)
+    assert np.isfinite(bench.reference).all()
+    assert np.abs(bench.reference[1] - before).max() < 1e-2
+
+
+def test_a_state_that_is_no_number_asks_for_nothing(robot):
+    bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
+    bench.advance(20)
+    memory = bench.context.get_abstract_state(0).get_value()
+    bench.fix(joint_state=[np.nan] * 24)
+    bench.advance(1)
+    assert not bench.reference[1].any()
+    assert bench.context.get_abstract_state(0).get_value() is memory
+    assert np.isnan(bench.record("point")).all()
+
+
+def test_two_contexts_do_not_share_their_memory(robot):
+    bench = Bench(robot, FilterLead(2, 3e-3, PERIOD))
+    other = bench.context.Clone()
+    bench.advance(50)
+    assert other.get_abstract_state(0).get_value() is None
+    twin = bench.context.Clone()
+    bench.advance(1)
+    fresh = Simulator(bench.system, twin)
+    fresh.Initialize(InitializeParams(suppress_initialization_events=True))
+    fresh.AdvanceTo(bench.context.get_time())
+    port = bench.system.GetOutputPort("record")
+    np.testing.assert_array_equal(port.Eval(twin), port.Eval(bench.context))
+
+
+def test_regions_can_be_switched_off(robot):
+    bench = Bench(robot, ServoLead(5e-3, 0.0, PERIOD))
+    bench.fix(active=[0.0])
+    bench.advance(200)
+    assert -bench.reference[1, 2] > 0.2
+    bench.fix(active=[1.0])
+    bench.advance(1)
+    assert -bench.reference[1, 2] == pytest.approx(1e-3 / PARAMETERS.approach_time, rel=1e-9)
