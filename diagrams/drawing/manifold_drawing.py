@@ -59,7 +59,7 @@ class PathDrawing:
         """See :class:`ManifoldDrawing`."""
         curve = self.path.position
         if isinstance(curve, CurveOnSurface):
-            draw_surface(meshcat, "path_surface", *_skin_and_lines(curve.surface))
+            draw_surface(meshcat, "path_surface", *skin_and_lines(curve.surface))
         visualizer = PathVisualizer(self.path, self.layout, meshcat, period)
         drawing = builder.AddNamedSystem("path_visualizer", visualizer)
         return drawing.GetInputPort("path_point")
@@ -79,7 +79,7 @@ class SurfaceDrawing:
 
     def outline(self) -> list[np.ndarray]:
         """See :class:`ManifoldDrawing`."""
-        return _skin_and_lines(self.surface)[1]
+        return skin_and_lines(self.surface)[1]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
         """See :class:`ManifoldDrawing`."""
@@ -88,7 +88,7 @@ class SurfaceDrawing:
         def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return point[layout.position][:3], self.manifold.axes(point)
 
-        skin, lines = _skin_and_lines(self.surface)
+        skin, lines = skin_and_lines(self.surface)
         drawing = builder.AddNamedSystem(
             "surface_visualizer",
             SurfaceVisualizer(skin, lines, layout.size, place, meshcat, period),
@@ -96,7 +96,7 @@ class SurfaceDrawing:
         return drawing.GetInputPort("manifold_point")
 
 
-def _skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
+def skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return points of a surface on a grid [m], shape (points, points, 3), and lines of it."""
     first, second = (np.linspace(*ends, _LINE_POINTS) for ends in surface.domain)
     theta = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)

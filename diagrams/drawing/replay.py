@@ -69,6 +69,7 @@ class RecordedMotion:
         distance: What the colour of the tool's way tells; of one colour without.
         tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
+        region_clock: Of regions that move [s], shape (frames,).
     """
 
     times: np.ndarray
@@ -80,6 +81,7 @@ class RecordedMotion:
     distance: RecordedDistance | None = None
     tool_force: np.ndarray | None = None
     trail: np.ndarray | None = None
+    region_clock: np.ndarray | None = None
 
 
 def build_replay(
@@ -141,7 +143,11 @@ def add_motion(
         "manifold_point": motion.manifold_point,
     }
     sources = {name: add_source(builder, name, motion.times, x) for name, x in signals.items()}
-    builder.Connect(sources["manifold_point"], manifold.add(builder, meshcat, period))
+    drawing = manifold.add(builder, meshcat, period)
+    builder.Connect(sources["manifold_point"], drawing)
+    if motion.region_clock is not None:
+        clock = add_source(builder, "clock", motion.times, motion.region_clock[:, np.newaxis])
+        builder.Connect(clock, drawing.get_system().GetInputPort("region_clock"))
     if workpiece is not None:
         add_workpiece_drawing(builder, workpiece, sources["tool_pose"], meshcat, period)
     _add_tool(builder, motion, meshcat, period)

@@ -10,7 +10,7 @@ from diagrams.scenario.posture import PostureParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
-MANIFOLDS = ("path", "trajectory", "surface")
+MANIFOLDS = ("path", "trajectory", "surface", "space")
 _TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
@@ -132,7 +132,8 @@ class ControllerParameters:
             effort limit per rad/s.
         effort_scale: Fraction of the model's effort limits that the law may use.
         manifold: ``path``: path following; ``trajectory``: classical tracking of a point
-            that moves along the path with time, for comparison; ``surface``: surface following.
+            that moves along the path with time, for comparison; ``surface``: surface following;
+            ``space``: led freely by a hand, within fixtures.
         external_torque: What it knows of forces on the tool.
         model: What the controller takes the robot for, as ``robot.model``, or a YAML file with
             robot parameters; empty for the plant's own. ``model_error`` comes on top.

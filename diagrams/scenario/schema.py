@@ -14,6 +14,7 @@ from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.controller import ControllerParameters
 from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
 from diagrams.scenario.faults import FaultParameters
+from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -54,6 +55,7 @@ class Scenario:
         robot: Which robot.
         path: Which path.
         surface: Which surface, for ``controller.manifold: surface`` or a path on it.
+        fixtures: Regions that the tool may not enter, for ``controller.manifold: space``.
         controller: The controller.
         model_error: What the controller believes wrongly of the robot.
         reference: Motion along the path.
@@ -87,6 +89,7 @@ class Scenario:
     robot: RobotParameters = dc.field(default_factory=RobotParameters)
     path: PathParameters = dc.field(default_factory=PathParameters)
     surface: SurfaceParameters | None = None
+    fixtures: FixtureParameters | None = None
     controller: ControllerParameters = dc.field(default_factory=ControllerParameters)
     model_error: ModelErrorParameters = dc.field(default_factory=ModelErrorParameters)
     reference: ReferenceParameters = dc.field(default_factory=ReferenceParameters)

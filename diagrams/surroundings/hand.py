@@ -38,8 +38,8 @@ def add_hand(
     if scenario.hand is None:
         return []
     if scenario.hand.frame == "manifold":
-        for i, waypoint in enumerate(scenario.hand.waypoints):
-            task.check_place(waypoint.position, f"hand.waypoints[{i}].position")
+        for i, place in enumerate(scenario.hand.places()[1]):
+            task.check_place(place, f"hand.waypoints[{i}].position")
     try:
         hand = OperatorHand(scenario.hand, scenario.controller.sampling_time, task.target())
     except InputError as error:

@@ -5,9 +5,10 @@ import math
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
-from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceLaw
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
@@ -66,8 +67,12 @@ def add_compliance(
         InputError: If the compliance does not suit the law.
     """
     manifold, period = linearization.manifold, scenario.controller.sampling_time
+    impedance_parameters = scenario.compliance.impedance()
+    if manifold.name == SpaceManifold.name:
+        # guidance leads along, see add_guidance
+        impedance_parameters.tangential = CoordinateImpedance()
     law = ImpedanceLaw(
-        scenario.compliance.impedance(),
+        impedance_parameters,
         manifold.coordinates,
         linearization.relative_degree,
         period,

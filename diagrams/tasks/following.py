@@ -11,14 +11,17 @@ from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.friction import Coefficients, add_friction_compensation
+from diagrams.tasks.guidance import add_guidance
 from diagrams.tasks.observed_forces import add_observed_forces
 from diagrams.tasks.posture import add_posture_reference
+from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.swing import SwingingReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
@@ -57,12 +60,13 @@ class PlaceOnManifold:
 
     Attributes:
         projector: What finds it.
-        desired_reference: Reference of the virtual output, before it yields to forces.
+        desired_reference: Reference of the virtual output, before it yields to forces; None where
+            forces alone lead the tool.
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
     """
 
     projector: ManifoldProjector
-    desired_reference: OutputPort
+    desired_reference: OutputPort | None
     signals: dict[str, OutputPort]
 
 
@@ -83,13 +87,14 @@ def add_place(
     kinematics = builder.AddNamedSystem(
         "tool_kinematics", ToolKinematics(following.robot, following.on_motors)
     )
-    order = reference_order(following.scenario, linearization)
-    generator = builder.AddNamedSystem(
-        "reference_generator",
-        ReferenceGenerator(task.motion, order, linearization.num_outputs),
-    )
-    tool_pose, desired = kinematics.GetOutputPort("tool_pose"), generator.GetOutputPort("reference")
-    desired = _swung(builder, following, desired, order)
+    tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
+    if not isinstance(task, SpaceTask):
+        order = reference_order(following.scenario, linearization)
+        generator = builder.AddNamedSystem(
+            "reference_generator",
+            ReferenceGenerator(task.motion, order, linearization.num_outputs),
+        )
+        desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     period = following.scenario.controller.sampling_time
     place = task.add_place(builder, tool_pose, desired, period)
@@ -153,8 +158,7 @@ def add_law(
             law, scenario.controller.sampling_time, supervision(scenario, following.robot)
         ),
     )
-    desired = _add_smooth_start(builder, following, controller, place.desired_reference)
-    made = {"reference": desired, "law": controller.GetOutputPort("law")}
+    made = {"law": controller.GetOutputPort("law")}
     signals |= add_external_torque(builder, following.robot, scenario, controller, signals)
     friction, logged = add_friction_compensation(
         builder, following.robot, scenario, controller, following.friction, signals
@@ -165,6 +169,13 @@ def add_law(
     signals |= add_observed_forces(builder, following.robot, scenario, controller, signals)
     made |= {name: signals[name] for name in _OBSERVED if name in signals}
     made |= add_posture_reference(builder, following.robot, scenario, law, controller, signals)
+    desired = place.desired_reference
+    if desired is None:
+        guidance = _add_guidance(builder, following, signals)
+        desired = guidance.GetOutputPort("reference")
+        made["guidance"] = guidance.GetOutputPort("record")
+    desired = _add_smooth_start(builder, following, controller, desired)
+    made = {"reference": desired} | made
     if scenario.compliance.is_given:
         inputs = signals | {
             "desired_reference": desired,
@@ -177,6 +188,16 @@ def add_law(
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))
     return controller, made
+
+
+def _add_guidance(
+    builder: DiagramBuilder, following: Following, signals: dict[str, OutputPort]
+) -> FixtureGuidance:
+    """Add what leads a tool that has no reference of its own."""
+    task, scenario = following.task, following.scenario
+    assert isinstance(task, SpaceTask)  # see add_place
+    order = reference_order(scenario, following.law.linearization)
+    return add_guidance(builder, scenario, following.robot, task, order, signals)
 
 
 def _add_smooth_start(

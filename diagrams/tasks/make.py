@@ -4,14 +4,16 @@ from pathlib import Path as FilePath
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
+from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.geometry.progress import Progress
 
-TASKS: dict[str, type[PathTask | SurfaceTask]] = {
+TASKS: dict[str, type[PathTask | SurfaceTask | SpaceTask]] = {
     "path": PathTask,
     "trajectory": TrajectoryTask,
     "surface": SurfaceTask,
+    "space": SpaceTask,
 }
 
 

@@ -120,7 +120,7 @@ class PathTask(Task):
         self,
         builder: DiagramBuilder,
         tool_pose: OutputPort,
-        reference: OutputPort,
+        reference: OutputPort | None,
         period: float,
     ) -> PlaceFinder:
         """See :class:`Task`."""
@@ -187,7 +187,7 @@ class TrajectoryTask(PathTask):
         self,
         builder: DiagramBuilder,
         tool_pose: OutputPort,
-        reference: OutputPort,
+        reference: OutputPort | None,
         period: float,
     ) -> PlaceFinder:
         """See :class:`Task`; the law acts on the point that time prescribes."""
@@ -196,6 +196,7 @@ class TrajectoryTask(PathTask):
             "trajectory_point",
             TrajectoryPoint(self.path, self.relative_degree, len(self.manifold.coordinates)),
         )
+        assert reference is not None  # time leads the point
         builder.Connect(reference, leader.GetInputPort("reference"))
         return PlaceFinder(projector, leader.GetOutputPort("manifold_point"))
 

@@ -53,10 +53,7 @@ def make_surface(
         InputError: If the surface cannot be made, or is not smooth enough.
     """
     needed = RELATIVE_DEGREE[law] + 1
-    if isinstance(shape, Fitted | Revolved | Extruded):
-        made = surface_from_file(shape, needed, folder, progress)
-    else:
-        made = MadeSurface(_from_numbers(shape))
+    made = surface_from_shape(shape, needed, folder, progress)
     if made.surface.smoothness < needed:
         raise InputError(
             f"smoothness: class C^{made.surface.smoothness:g}, and the law '{law}' needs "
@@ -64,6 +61,25 @@ def make_surface(
         )
     check_single_sheet(made.surface)
     return made
+
+
+def surface_from_shape(
+    shape: SurfaceShape, smoothness: int, folder: FilePath, progress: Progress | None = None
+) -> MadeSurface:
+    """Return a surface, whatever its class.
+
+    Args:
+        shape: What the scenario says.
+        smoothness: k of the class C^k that one from a file gets, unless the scenario says another.
+        folder: Where relative file names start.
+        progress: See :func:`make_surface`.
+
+    Raises:
+        InputError: If the surface cannot be made.
+    """
+    if isinstance(shape, Fitted | Revolved | Extruded):
+        return surface_from_file(shape, smoothness, folder, progress)
+    return MadeSurface(_from_numbers(shape))
 
 
 def _from_numbers(shape: NumberShape) -> Surface:

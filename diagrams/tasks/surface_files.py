@@ -53,24 +53,16 @@ def surface_from_file(
     """
     tell = progress or (lambda _fraction, _phase: None)
     made = shape.smoothness or smoothness
-    if not shape.file:
-        raise InputError("file: none; write file: NAME, relative to the scenario's folder")
-    file = folder / shape.file
-    rotation = rotation_from_axes(shape.axis, shape.start)
     if isinstance(shape, Fitted):
+        file = _file_of(shape, folder)
         tell(0.0, f"reading {file.name}")
         points = read_surface_points(file, cast(Unit, shape.unit))
-        placed = points @ rotation.T + shape.origin
+        placed = points @ rotation_from_axes(shape.axis, shape.start).T + shape.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
         return _near_grid(shape, placed, made) if shape.grid else _scattered(shape, placed, made)
+    rotation = rotation_from_axes(shape.axis, shape.start)
+    profile = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):
-        points = read_profile(file, ["radius", "height"])
-        if not points[:, 0].min() > 0.0:
-            raise InputError(
-                f"{shape.file}: radius = {points[:, 0].min():g} m; positive numbers are required, "
-                "since a profile must not meet the axis"
-            )
-        profile = _profile(shape, points, made)
         first, last = np.deg2rad(shape.angles_deg) if shape.angles_deg else (0.0, 0.0)
         return MadeSurface(
             surface_of_revolution(
@@ -81,18 +73,47 @@ def surface_from_file(
                 inward=shape.inward,
             )
         )
-    points = read_profile(file, ["x", "y", "z"]) @ rotation.T + shape.origin
-    profile = _profile(shape, points, made)
     return MadeSurface(extruded_surface(profile, rotation @ shape.direction, shape.length))
 
 
-def _profile(
-    shape: Revolved | Extruded, points: np.ndarray, smoothness: int
+def profile_from_file(
+    shape: Revolved | Extruded, smoothness: int, folder: FilePath
 ) -> PiecewisePolynomialCurve:
+    """Return the profile that a surface is made from.
+
+    Args:
+        shape: What the scenario says.
+        smoothness: k of the class C^k that it gets, unless the scenario says another.
+        folder: Where relative file names start.
+
+    Returns:
+        Radius and height of a surface of revolution [m], dimension 2; of an extruded one a curve
+        in the world [m], dimension 3.
+
+    Raises:
+        InputError: If the file cannot be used.
+    """
+    file = _file_of(shape, folder)
+    if isinstance(shape, Revolved):
+        points = read_profile(file, ["radius", "height"])
+        if not points[:, 0].min() > 0.0:
+            raise InputError(
+                f"{shape.file}: radius = {points[:, 0].min():g} m; positive numbers are required, "
+                "since a profile must not meet the axis"
+            )
+    else:
+        rotation = rotation_from_axes(shape.axis, shape.start)
+        points = read_profile(file, ["x", "y", "z"]) @ rotation.T + shape.origin
     try:
-        return interpolate(points, smoothness=smoothness, closed=shape.closed)
+        return interpolate(points, smoothness=shape.smoothness or smoothness, closed=shape.closed)
     except InputError as error:
         raise InputError(f"{shape.file}: {error}") from None
+
+
+def _file_of(shape: FileShape, folder: FilePath) -> FilePath:
+    if not shape.file:
+        raise InputError("file: none; write file: NAME, relative to the scenario's folder")
+    return folder / shape.file
 
 
 def _near_grid(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurface:

@@ -93,7 +93,7 @@ class SurfaceTask(Task):
         self,
         builder: DiagramBuilder,
         tool_pose: OutputPort,
-        reference: OutputPort,
+        reference: OutputPort | None,
         period: float,
     ) -> PlaceFinder:
         """See :class:`Task`."""

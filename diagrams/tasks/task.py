@@ -50,7 +50,7 @@ class Task(ABC):
         place: Manifold in whose coordinates the tool's true place is told.
         manifold: Manifold that the law makes linear.
         motion: Tangential coordinates of the reference over time, of as many dimensions.
-        shape: Numbers of the manifold that decide whether it can be followed.
+        shape: Numbers of the manifold that decide whether it can be followed, if there are any.
         fit: Where the points stand that the manifold was fitted to, if it was.
         warnings: What is out of proportion in it, one sentence each.
     """
@@ -58,7 +58,7 @@ class Task(ABC):
     place: PlaceManifold
     manifold: Manifold
     motion: PiecewisePolynomialCurve
-    shape: ShapeReport | SurfaceReport
+    shape: ShapeReport | SurfaceReport | None
     fit: Residuals | None = None
     warnings: list[str]
 
@@ -97,7 +97,7 @@ class Task(ABC):
         self,
         builder: DiagramBuilder,
         tool_pose: OutputPort,
-        reference: OutputPort,
+        reference: OutputPort | None,
         period: float,
     ) -> PlaceFinder:
         """Add what finds the place on the manifold.
@@ -105,7 +105,8 @@ class Task(ABC):
         Args:
             builder: Builder of the diagram.
             tool_pose: ``[y_t, R_e]`` as measured, shape (12,).
-            reference: Derivatives of the virtual output's reference by rows.
+            reference: Derivatives of the virtual output's reference by rows; None where a hand
+                leads the tool.
             period: Sampling time [s].
         """
 

@@ -1,0 +1,125 @@
+"""The forbidden regions of a scenario, as rules, logs and pictures need them."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.region import Box, RegionParameters
+from diagrams.tasks.region import make_region
+from diagrams.tasks.surface import surface_from_shape
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.regions.checks import (
+    refuse_forbidden_start,
+    refuse_same_regions,
+    tangent_regions,
+)
+from pfsc_drake.geometry.regions.moving import MovingRegion
+from pfsc_drake.geometry.regions.region import Region
+from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+from pfsc_drake.geometry.surfaces.shapes import plane
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+# class C^k that a surface needs to be drawn
+_DRAWN = 1
+# m, around the start, within which the speed of what turns counts
+_WORKSPACE = 2.0
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A region that a tool may not enter.
+
+    Attributes:
+        name: Kind of its shape and its number, from 1 on.
+        region: The admissible side.
+        stiffness: Of a soft one [N/m]; infinite if it is hard.
+        surfaces: What of its boundary is drawn, where it is at rest.
+    """
+
+    name: str
+    region: Region | MovingRegion
+    stiffness: float
+    surfaces: Sequence[Surface]
+
+    def distance(self, point: Sequence[float], clock: float) -> float:
+        """Return the signed distance of a point [m], positive where it may be.
+
+        Args:
+            point: Shape (3,) [m].
+            clock: Of moving regions [s].
+        """
+        x, y, z = point
+        if isinstance(self.region, MovingRegion):
+            return self.region.distance_at(x, y, z, clock)[0]
+        return self.region.distance(x, y, z)[0]
+
+    def largest_speed(self, start: np.ndarray) -> float:
+        """Return the largest speed of what moves within 2 m of a start [m/s]."""
+        if isinstance(self.region, MovingRegion):
+            return self.region.largest_speed(start, _WORKSPACE)
+        return 0.0
+
+
+def make_fixtures(
+    parameters: FixtureParameters,
+    start: np.ndarray,
+    folder: FilePath,
+    progress: Progress | None = None,
+) -> tuple[list[Fixture], list[str]]:
+    """Return the regions of a scenario, and what is odd about them, one sentence each.
+
+    Args:
+        parameters: What the scenario says.
+        start: Where the tool starts [m], shape (3,).
+        folder: Where relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If a region cannot be made, is given twice, or covers the start and that is to
+            be refused.
+    """
+    fixtures = []
+    for number, said in enumerate(parameters.regions):
+        try:
+            fixtures.append(_make_fixture(number, said, folder, progress))
+        except InputError as error:
+            raise InputError(f"fixtures.regions[{number}]: {error}") from None
+    by_name = {fixture.name: fixture.region for fixture in fixtures}
+    hard = {f.name: f.region for f in fixtures if f.stiffness == math.inf}
+    try:
+        refuse_same_regions(by_name, start)
+        if parameters.start_inside == "refuse":
+            refuse_forbidden_start(hard, start)
+    except InputError as error:
+        raise InputError(f"fixtures: {error}") from None
+    return fixtures, [f"fixtures: {sentence}" for sentence in tangent_regions(hard, start)]
+
+
+def _make_fixture(
+    number: int, said: RegionParameters, folder: FilePath, progress: Progress | None
+) -> Fixture:
+    name = f"{type(said.shape).__name__.lower()}_{number + 1}"
+    region = make_region(said, folder, progress)
+    stiffness = math.inf if said.stiffness is None else said.stiffness
+    if isinstance(said.shape, Box):
+        return Fixture(name, region, stiffness, _faces(said.shape))
+    surface = surface_from_shape(said.shape, _DRAWN, folder).surface
+    return Fixture(name, region, stiffness, [surface])
+
+
+def _faces(box: Box) -> Sequence[Surface]:
+    """Return the six sides of a box."""
+    axes, half = rotation_from_axes(box.axis, box.start), np.array(box.size) / 2.0
+    faces = []
+    for k, sign in itertools.product(range(3), (-1.0, 1.0)):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        rotation = np.column_stack([axes[:, i], axes[:, j], axes[:, k]])
+        size = ((-half[i], half[i]), (-half[j], half[j]))
+        faces.append(plane(size, box.origin + sign * half[k] * axes[:, k], rotation))
+    return faces

@@ -1,0 +1,107 @@
+"""The reference of a tool that is led by hand, within virtual fixtures."""
+
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.scenario import Scenario
+from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.tasks.space_guidance import SpaceTask
+from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
+from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.fixtures.printed import PrintedGuidance
+from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance, Guidance
+
+
+def add_guidance(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    robot: RobotModel,
+    task: SpaceTask,
+    order: int,
+    ports: dict[str, OutputPort],
+) -> FixtureGuidance:
+    """Add what leads the tool.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        robot: The robot as it is believed.
+        task: Leading it through space.
+        order: Highest derivative of the reference that is needed.
+        ports: ``joint_state`` as measured; ``wrench_measured`` and ``tared``, or without a sensor
+            ``wrench_observed`` and ``ready``.
+
+    Raises:
+        InputError: If the rules do not suit the law.
+    """
+    period, record = scenario.controller.sampling_time, GuidanceRecord(len(task.fixtures))
+    system = builder.AddNamedSystem(
+        "fixture_guidance",
+        FixtureGuidance(
+            make_guidance(scenario, task),
+            robot,
+            order,
+            len(task.manifold.coordinates),
+            record,
+            period,
+        ),
+    )
+    wrench, ready = "wrench_measured", "tared"
+    if scenario.compliance.source == "observed":
+        wrench, ready = "wrench_observed", "ready"
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    builder.Connect(ports[wrench], system.GetInputPort("wrench"))
+    builder.Connect(ports[ready], system.GetInputPort("ready"))
+    return system
+
+
+def make_guidance(scenario: Scenario, task: SpaceTask) -> Guidance:
+    """Return the rules that lead a scenario's tool.
+
+    Args:
+        scenario: The scenario.
+        task: Leading it through space.
+
+    Raises:
+        InputError: If the rules do not suit the law.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    along, period = scenario.compliance.tangential, scenario.controller.sampling_time
+    admittance = Admittance(along.mass.value, along.damping.value, period)
+    regions = [fixture.region for fixture in task.fixtures]
+    nearby = ScheduledRegions(
+        regions,
+        parameters.guidance,
+        period,
+        speeds=task.region_speeds,
+        looks=parameters.looks or None,
+    )
+    lead = make_lead(scenario)
+    if parameters.guidance.rules == "printed":
+        if not isinstance(lead, ServoLead):
+            raise InputError(
+                f"fixtures.guidance.rules = printed: controller.law = {scenario.controller.law}; "
+                "must be velocity_servo, as in Sec. 5.2.4"
+            )
+        return PrintedGuidance(parameters.guidance.printed, admittance, lead, nearby)
+    stiffness = [fixture.stiffness for fixture in task.fixtures]
+    return ProgramGuidance(parameters.guidance, admittance, lead, nearby, stiffness)
+
+
+def make_lead(scenario: Scenario) -> Lead:
+    """Return what is between the velocity that is asked for and the tool.
+
+    Args:
+        scenario: The scenario.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    period, degree = scenario.controller.sampling_time, RELATIVE_DEGREE[scenario.controller.law]
+    if degree > 1:
+        return FilterLead(degree, parameters.smoothing, period)
+    lag = parameters.servo_lag if parameters.servo_lag >= 0.0 else 1.0 / scenario.servo.bandwidth
+    return ServoLead(lag, scenario.servo.bus_delay, period)

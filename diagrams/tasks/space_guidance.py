@@ -1,0 +1,153 @@
+"""Leading a tool through space by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
+
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from diagrams.drawing.region_drawing import SpaceDrawing
+from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require
+from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.tasks.fixtures import make_fixtures
+from diagrams.tasks.surface import followed_axis, given_quaternion, require_joints
+from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.physics.hand_model import Place
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+
+
+class SpaceTask(Task):
+    """A tool that moves where a hand leads it, and not into forbidden regions.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Attributes:
+        fixtures: The regions.
+
+    Raises:
+        InputError: If a region cannot be made, or the start is missing or forbidden.
+    """
+
+    place: SpaceManifold
+    manifold: SpaceManifold
+    shape = None
+
+    def __init__(
+        self, scenario: Scenario, folder: FilePath, progress: Progress | None = None
+    ) -> None:
+        self._scenario = scenario
+        parameters = scenario.fixtures or FixtureParameters()
+        _require_admittance(scenario)
+        said = parameters.orientation
+        self.place = SpaceManifold(
+            RELATIVE_DEGREE[scenario.controller.law],
+            given_quaternion(said),
+            tool_axis=followed_axis(said),
+        )
+        self.manifold = self.place
+        given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
+        require(bool(given), "start.position", given, allowed)
+        self._start = np.array(given, dtype=float)
+        require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
+        self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
+        self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
+
+    def require_joints(self, num_joints: int) -> None:
+        """See :class:`Task`."""
+        require_joints(self.manifold, num_joints)
+
+    def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.place.point(y_t.tolist())
+
+    @property
+    def drawing(self) -> SpaceDrawing:
+        """See :class:`Task`."""
+        return SpaceDrawing(self.fixtures, self.place)
+
+    def add_place(
+        self,
+        builder: DiagramBuilder,
+        tool_pose: OutputPort,
+        reference: OutputPort | None,
+        period: float,
+    ) -> PlaceFinder:
+        """See :class:`Task`."""
+        projector = builder.AddNamedSystem(
+            "tool_place",
+            ManifoldProjector(
+                self.place.layout,
+                lambda y_t, memory: self.place.point(y_t),
+                lambda y_t: y_t,
+                period,
+            ),
+        )
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+
+    def start(self, shift: np.ndarray) -> StartPoint:
+        """See :class:`Task`."""
+        y_t, R_e = self._start + shift, None
+        if self.place.is_oriented:
+            deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
+            quaternion = self.place.point(y_t)[self.place.layout.quaternion]
+            R_e = quaternion_to_matrix(quaternion) @ deviation
+        return StartPoint(ToolTarget(y_t, R_e, self.place.tool_axis), y_t)
+
+    def point(self, start: StartPoint) -> np.ndarray:
+        """See :class:`Task`."""
+        return self.place.point(start.target.y_t.tolist())
+
+    def way(self) -> Iterator[tuple[np.ndarray, str]]:
+        """See :class:`Task`; where the hand will lead it nobody knows."""
+        yield self._start, "start"
+
+    def target(self) -> Place:
+        """See :class:`Task`; coordinates are those of the world."""
+        return lambda coordinates, rates: (coordinates, rates)
+
+    @property
+    def region_speeds(self) -> list[float]:
+        """Of each region the largest speed near the tool [m/s]."""
+        return [fixture.largest_speed(self._start) for fixture in self.fixtures]
+
+    def distances(self, y_t: np.ndarray, clock: np.ndarray) -> np.ndarray:
+        """Return how far tool points are from each region [m], shape (samples, M).
+
+        Args:
+            y_t: Tool points [m], shape (samples, 3).
+            clock: Of moving regions at each sample [s], shape (samples,).
+        """
+        places = zip(y_t.tolist(), clock.tolist(), strict=True)
+        return np.array(
+            [[fixture.distance(place, time) for fixture in self.fixtures] for place, time in places]
+        ).reshape(len(y_t), len(self.fixtures))
+
+    def check_place(self, coordinates: np.ndarray, key: str) -> None:
+        """See :class:`Task`; all of space is there."""
+
+
+def _require_admittance(scenario: Scenario) -> None:
+    """Refuse a tool that a hand could not move.
+
+    Raises:
+        InputError: If so.
+    """
+    along = scenario.compliance.tangential
+    free = not along.stiffness.at and along.stiffness.value == 0.0
+    constant = not (along.mass.at or along.damping.at) and along.damping.value > 0.0
+    if not (free and constant):
+        raise InputError(
+            "compliance.tangential: controller.manifold = space needs a constant mass, a constant "
+            "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
+        )
