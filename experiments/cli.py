@@ -206,12 +206,14 @@ def study_command(
         typer.Argument(
             help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
             "all laws on robots that are not their models; tracking: path following against "
-            "trajectory tracking; identify_comau: from robots to their models and back."
+            "trajectory tracking; fixture_rules: printed rules of forbidden regions against the "
+            "program at an acute edge; identify_comau: from robots to their models and back."
         ),
     ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
 ) -> None:
     """Many runs on one page, on all cores: one minute (stiffness) to ten."""
+    from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
@@ -221,6 +223,7 @@ def study_command(
         "stiffness": write_study,
         "robustness": write_robustness,
         "tracking": write_tracking,
+        "fixture_rules": write_fixture_rules,
         IDENTIFICATION: write_identification,
     }
     if name not in studies:

@@ -126,9 +126,12 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     shape = settings.path.shape
     if isinstance(shape, Waypoints) or (isinstance(shape, OnSurface) and shape.file):
         shape.file = str((folder / shape.file).resolve())
-    if settings.surface and isinstance(settings.surface.shape, Fitted | Revolved | Extruded):
-        described = settings.surface.shape
-        described.file = str((folder / described.file).resolve())
+    described: list[object] = [settings.surface.shape] if settings.surface else []
+    if settings.fixtures:
+        described += [region.shape for region in settings.fixtures.regions]
+    for surface in described:
+        if isinstance(surface, Fitted | Revolved | Extruded):
+            surface.file = str((folder / surface.file).resolve())
     for block in (settings.robot, settings.controller):
         if Path(block.model).suffix and not block.model.startswith("package://"):
             block.model = str((folder / block.model).resolve())

@@ -12,11 +12,14 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.scenario import Scenario
 from diagrams.wording import posture_text
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun, prepare
 from experiments.results.friction_metrics import friction_metrics
+from experiments.results.guidance_audit import Promise, audit
+from experiments.results.guidance_metrics import guidance_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import lap_length
 from experiments.results.path_metrics import path_following_metrics
@@ -205,6 +208,8 @@ def _measure(
         log, settings.settling_tolerance, settings.reference.dwell, _MOVING
     )
     metrics.update(press_metrics(log))
+    metrics.update(guidance_metrics(log))
+    metrics.update(_guidance_audit(log, settings))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)
@@ -223,6 +228,20 @@ def _measure(
     results.write("metrics.json", metrics.to_json())
     warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
     return _Measured(log, motion, metrics, warnings, result.fault, end)
+
+
+def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
+    """Check what was promised of forbidden regions, if there were any."""
+    fixtures, along = settings.fixtures, settings.compliance.tangential
+    if fixtures is None or fixtures.guidance.rules != "program" or "near_regions" not in log:
+        return Metrics()
+    guidance = fixtures.guidance
+    return audit(
+        log,
+        Promise(
+            along.mass.value, along.damping.value, guidance.largest_speed, guidance.tank.capacity
+        ),
+    )
 
 
 def _sensor_warnings(log: RunLog) -> list[str]:

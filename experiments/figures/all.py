@@ -19,6 +19,14 @@ from experiments.figures.drives import (
 )
 from experiments.figures.forces import draw_forces, has_forces
 from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
+from experiments.figures.guidance import (
+    draw_contact,
+    draw_energy,
+    draw_guidance,
+    gives_energy,
+    has_contact,
+    has_regions,
+)
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
 from experiments.figures.polish import draw_force_map, draw_pressing
@@ -34,6 +42,8 @@ from experiments.figures.surface_fit import draw_surface_fit
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals
 from reporting.style import STYLE, Drawing, Figure, render
+
+_SPACE = 3  # tangential coordinates of a tool that is led freely
 
 
 def render_figures(
@@ -76,9 +86,17 @@ def _has(*signals: str) -> Callable[[RunLog], bool]:
     return lambda log: all(signal in log for signal in signals)
 
 
+def _is_along(log: RunLog) -> bool:
+    """Whether there is a path or a surface to go along."""
+    return "eta" in log and log["eta"].values.shape[1] < _SPACE
+
+
 # In the order of the report: when a figure can be drawn, and what draws it.
 _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
-    (_has("eta"), draw_progress),
+    (_is_along, draw_progress),
+    (has_regions, draw_guidance),
+    (has_contact, draw_contact),
+    (gives_energy, draw_energy),
     (_has("xi"), draw_transversal),
     (_has("phi"), draw_orientation),
     (_has("angles_e", "angles_d"), draw_angles),

@@ -5,6 +5,7 @@ from pydrake.systems.framework import Context
 
 from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
 from diagrams.station import Station
+from experiments.results.guidance_signals import region_times
 from experiments.results.run_log import FloatArray, RunLog
 
 # of the tool's way over what it presses on, where it would be hidden [m]
@@ -44,9 +45,10 @@ def collect_motion(
         points,
         log["elbow"].values[frames] if "elbow" in log else None,
         pushes,
-        _distance(log.time[frames], log["xi"].values[frames], start),
+        _distance(log.time[frames], log["xi"].values[frames], start) if "xi" in log else None,
         log["wrench_ext"].values[frames, :3] if "wrench_ext" in log else None,
         _lifted(station, log["y_t"].values[frames], points),
+        region_times(log, station)[frames] if "region_clock" in log else None,
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
+from experiments.results.guidance_signals import add_guidance
 from experiments.results.link_signals import add_link_signals
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
@@ -61,6 +62,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_posture(log, station, raw, _joint_units(station)[0])
     _add_forces(log, station, raw)
     add_pressing(log, station, raw, points)
+    add_guidance(log, station, raw, pose[:, :3])
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():

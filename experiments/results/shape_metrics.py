@@ -8,7 +8,9 @@ from pfsc_drake.geometry.surfaces.residuals import Residuals
 from reporting.metrics import Metrics
 
 
-def shape_metrics(shape: ShapeReport | SurfaceReport, fit: Residuals | None = None) -> Metrics:
+def shape_metrics(
+    shape: ShapeReport | SurfaceReport | None, fit: Residuals | None = None
+) -> Metrics:
     """Return the numbers of a path's or a surface's shape that exist, in SI units.
 
     Args:
@@ -25,6 +27,8 @@ def shape_metrics(shape: ShapeReport | SurfaceReport, fit: Residuals | None = No
         if fit is not None:
             metrics.add("surface_fit_rms", fit.rms, "m")
             metrics.add("surface_fit_max", fit.largest, "m")
+        return metrics
+    if shape is None:
         return metrics
     metrics.add("path_length", shape.length, "m")
     if math.isfinite(shape.smallest_radius):

@@ -3,6 +3,7 @@
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.results.friction_metrics import friction_metric_names
+from experiments.results.guidance_metrics import guidance_metric_names
 from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import is_redundant
 from experiments.results.path_metrics import metric_names
@@ -39,6 +40,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
         known = [
             *metric_names(station.robot.dimension, signals | other),
             *press_metric_names(signals),
+            *guidance_metric_names(station),
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape, station.task.fit),
             *JointLimits.of(station.robot).metric_names(),
