@@ -1,0 +1,147 @@
+"""The audit of guidance: what it passes, and that it sees what is wrong."""
+
+import math
+
+import numpy as np
+import pytest
+
+from experiments.results.guidance_audit import AUDITED, Promise, audit
+from experiments.results.run_log import RunLog
+from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from tests.control.fixtures.point_robot import (
+    DAMPING,
+    DELAY,
+    LAG,
+    MASS,
+    PERIOD,
+    ball,
+    half_space,
+    lead,
+    program,
+)
+
+PROMISE = Promise(MASS, DAMPING, 2.0, 1.0)
+FLOOR = half_space((0, 0, 0), (0, 0, 1), speed=0.02)
+REGIONS = [FLOOR, half_space((0, 0, 0.06), (0, 0, -1)), ball((0.0, 0.0, 0.03), 0.01)]
+
+
+def column(log, key):
+    return np.arange(MOST_NEAR) * len(SLOT) + SLOT.index(key)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """A second between a floor that rises, a soft ceiling and a ball."""
+    guidance = program(REGIONS, [math.inf, 2e3, math.inf])
+
+    def hand(t, y):
+        return np.array([-12.0, 0.0, 25.0 if t < 0.5 else -25.0])
+
+    record = lead(guidance, (0.03, 0, 0.04), hand, 1.0)
+    layout = GuidanceRecord(len(REGIONS))
+    pairs = zip(record.steps, record.force, strict=True)
+    values = np.array([layout.row(step, force) for step, force in pairs])
+    return np.array(record.y), values, layout
+
+
+def make_log(rows):
+    y_t, values, layout = rows
+    log = RunLog(PERIOD * np.arange(len(values)))
+    part = {name: values[:, rows].copy() for name, rows in layout.fields.items()}
+    log.add("velocity_command", part["velocity"], "m/s")
+    log.add("guiding_force", part["force"], "N")
+    log.add("rest_point", part["point"], "m")
+    log.add("near_regions", part["near"], "")
+    log.add("tank", part["tank"], "J")
+    log.add("y_t", y_t.copy(), "m")
+    clock = part["clock"][:, 0] - LAG - DELAY
+    pairs = zip(y_t, clock, strict=True)
+    distances = [[region(y, time)[0] for region in REGIONS] for y, time in pairs]
+    log.add("region_distance", np.array(distances), "m")
+    return log
+
+
+def worst(log):
+    return {name: metric.value for name, metric in audit(log, PROMISE).items()}
+
+
+def test_what_is_kept_passes(rows):
+    found = worst(make_log(rows))
+    assert list(found) == list(AUDITED)
+    for name in ("stationarity", "allowance", "energy", "tank"):
+        assert found[f"audit_{name}"] < 1e-9
+    assert found["audit_bound"] > 0.0
+    assert found["audit_missed"] == 0.0
+    # and there was something to check
+    slots = rows[1][:, rows[2].fields["near"]].reshape(len(rows[1]), -1, len(SLOT))
+    phi, soft = slots[..., SLOT.index("phi")], slots[..., SLOT.index("stiffness")] > 0.0
+    assert (phi * soft).max() > 1.0
+    assert (phi * ~soft).max() > 1.0
+    assert np.abs(slots[..., SLOT.index("u")]).max() > 0.01
+
+
+def tamper_velocity(log):
+    log["velocity_command"].values[500] += [0.0, 0.0, 1e-3]
+
+
+def tamper_force_of_a_region(log):
+    phi = log["near_regions"].values[:, column(log, "phi")]
+    tick, slot = np.argwhere(phi > 1.0)[0]
+    log["near_regions"].values[tick, column(log, "phi")[slot]] += 5.0
+
+
+def tamper_allowance(log):
+    values = log["near_regions"].values
+    held = (values[:, column(log, "phi")] > 1.0) & (values[:, column(log, "stiffness")] == 0.0)
+    tick, slot = np.argwhere(held)[0]
+    values[tick, column(log, "beta")[slot]] -= 1e-3
+
+
+def tamper_energy(log):
+    """A step that speeds up by itself."""
+    log["velocity_command"].values[500] *= 1.5
+
+
+def tamper_tank(log):
+    log["tank"].values[300:] += 1e-3
+
+
+def tamper_bound(log):
+    log["guiding_force"].values[:] = -80.0 * log["velocity_command"].values
+
+
+def tamper_sight(log):
+    """A region that was on the tool is not in the list."""
+    values = log["near_regions"].values
+    tick, slot = np.argwhere(values[:, column(log, "phi")] > 1.0)[-1]
+    values[tick, column(log, "index")[slot]] = -1.0
+
+
+@pytest.mark.parametrize(
+    ("tamper", "name", "least"),
+    [
+        (tamper_velocity, "stationarity", 5e-4),
+        (tamper_force_of_a_region, "stationarity", 1e-4),
+        (tamper_allowance, "allowance", 5e-4),
+        (tamper_energy, "energy", 1e-6),
+        (tamper_tank, "tank", 5e-4),
+        (tamper_sight, "missed", 0.5),
+    ],
+)
+def test_what_is_broken_is_seen(rows, tamper, name, least):
+    log = make_log(rows)
+    tamper(log)
+    assert worst(log)[f"audit_{name}"] > least
+
+
+def test_a_hand_that_gained_more_than_the_tank_is_seen(rows):
+    log = make_log(rows)
+    tamper_bound(log)
+    assert worst(log)["audit_bound"] < 0.0
+
+
+def test_a_run_without_ticks_has_no_audit(rows):
+    log = make_log(rows)
+    log["velocity_command"].values[:] = np.nan
+    assert worst(log) == {}
