@@ -10,7 +10,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
-from diagrams.scenario import OnSurface, Scenario, Waypoints
+from diagrams.scenario import Intersection, OnSurface, Scenario, Waypoints
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
@@ -129,6 +129,8 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     described: list[object] = [settings.surface.shape] if settings.surface else []
     if settings.fixtures:
         described += [region.shape for region in settings.fixtures.regions]
+    if isinstance(shape, Intersection):
+        described += shape.surfaces
     for surface in described:
         if isinstance(surface, Fitted | Revolved | Extruded):
             surface.file = str((folder / surface.file).resolve())

@@ -10,6 +10,7 @@ from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import (
     BentLemniscate,
     Circle,
+    Intersection,
     Keyframe,
     Line,
     OnSurface,
@@ -40,6 +41,7 @@ __all__ = [
     "HandParameters",
     "HandWaypoint",
     "HoldBackParameters",
+    "Intersection",
     "JointFrictionParameters",
     "Keyframe",
     "LawGains",

@@ -24,6 +24,8 @@ class GainParameters:
             names what was chosen.
         bandwidth: Magnitude of the slow poles [1/s] that ``auto`` chooses.
         bears: Relative error of masses and joint stiffnesses that poles chosen by ``auto`` bear.
+        free: Whether only its velocity is held, so that a hand leads it wherever it likes; then
+            there are r - 1 poles, or the coefficients ``a_2 .. a_r``. For ``eta`` and ``phi``.
         coefficients: ``a_1 .. a_r``, alternatively.
         integral: ``a_0``; needs coefficients.
         integral_pole: With poles, one more pole [1/s] and with it an integral part, which takes
@@ -36,6 +38,7 @@ class GainParameters:
     integral_pole: float = 0.0
     bandwidth: float = 0.0
     bears: float = 0.05
+    free: bool = False
 
     def __post_init__(self) -> None:
         require_not_negative("bandwidth", self.bandwidth)
@@ -44,6 +47,13 @@ class GainParameters:
         alone = self.integral_pole != 0.0 and bool(self.coefficients)
         require(not alone, "integral_pole", self.integral_pole, "0 with coefficients; see integral")
         require(0.0 <= self.bears <= 0.5, "bears", self.bears, "a fraction from 0 to 0.5")
+        held = self.bandwidth or self.integral or self.integral_pole
+        require(
+            not (self.free and held),
+            "free",
+            self.free,
+            "false with bandwidth, integral or integral_pole, which hold a position",
+        )
         require(
             not (self.bandwidth and self.coefficients),
             "bandwidth",
@@ -88,6 +98,9 @@ class LawGains:
     def __post_init__(self) -> None:
         integral = self.posture.integral or self.posture.integral_pole
         require(integral == 0.0, "posture", integral, "gains without an integral part")
+        for key in ("xi", "posture"):
+            free = getattr(self, key).free
+            require(not free, f"{key}.free", free, "false; eta and phi may be free")
 
 
 @dc.dataclass

@@ -7,6 +7,7 @@ from typing import Union
 import numpy as np
 
 from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
+from diagrams.scenario.surface import SurfaceShape
 from pfsc_drake.geometry.rotation import rotation_to_axis
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 
@@ -152,9 +153,36 @@ class OnSurface:
         require(good, "max_distance", self.max_distance, f"a positive number up to {FARTHEST:g} m")
 
 
+@dc.dataclass
+class Intersection:
+    """The edge in which two surfaces meet, along the cross product of their normals.
+
+    Attributes:
+        surfaces: Both, as ``surface.shape``; the edge ends where one of them does.
+        near: A point [m]: of several edges the nearest is meant, and a closed one begins there;
+            empty if there is only one.
+        tolerance: How far a spline may be from the edge, 1e-9 or more [m]. Lines, circles and
+            ellipses are exact.
+    """
+
+    surfaces: list[SurfaceShape] = dc.field(default_factory=list)
+    near: list[float] = dc.field(default_factory=list)
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        count = len(self.surfaces)
+        require(
+            count in (0, 2), "surfaces", f"{count} given", "2, e.g. [!Plane {..}, !Sphere {..}]"
+        )
+        if self.near:
+            _require_place("near", self.near)
+        good = 1e-9 <= self.tolerance <= FARTHEST
+        require(good, "tolerance", self.tolerance, f"1e-09 m to {FARTHEST:g} m")
+
+
 # the first is what a shape without a tag means
 PathShape = Union[  # noqa: UP007 (Drake's YAML needs it)
-    Waypoints, BentLemniscate, Circle, Line, OnSurface
+    Waypoints, BentLemniscate, Circle, Line, OnSurface, Intersection
 ]
 
 
@@ -214,7 +242,7 @@ class PathParameters:
 
     Attributes:
         shape: Position, one of ``!BentLemniscate``, ``!Circle``, ``!Line``, ``!Waypoints``,
-            ``!OnSurface``.
+            ``!OnSurface``, ``!Intersection``.
         orientation: Orientation; without keyframes the waypoint file's, or none.
     """
 

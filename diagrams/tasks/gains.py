@@ -37,15 +37,23 @@ def gains_of(
         InputError: If there are more or fewer than r, or they do not make the error vanish.
     """
     key = f"controller.gains.{law}.{name}"
+    needed = relative_degree - parameters.free
+    if parameters.free and not needed:
+        raise InputError(
+            f"{key}.free = true with the law '{law}', whose servos hold every joint; must be false"
+        )
     if parameters.poles:
         gains = gains_from_poles(parameters.poles, parameters.integral_pole)
-    elif len(parameters.coefficients) == relative_degree:
+    elif len(parameters.coefficients) == needed:
         gains = CoordinateGains(tuple(parameters.coefficients), parameters.integral)
     else:
+        otherwise = "" if parameters.free else ", or poles: auto with a bandwidth (1/s)"
         raise InputError(
             f"{key}: {len(parameters.coefficients)} coefficients and no poles; "
-            f"the law needs {relative_degree} of either, or poles: auto with a bandwidth (1/s)"
+            f"the law needs {needed} of either{otherwise}"
         )
+    if parameters.free:
+        gains = CoordinateGains((0.0, *gains.proportional), is_free=True)
     check_gains(gains, relative_degree, key)
     return gains
 
@@ -59,10 +67,16 @@ def loop_gains(by_kind: LawGains, law: str, linearization: Linearization) -> Loo
         linearization: The law.
 
     Raises:
-        InputError: See :func:`gains_of`.
+        InputError: See :func:`gains_of`; or a coordinate is free that follows a moving point.
     """
     r = linearization.relative_degree
     names = [coordinate.kind.value for coordinate in linearization.manifold.coordinates]
+    free = [kind for kind in dict.fromkeys(names) if getattr(by_kind, kind).free]
+    if free and linearization.manifold.follows_time:
+        raise InputError(
+            f"controller.gains.{law}.{free[0]}.free = true: must be false with controller.manifold "
+            "= trajectory, whose reference is a point that moves"
+        )
     outputs = Stabilization([gains_of(getattr(by_kind, k), r, law, k) for k in names], r, names)
     if not linearization.is_redundant:
         return LoopGains(outputs)

@@ -1,10 +1,16 @@
 """What a law will not do well on a robot."""
 
+import casadi as ca
 import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.gains import sampled_robot
 from diagrams.tasks.posture import warn_unused
+from pfsc_drake.control.compliance.impedance import Profile
+from pfsc_drake.control.compliance.observed_inertia import (
+    bearable_inertia_error,
+    bearable_mass_error,
+)
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError
@@ -53,6 +59,7 @@ def law_warnings(
         *(causes or _fragile_gains(parameters, robot, law, rest)),
         *_fast_servo(scenario, robot, link_state),
         *_unknown_forces(scenario, robot),
+        *_observed_forces(scenario, robot, law, rest),
         *_friction_behind_servos(parameters),
         *warn_unused(parameters, law),
     ]
@@ -150,11 +157,13 @@ def _soft_joints(
 
 
 def _transversal_gains(law: FollowingLaw) -> np.ndarray:
-    """Return the gains of a law, as if tangential coordinates had those of transversal ones."""
+    """Return the gains of a law, as if tangential and free coordinates had transversal ones."""
     coordinates = law.linearization.manifold.coordinates
     along, across = (indices(coordinates, k) for k in (Kind.TANGENTIAL, Kind.TRANSVERSAL))
     gains = law.stabilization.proportional.copy()
-    gains[:, along] = gains[:, across.start : across.start + 1]
+    own = gains[:, across.start : across.start + 1]
+    gains[:, along] = own
+    gains[:, law.stabilization.is_free] = own
     return gains
 
 
@@ -183,6 +192,45 @@ def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
         "controller.friction is not used: the servos of the law 'velocity_servo' overcome friction "
         "themselves"
     ]
+
+
+def _observed_forces(
+    scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+) -> list[str]:
+    """Warn of a compliance that takes what wrong masses do not need for forces."""
+    compliance, linearization = scenario.compliance, law.linearization
+    if compliance.source != "observed" or not compliance.is_given:
+        return []
+    n, rate, impedance = robot.dimension, compliance.observed.rate, compliance.impedance()
+    state = np.concatenate([rest.q_J, np.zeros(n), rest.q_J, np.zeros(n)])
+    no_torque = np.zeros(n * (linearization.relative_degree - 1))
+    A = np.array(linearization.function(state, no_torque, rest.point)[1])
+    kinds = [impedance.of(coordinate.kind) for coordinate in linearization.manifold.coordinates]
+    bearable = np.array(
+        [
+            bearable_inertia_error(
+                _least(kind.mass), _least(kind.damping), _most(kind.stiffness), rate
+            )
+            for kind in kinds
+        ]
+    )
+    inertia = ca.evalf(robot.mass_matrix(ca.SX(rest.q_J))).full()
+    borne = bearable_mass_error(inertia, A, bearable)
+    if borne >= _BORNE_ERROR:
+        return []
+    return [
+        f"compliance.source = observed bears masses believed {100.0 * borne:.1f} % too high at the "
+        f"start, not {100.0 * _BORNE_ERROR:g} %: larger masses or damping in compliance, or "
+        "a slower compliance.observed.rate"
+    ]
+
+
+def _least(profile: Profile) -> float:
+    return min(profile.values, default=profile.value)
+
+
+def _most(profile: Profile) -> float:
+    return max(profile.values, default=profile.value)
 
 
 def _unknown_forces(scenario: Scenario, robot: RobotModel) -> list[str]:

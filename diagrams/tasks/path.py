@@ -9,12 +9,14 @@ import numpy as np
 from diagrams.scenario import (
     BentLemniscate,
     Circle,
+    Intersection,
     Line,
     OnSurface,
     OrientationParameters,
     PathParameters,
     Waypoints,
 )
+from diagrams.tasks.path_along_edge import make_edge
 from diagrams.tasks.path_warnings import far_waypoints
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
@@ -62,7 +64,10 @@ def make_path(
         path = _through_waypoints(parameters, shape, smoothness, folder, progress)
     else:
         assert not isinstance(shape, OnSurface)
-        position = _position(shape)
+        if isinstance(shape, Intersection):
+            position = make_edge(shape, law, folder, progress)
+        else:
+            position = _position(shape)
         path = Path(position, _orientation(parameters.orientation, position, smoothness))
     task = parameters.orientation.task
     if task == "none" and path.orientation is not None:

@@ -227,8 +227,10 @@ def path_following_metrics(
     if "phi" in log:
         error = max_orientation_error_after(log, converged_after)
         metrics.add("max_orientation_error", error, "rad")
-    if "eta" in log and "eta_p" in log:
-        metrics.add("max_tangential_error", tangential_error(log), "m")
+    if "eta" in log:
+        # what a hand leads freely has no reference
+        error = tangential_error(log) if "eta_p" in log else math.nan
+        metrics.add("max_tangential_error", error, "m")
     if "eta_dot" in log:
         metrics.add("peak_speed", peak_speed(log), "m/s")
     if "tau_d" in log:

@@ -162,7 +162,8 @@ def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: 
     for kind, part, labels in _kinds(station):
         name = kind.value
         log.add(name, Y[:, 0, part], kind.unit, labels)
-        log.add(f"{name}_p", Y_p[:, 0, part], kind.unit, [f"{x}_p" for x in labels])
+        if not station.law.stabilization.is_free[part].any():
+            log.add(f"{name}_p", Y_p[:, 0, part], kind.unit, [f"{x}_p" for x in labels])
         if linearization.relative_degree > 1:
             rates = [f"{x}_dot" for x in labels]
             log.add(f"{name}_dot", Y[:, 1, part], f"{kind.unit}/s", rates)

@@ -9,6 +9,8 @@ from pfsc_drake.geometry.curves.orientation import OrientationCurve, interpolate
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.smoothing import noise_level
 from pfsc_drake.geometry.curves.spline import interpolate
+from pfsc_drake.geometry.intersections.corner import find_corners
+from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
@@ -67,6 +69,7 @@ from pfsc_drake.geometry.surfaces.surface import Surface
 __all__ = [
     "ArcLength",
     "Curve",
+    "Edge",
     "FourierCurve",
     "FundamentalForms",
     "GlobalProjector",
@@ -99,6 +102,9 @@ __all__ = [
     "cone",
     "cylinder",
     "extruded_surface",
+    "find_corners",
+    "find_edge",
+    "find_edges",
     "fit_scattered",
     "fundamental_forms",
     "interpolate",

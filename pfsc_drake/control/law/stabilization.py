@@ -17,18 +17,24 @@ class CoordinateGains:
     ``s^r + a_r s^(r-1) + ... + a_1`` (times s, plus ``a_0``, with an integral part),
     see (3.34), (3.61), (3.67), (3.86).
 
+    A free coordinate is held nowhere: ``a_1`` is zero, and the error of its velocity obeys
+    ``s^(r-1) + a_r s^(r-2) + ... + a_2``. So a hand leads a tool along a path on a robot that can
+    be moved at its links, without a sensor (Tab. 5.2).
+
     Attributes:
         proportional: ``a_1 .. a_r`` in the dissertation's order, 1/s^r .. 1/s.
         integral: ``a_0`` [1/s^(r+1)]; 0 for none.
+        is_free: Whether ``a_1`` is zero on purpose.
     """
 
     proportional: tuple[float, ...]
     integral: float = 0.0
+    is_free: bool = False
 
     @property
     def polynomial(self) -> np.ndarray:
-        """Characteristic polynomial, highest power first."""
-        tail = [*self.proportional[::-1]]
+        """Characteristic polynomial, highest power first; of a free coordinate, the velocity's."""
+        tail = [*self.proportional[: 0 if self.is_free else None : -1]]
         return np.array([1.0, *tail, self.integral] if self.integral else [1.0, *tail])
 
     @property
@@ -71,8 +77,14 @@ def check_gains(gains: CoordinateGains, relative_degree: int, name: str) -> None
         name: What they belong to, for the message.
 
     Raises:
-        InputError: If their number is not r, or the polynomial is not Hurwitz.
+        InputError: If their number is not r, the polynomial is not Hurwitz, or a free coordinate
+            has an ``a_1``, an integral part or no other gain.
     """
+    if gains.is_free and (relative_degree < 2 or gains.integral or gains.proportional[0]):
+        raise InputError(
+            f"{name}: free with a_0 = {gains.integral:g} and gains {list(gains.proportional)}; a "
+            "free coordinate has no a_0, a_1 = 0, and a law of relative degree 2 or more"
+        )
     if len(gains.proportional) != relative_degree:
         raise InputError(
             f"{name}: {len(gains.proportional)} gains given; "
@@ -110,6 +122,7 @@ class Stabilization:
         # row k holds a_{k+1} of all coordinates
         self.proportional = np.array([g.proportional for g in gains]).T
         self.integral = np.array([g.integral for g in gains])
+        self.is_free = np.array([g.is_free for g in gains])
         self.has_integral_part = bool(np.any(self.integral))
 
     def virtual_input(self, Y: Sequence, reference: Sequence, integral: Any) -> Any:

@@ -115,3 +115,30 @@ def test_an_integral_part_has_a_pole_of_its_own():
     assert len(gains.proportional) == 4
     np.testing.assert_allclose(np.sort(gains.poles.real), [-350, -250, -60, -60, -15], rtol=1e-5)
     assert gains_from_poles([-60, -250]).integral == 0.0
+
+
+def test_a_free_coordinate_keeps_its_place_and_loses_its_velocity():
+    """With r = 3 the velocity obeys s^2 + 5 s + 6, from any position."""
+    gains = CoordinateGains((0.0, 6.0, 5.0), is_free=True)
+    check_gains(gains, 3, "eta")
+    assert sorted(gains.poles) == pytest.approx([-3.0, -2.0])
+    law = Stabilization([gains], 3, ["eta"])
+    v = law.virtual_input(
+        [np.array([0.7]), np.array([0.1]), np.array([0.2])], [np.zeros(1)] * 4, np.zeros(1)
+    )
+    assert v == pytest.approx([-6.0 * 0.1 - 5.0 * 0.2])
+
+
+@pytest.mark.parametrize(
+    ("gains", "degree", "part"),
+    [
+        (CoordinateGains((0.0, 3.0), 1.0, is_free=True), 2, "a_0 = 1"),
+        (CoordinateGains((2.0, 3.0), is_free=True), 2, "a_1 = 0"),
+        (CoordinateGains((0.0,), is_free=True), 1, "relative degree 2 or more"),
+        (CoordinateGains((0.0, 0.0), is_free=True), 2, "not Hurwitz"),
+        (CoordinateGains((0.0, -1.0), is_free=True), 2, "not Hurwitz"),
+    ],
+)
+def test_free_gains_that_do_not_suit_are_refused(gains, degree, part):
+    with pytest.raises(InputError, match=part):
+        check_gains(gains, degree, "eta")

@@ -86,6 +86,10 @@ def test_limits_are_those_of_the_model_scaled(load_arm):
             ("controller.gains.rigid.xi", "1 gains", "needs 2"),
         ),
         (
+            controller("velocity_servo", GainParameters(free=True), by_poles(-1)),
+            ("controller.gains.velocity_servo.eta.free = true", "servos hold every joint"),
+        ),
+        (
             controller("rigid", by_poles(-1, 0), by_poles(-1, -1)),
             ("controller.gains.rigid.eta", "not Hurwitz"),
         ),

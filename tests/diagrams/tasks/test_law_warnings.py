@@ -175,3 +175,29 @@ def test_poles_are_not_chosen_without_a_bandwidth(scenario):
 def test_refused_ways_to_choose_poles(wrong, key):
     with pytest.raises(InputError, match=key):
         GainParameters(**wrong)
+
+
+def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
+    """From 3.5 % (still) to 4 % (swings at 13 Hz) on, simulated with all masses too high."""
+    scenario = load_file(Scenario, SCENARIOS / "vf_soft_circle.yaml")
+    scenario.friction, scenario.controller.friction.source = type(scenario.friction)(), "none"
+    scenario.model_error = type(scenario.model_error)()
+    assert warnings(scenario) == []
+    scenario.compliance.source = "observed"
+    (warning,) = warnings(scenario)
+    assert "bears masses believed 3.9 % too high" in warning
+    scenario.compliance.observed.rate = 20.0
+    assert warnings(scenario) == []
+
+
+def test_free_angles_make_no_loop_unstable():
+    scenario = load_file(Scenario, SCENARIOS / "pfc_comau_6r.yaml")
+    gains = scenario.controller.gains["singular_perturbation"]
+    gains.phi = GainParameters(free=True, poles=[-10.0])
+    assert warnings(scenario) == []
+
+
+def test_only_what_leads_along_may_be_free():
+    for key in ("xi", "posture"):
+        with pytest.raises(InputError, match=f"{key}.free = True; allowed: false"):
+            LawGains(**{key: GainParameters(free=True, coefficients=[3.0])})

@@ -123,10 +123,18 @@ def test_boundary_layer_damping(refused, mine, damping):
         ("{}", ("controller.gains.elastic.eta", "needs 4")),
         ("{poles: [-1, -1, -1, -1], integral: 1}", ("poles", "either")),
         ("{poles: [-50, -50, -50, -.inf]}", ("eta", "finite")),
+        ("{free: true, coefficients: [3]}", ("elastic.eta", "1 coefficients", "needs 3")),
+        ("{free: true, coefficients: [6, 11, -6]}", ("elastic.eta", "not Hurwitz")),
+        ("{free: true, poles: [-3, -4, -5], integral_pole: -1}", ("free", "integral_pole")),
     ],
 )
 def test_gains(refused, mine, gains, parts):
     refused(mine(), *parts, changes=[f"controller.gains.elastic.eta={gains}"])
+
+
+def test_nothing_that_follows_a_moving_point_is_free(refused):
+    gains = "controller.gains.singular_perturbation.eta={free: true, poles: [-5]}"
+    refused("ttc_comau_6r", "eta.free = true", "trajectory", changes=[gains])
 
 
 def test_no_gains_for_the_law(refused, mine):

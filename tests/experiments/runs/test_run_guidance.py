@@ -57,3 +57,19 @@ def test_a_surface_has_no_second_coordinate_to_swing(tmp_path, capsys):
     arguments = ["run", "sfc_comau_paraboloid", "--out", str(tmp_path), "--set", change]
     assert main(arguments) == 2
     assert "reference.swings[0]: coordinate = 2; there is 1" in capsys.readouterr().err
+
+
+def test_the_hand_leads_the_tool_along_an_edge(tmp_path):
+    """True place of the tool against the equations of paraboloid and cylinder."""
+    places = "{time: 0.3, position: [0, 0, 0]}, {time: 1.2, position: [0.15, 0.05, 0]}"
+    log = run(tmp_path, "vf_edge", 1.4, f"hand.waypoints=[{places}]")
+    y_t = log["y_t"][300:]
+    x, axis = y_t - [0.85, 0.0, 0.75], np.array([0.3, 0.1, 1.0]) / np.sqrt(1.1)
+    slope = 8.0 * np.linalg.norm(x[:, :2], axis=1)
+    from_paraboloid = (x[:, 2] - 4.0 * (x[:, :2] ** 2).sum(axis=1)) / np.hypot(1.0, slope)
+    x = y_t - [0.87, 0.02, 0.85]
+    from_cylinder = np.linalg.norm(x - np.outer(x @ axis, axis), axis=1) - 0.15
+    assert np.abs(from_paraboloid).max() < 0.4e-3
+    assert np.abs(from_cylinder).max() < 0.4e-3
+    assert log["eta"][-1] > 0.08
+    assert np.abs(log["manifold_force"][:, 1:3]).max() > 10.0

@@ -1,0 +1,1 @@
+"""Edges, where two surfaces meet, and corners, where three do."""

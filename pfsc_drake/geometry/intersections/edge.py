@@ -1,0 +1,244 @@
+"""Edges: the curves in which two surfaces meet."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.spline import interpolate
+from pfsc_drake.geometry.intersections.conic import line_or_ellipse
+from pfsc_drake.geometry.intersections.meeting import SAME, Meeting, numbers
+from pfsc_drake.geometry.intersections.search import starts
+from pfsc_drake.geometry.intersections.touching import require_crossing
+from pfsc_drake.geometry.intersections.trace import Trace, Tracer
+from pfsc_drake.geometry.surfaces.surface import Surface
+
+TOLERANCE = 1e-6
+_LEAST_TOLERANCE = 1e-9
+# Where within each piece of a spline it is looked how far from the edge it is.
+_CHECKS = np.linspace(0.05, 0.95, 8)
+# Of the tolerance: what may be seen there, so that it holds in between, too.
+_KEPT = 0.35
+_MOST_REFINEMENTS, _MOST_NODES = 16, 20_000
+# Of the size: how far from a place of an edge one that is nearer to a point may be.
+_AROUND = 0.05
+
+
+class Edge(NamedTuple):
+    """A curve in which two surfaces meet.
+
+    Attributes:
+        curve: Along ``n_1 x n_2``; a line, a circle or an ellipse where it is one, else a spline.
+        theta: Parameters of both surfaces at nodes along it, not wrapped, [n, 4].
+        deviation: How far the curve is from the edge, m.
+    """
+
+    curve: Curve
+    theta: np.ndarray
+    deviation: float
+
+
+def find_edges(
+    first: Surface, second: Surface, *, smoothness: int, tolerance: float = TOLERANCE
+) -> list[Edge]:
+    """All edges of two surfaces, the one of most nodes first.
+
+    What is smaller than the samples of :func:`sample_grid` may be overlooked.
+
+    Args:
+        first: Surface of class C^2; all edges are cut where it or the other one ends.
+        second: The other.
+        smoothness: k of the class C^k of splines, 2..6.
+        tolerance: Largest deviation of a spline, m.
+
+    Raises:
+        InputError: They do not meet, coincide, or touch somewhere instead of crossing; says where.
+    """
+    meeting, tolerance = Meeting([first, second]), _checked(tolerance)
+    theta = _places(meeting)
+    require_crossing(meeting, theta)
+    tracer, edges = Tracer(meeting), []
+    while len(theta):
+        trace = tracer.trace(theta[0])
+        edges.append(_fitted(meeting, trace, smoothness, tolerance))
+        theta = theta[1:][~_on_trace(meeting, trace, theta[1:])]
+    return sorted(edges, key=lambda edge: -len(edge.theta))
+
+
+def find_edge(
+    first: Surface,
+    second: Surface,
+    *,
+    near: ArrayLike,
+    smoothness: int,
+    tolerance: float = TOLERANCE,
+) -> Edge:
+    """The edge of two surfaces that is nearest to a point; a closed one begins there.
+
+    Args:
+        first: As for :func:`find_edges`.
+        second: Likewise.
+        near: The point, [3], m.
+        smoothness: As for :func:`find_edges`.
+        tolerance: Likewise.
+
+    Raises:
+        InputError: As for :func:`find_edges`; only this edge counts.
+    """
+    point, meeting, tolerance = (
+        np.asarray(near, float),
+        Meeting([first, second]),
+        _checked(tolerance),
+    )
+    if point.shape != (3,) or not np.all(np.isfinite(point)):
+        raise InputError(f"near: {point.tolist()}; 3 finite numbers, in m, are required")
+    theta = _places(meeting)
+    far = np.linalg.norm(meeting.partials(theta, 0)[0, :, 0] - point, axis=1)
+    nearest = theta[np.argmin(far)][None]
+    require_crossing(meeting, nearest)
+    nearest = _nearer(meeting, nearest, point)
+    return _fitted(meeting, Tracer(meeting).trace(nearest[0]), smoothness, tolerance)
+
+
+def _nearer(meeting: Meeting, theta: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Parameters [1, 4] of the place on an edge, around a given one, that is nearest to a point."""
+    place = meeting.partials(theta, 0)[0, :, 0]
+    tangent = np.cross(*meeting.normals(theta))
+    tangent /= np.linalg.norm(tangent)
+
+    def at(way: float) -> np.ndarray:
+        there, good = meeting.solve(theta, (place + way * tangent, tangent))
+        return there if good[0] else theta
+
+    def distance(way: float) -> float:
+        return float(np.linalg.norm(meeting.partials(at(way), 0)[0, 0, 0] - point))
+
+    around = _AROUND * meeting.size
+    options = {"xatol": SAME * meeting.size}
+    found = minimize_scalar(distance, bounds=(-around, around), method="bounded", options=options)
+    return at(float(found.x))
+
+
+def _checked(tolerance: float) -> float:
+    if not _LEAST_TOLERANCE <= tolerance < np.inf:
+        raise InputError(f"tolerance: {tolerance} m; {_LEAST_TOLERANCE:g} m or more is required")
+    return tolerance
+
+
+def _places(meeting: Meeting) -> np.ndarray:
+    """Parameters of places on all edges, [n, 4]."""
+    theta, good = meeting.solve(starts(meeting.surfaces))
+    if not good.any():
+        raise InputError(
+            "surfaces: do not meet within their bounds, though they come as near as "
+            f"{meeting.gaps(theta).min():.3g} m; larger or other ones are required"
+        )
+    return theta[good]
+
+
+def _on_trace(meeting: Meeting, trace: Trace, theta: np.ndarray) -> np.ndarray:
+    """Whether places on edges, [n, 4], are on one that has been traced, [n]."""
+    if not len(theta):
+        return np.zeros(0, dtype=bool)
+    nodes = meeting.partials(trace.theta, 0)[0, :, 0]
+    places = meeting.partials(theta, 0)[0, :, 0]
+    far = np.linalg.norm(nodes - places[:, None], axis=2)
+    nearest, far = far.argmin(axis=1), far.min(axis=1)
+    steps = np.linalg.norm(np.diff(nodes, axis=0, append=nodes[:1]), axis=1)
+    if not trace.is_closed:
+        steps[-1] = 0.0
+    local = np.maximum(steps, np.roll(steps, 1))[nearest]
+    tangents = np.cross(*meeting.normals(theta))
+    begun, good = meeting.solve(trace.theta[nearest], (places, tangents))
+    off = np.linalg.norm(meeting.partials(begun, 0)[0, :, 0] - places, axis=1)
+    same = 10.0 * SAME * meeting.size
+    return np.asarray((good & (off < same) & (far < local)) | (far < same))
+
+
+def _fitted(meeting: Meeting, trace: Trace, smoothness: int, tolerance: float) -> Edge:
+    """A curve through the nodes of an edge, and more of them where it would miss it."""
+    theta = trace.theta
+    for _ in range(_MOST_REFINEMENTS):
+        points = meeting.partials(theta, 0)[0, :, 0]
+        enough = len(points) >= max(8, smoothness + 2)
+        if enough:
+            exact = line_or_ellipse(points, trace.is_closed)
+            if exact is not None:
+                return Edge(exact, theta, 0.0)
+        begin, end = _neighbours(meeting, theta, trace.is_closed)
+        far = np.ones(len(begin), dtype=bool)
+        if enough:
+            parameters = _arc_lengths(meeting, theta, trace.is_closed)
+            curve = interpolate(
+                points, smoothness=smoothness, closed=trace.is_closed, parameters=parameters
+            )
+            off = _deviations(meeting, curve, parameters, begin, end)
+            if off.max() <= _KEPT * tolerance:
+                return Edge(curve, theta, float(off.max()))
+            far = off > _KEPT * tolerance
+        theta = _refined(meeting, theta, begin, end, far)
+        if len(theta) > _MOST_NODES:
+            break
+    raise InputError(
+        f"tolerance: {tolerance:g} m; the edge near {numbers(points[0])} needs more than "
+        f"{len(theta)} nodes for it: a larger one, or smoother surfaces, are required"
+    )
+
+
+def _neighbours(
+    meeting: Meeting, theta: np.ndarray, is_closed: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters at both ends of all pieces between nodes, [pieces, 4] each."""
+    if not is_closed:
+        return theta[:-1], theta[1:]
+    # the first node again, as many turns on as lead to it
+    turns = np.round((theta[-1] - theta[0]) / meeting.lengths) * meeting.closed
+    return theta, np.vstack([theta[1:], theta[:1] + turns * meeting.lengths])
+
+
+def _arc_lengths(meeting: Meeting, theta: np.ndarray, is_closed: bool) -> np.ndarray:
+    """Lengths along the edge up to its nodes, by arcs of circles; of a closed one its whole too."""
+    begin, end = _neighbours(meeting, theta, is_closed)
+    chords = np.linalg.norm(
+        meeting.partials(end, 0)[0, :, 0] - meeting.partials(begin, 0)[0, :, 0], axis=1
+    )
+    tangents = [np.cross(*meeting.normals(ends)) for ends in (begin, end)]
+    tangents = [each / np.linalg.norm(each, axis=1, keepdims=True) for each in tangents]
+    half = np.arcsin(np.minimum(1.0, 0.5 * np.linalg.norm(tangents[1] - tangents[0], axis=1)))
+    return np.concatenate([[0.0], np.cumsum(chords / np.sinc(half / np.pi))])
+
+
+def _deviations(
+    meeting: Meeting, curve: Curve, parameters: np.ndarray, begin: np.ndarray, end: np.ndarray
+) -> np.ndarray:
+    """Largest distance of each piece of a curve from the edge, [pieces], m."""
+    off = np.zeros(len(begin))
+    for share in _CHECKS:
+        at = curve.derivatives(parameters[:-1] + share * np.diff(parameters), 1)
+        tangents = at[:, 1] / np.linalg.norm(at[:, 1], axis=1, keepdims=True)
+        theta, good = meeting.solve((1.0 - share) * begin + share * end, (at[:, 0], tangents))
+        gap = np.linalg.norm(meeting.partials(theta, 0)[0, :, 0] - at[:, 0], axis=1)
+        off = np.maximum(off, np.where(good, gap, np.inf))
+    return off
+
+
+def _refined(
+    meeting: Meeting, theta: np.ndarray, begin: np.ndarray, end: np.ndarray, far: np.ndarray
+) -> np.ndarray:
+    """Nodes with one more in the middle of each of some pieces."""
+    ends = [meeting.partials(part[far], 0)[0, :, 0] for part in (begin, end)]
+    chords = ends[1] - ends[0]
+    lengths = np.linalg.norm(chords, axis=1)
+    normals = chords / lengths[:, None]
+    middle = 0.5 * (begin[far] + end[far])
+    between, good = meeting.solve(middle, (0.5 * (ends[0] + ends[1]), normals))
+    if not good.all():
+        lost = 0.5 * (ends[0] + ends[1])[~good][0]
+        raise InputError(
+            f"surfaces: their edge leaves one of them for less than {lengths[~good][0]:.2g} m"
+            f" near {numbers(lost)}; larger or smaller bounds are required"
+        )
+    return np.insert(theta, np.flatnonzero(far) + 1, between, axis=0)
