@@ -1,4 +1,4 @@
-"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``sweep`` many.
+"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``sweep`` many, ``teach``.
 
 Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
 input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, everything logged
@@ -23,15 +23,15 @@ from experiments.catalog.scenario_catalog import expand_home, list_scenarios
 from experiments.outcomes import judge_run, judge_sweep, print_run, print_sweep
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
-from reporting.commands import interruptible, run_app, show_page
+from reporting.commands import FAULT, interruptible, run_app, show_page
 from reporting.progress import ProgressDisplay
 
 if TYPE_CHECKING:
     from reporting.page import Report
 
 _LONGEST_AFTER_FAULT = 100.0  # s
-# a study that runs by its name, as a scenario does
-IDENTIFICATION = "identify_comau"
+# studies that run by their names, as a scenario does
+IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
 
 # what several commands take
 ScenarioName = Annotated[
@@ -101,7 +101,7 @@ def run_command(
     from experiments.catalog.scenario_file import read_scenario
     from experiments.run import run_scenario
 
-    if scenario == IDENTIFICATION:
+    if scenario in (IDENTIFICATION, TEACH_IN):
         study_command(scenario, out or Path("out") / scenario)
     seconds = None if duration is None else _read_duration(duration)
     further = _read_after_fault(after_fault)
@@ -207,7 +207,8 @@ def study_command(
             help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
             "all laws on robots that are not their models; tracking: path following against "
             "trajectory tracking; fixture_rules: printed rules of forbidden regions against the "
-            "program at an acute edge; identify_comau: from robots to their models and back."
+            "program at an acute edge; identify_comau: from robots to their models and back; "
+            "teach_in: a path taught by hand, and followed."
         ),
     ] = "stiffness",
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
@@ -217,6 +218,7 @@ def study_command(
     from experiments.studies.identify import write_identification
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
+    from experiments.studies.teach_in import write_teach_in
     from experiments.studies.tracking import write_tracking
 
     studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
@@ -225,6 +227,7 @@ def study_command(
         "tracking": write_tracking,
         "fixture_rules": write_fixture_rules,
         IDENTIFICATION: write_identification,
+        TEACH_IN: write_teach_in,
     }
     if name not in studies:
         raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
@@ -235,6 +238,43 @@ def study_command(
             expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
         )
         raise typer.Exit(show_page("study", report))
+
+
+@app.command("teach")
+def teach_command(
+    run: Annotated[Path, typer.Argument(help="Folder of a run in which a hand led the tool.")],
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/taught"),
+    spacing: Annotated[float, typer.Option(help="Of the waypoints [m].")] = 0.01,
+    angle: Annotated[
+        float, typer.Option(help="Turn after which a waypoint is taken before that [deg].")
+    ] = 3.0,
+    tolerance: Annotated[
+        float, typer.Option(help="How far the path may be from a waypoint [m].")
+    ] = 2e-3,
+    tolerance_deg: Annotated[float, typer.Option(help="The same of the orientation [deg].")] = 1.0,
+    closed: Annotated[bool, typer.Option("--closed", help="Go round and round.")] = False,
+    velocity: Annotated[float, typer.Option(help="Along the path [m/s].")] = 0.1,
+    follow: Annotated[
+        bool, typer.Option("--follow/--no-follow", help="Run along the path.")
+    ] = True,
+) -> None:
+    """Turn a run in which a hand led the tool into a path, and follow it."""
+    from experiments.teaching.options import TeachingOptions
+    from experiments.teaching.teach import teach
+
+    with interruptible():
+        options = TeachingOptions(spacing, angle, closed, tolerance, tolerance_deg, velocity)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        outcome = teach(
+            expand_home(run),
+            expand_home(out),
+            options,
+            follow=follow,
+            progress=lambda line: console.print(line, highlight=False, markup=False),
+        )
+        status = show_page("page", outcome.report)
+        raise typer.Exit(FAULT if outcome.fault is not None and status == 0 else status)
 
 
 @app.command("margins")

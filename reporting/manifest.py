@@ -33,6 +33,8 @@ RESULTS = (
     "sweep.json",
     "sweep.csv",
     "sweep.parquet",
+    "taught.csv",
+    "follow.yaml",
 )
 GROWING = "growing"  # instead of a checksum
 UNFINISHED = ".unfinished"  # a file while it is being written

@@ -23,7 +23,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     Joint state, tool pose and path coordinates are the true ones, those of the links, also
     where the law acts on motor coordinates, on the errors from a moving reference point, or
     on what imperfect encoders measure. What it acted on is beside them: ``xi_M``,
-    ``tracking_error``, ``q_J_measured``, ``xi_measured`` and so on.
+    ``tracking_error``, ``q_J_measured``, ``y_t_measured``, ``xi_measured`` and so on.
 
     Args:
         station: The station that was simulated.
@@ -38,11 +38,14 @@ def collect_log(station: Station, root: Context) -> RunLog:
     pose = _tool_poses(station, raw["joint_state"])
     log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
     log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
+    deceived = measured is not None or not station.part.belief.sees_truth
+    if deceived:
+        log.add("y_t_measured", raw["tool_pose"][:, :3], "m", ["x", "y", "z"])
+        log.add("R_e_measured", raw["tool_pose"][:, 3:], "1", log["R_e"].labels)
     linearization, layout = station.law.linearization, station.law.layout
     Y = raw["law"][:, layout.manifold_state]
     Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
     points = raw["manifold_point"]
-    deceived = measured is not None or not station.part.belief.sees_truth
     if linearization.manifold.follows_time or station.on_motors or deceived:
         if linearization.manifold.follows_time:
             log.add("tracking_error", Y[:, 0, :3], "m", ["along", "normal_1", "normal_2"])

@@ -18,7 +18,12 @@ from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
 from pfsc_drake.geometry.paths.shape_report import ShapeReport, shape_report
-from pfsc_drake.geometry.paths.waypoint_file import WaypointTable, read_waypoints
+from pfsc_drake.geometry.paths.taught import Picking, pick_waypoints
+from pfsc_drake.geometry.paths.waypoint_file import (
+    WaypointTable,
+    read_waypoints,
+    waypoints_text,
+)
 from pfsc_drake.geometry.paths.waypoints import Tolerance, path_from_waypoints
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
@@ -79,6 +84,7 @@ __all__ = [
     "PathEvaluator",
     "PathPointLayout",
     "PathWaypoints",
+    "Picking",
     "PiecewisePolynomialCurve",
     "ProductSurface",
     "Projection",
@@ -118,6 +124,7 @@ __all__ = [
     "partial_index",
     "partial_orders",
     "path_from_waypoints",
+    "pick_waypoints",
     "plane",
     "project_globally",
     "quaternion_to_matrix",
@@ -135,6 +142,7 @@ __all__ = [
     "surface_through_grid",
     "torus",
     "translated_surface",
+    "waypoints_text",
     "zyx_to_matrix",
     "zyx_to_quaternion",
     "zyz_to_matrix",

@@ -1,4 +1,4 @@
-"""A human hand on the tool: a spring-damper towards a moving target."""
+"""A human hand on the tool: a spring-damper towards a moving target, that may turn it too."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_profile import FRAMES, smooth_step, smooth_step_slope
+from pfsc_drake.physics.force_profile import FRAMES, smooth_step
+from pfsc_drake.physics.hand_orientation import OrientationTarget, leg_at, rotation_vectors
 from pfsc_drake.physics.wandering import Wander
 
 # from coordinates and their rates, shape (3,) each, to position and velocity in the world
@@ -14,28 +15,39 @@ Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 _FARTHEST = 1e4  # m
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
+_LARGEST_ANGLE = 3600.0  # deg
 # sinusoids per axis, enough for an irregular tremor
 _TREMOR_LINES = 16
 
 
 @dataclass
 class HandWaypoint:
-    """Where the hand wants the tool point to be.
+    """Where the hand wants the tool point to be, and how turned.
 
     Attributes:
         time: [s].
         position: In the hand's frame, shape (3,) [m].
+        zyx_deg: ZYX angles (2.7) of the tool in the world, shape (3,) [deg]; empty for those of
+            the waypoint before.
     """
 
     time: float = 0.0
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         self.position = np.asarray(self.position, dtype=float)
+        self.zyx_deg = np.asarray(self.zyx_deg, dtype=float)
         if self.position.shape != (3,) or not np.all(np.abs(self.position) <= _FARTHEST):
             raise InputError(
                 f"position = {self.position.tolist()}: must be 3 finite numbers of at most "
                 f"{_FARTHEST:g} m"
+            )
+        good = self.zyx_deg.shape == (3,) and bool(np.all(np.abs(self.zyx_deg) <= _LARGEST_ANGLE))
+        if not (good or self.zyx_deg.shape == (0,)):
+            raise InputError(
+                f"zyx_deg = {self.zyx_deg.tolist()}: must be empty or 3 finite numbers of at most "
+                f"{_LARGEST_ANGLE:g} deg"
             )
 
 
@@ -49,6 +61,8 @@ class HandParameters:
             ``eta, xi_1, xi_2`` of the path.
         stiffness: K [N/m].
         damping: D [N s/m].
+        rotational_stiffness: K_r [Nm/rad], by which the hand turns the tool to the orientations
+            of its waypoints; zero for a hand that does not mind how the tool is turned.
         rotational_damping: D_r [Nm s/rad], by which the grip resists turning.
         force_limit: Largest magnitude of the force [N].
         torque_limit: Largest magnitude of the torque [Nm].
@@ -68,6 +82,7 @@ class HandParameters:
     frame: str = "world"
     stiffness: float = 300.0
     damping: float = 30.0
+    rotational_stiffness: float = 0.0
     rotational_damping: float = 0.0
     force_limit: float = 45.0
     torque_limit: float = 3.0
@@ -84,7 +99,8 @@ class HandParameters:
         for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
             value, allowed = getattr(self, key), f"positive, at most {_LARGEST:g}"
             _require(0.0 < value <= _LARGEST, key, value, allowed)
-        for key in ("damping", "rotational_damping", "reaction_delay", "tremor"):
+        weak = ("damping", "rotational_stiffness", "rotational_damping", "reaction_delay", "tremor")
+        for key in weak:
             value, allowed = getattr(self, key), f"zero or positive, at most {_LARGEST:g}"
             _require(0.0 <= value <= _LARGEST, key, value, allowed)
         _require(self.seed >= 0, "seed", self.seed, "zero or positive")
@@ -98,6 +114,16 @@ class HandParameters:
         )
         _require(ascending, "waypoints", times.tolist(), "one or more with ascending times")
         _require(self.release > times[0], "release", self.release, f"after {times[0]:g} s")
+        self._check_turning()
+
+    def _check_turning(self) -> None:
+        given = [self.wander is None and point.zyx_deg.size > 0 for point in self.waypoints]
+        turns, allowed = self.rotational_stiffness > 0.0, "0, or zyx_deg in the first waypoint"
+        if turns or any(given):
+            first = bool(given) and given[0]
+            _require(first, "rotational_stiffness", self.rotational_stiffness, allowed)
+            allowed = "positive where waypoints have zyx_deg"
+            _require(turns, "rotational_stiffness", self.rotational_stiffness, allowed)
 
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Return when the target is where, shapes (k,) [s] and (k, 3) [m]."""
@@ -106,15 +132,27 @@ class HandParameters:
         times = np.array([waypoint.time for waypoint in self.waypoints], dtype=float)
         return times, np.array([waypoint.position for waypoint in self.waypoints])
 
+    def orientation(self) -> OrientationTarget | None:
+        """Return how the tool is to be turned, or None."""
+        if self.rotational_stiffness == 0.0:
+            return None
+        angles: list[np.ndarray] = []
+        for waypoint in self.waypoints:
+            angles.append(waypoint.zyx_deg if waypoint.zyx_deg.size else angles[-1])
+        return OrientationTarget(self.places()[0], np.array(angles))
+
 
 class HandModel:
     """Force of a hand on the tool.
 
-    The hand wants ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and ``tau_c = -D_r w``, and
+    The hand wants ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and
+    ``tau_c = K_r r + D_r (w_d - w)``, and
     delivers, a reaction delay later, ``s (limit(f_c + tremor))`` and ``s limit(tau_c)``: s goes
     from 0 to 1 while it takes hold and back when it lets go; limits are of the magnitude.
 
-    The target ``p_d`` moves from waypoint to waypoint with minimum jerk, at rest in each.
+    The target ``p_d`` moves from waypoint to waypoint with minimum jerk, at rest in each, and so
+    does ``R_d``, w_d being its angular velocity; ``r`` is axis times angle of ``R_d R_e'``. A hand
+    without orientation wants ``-D_r w`` alone.
     The tremor is a sum of sinusoids, whose frequencies and phases the seed determines.
     Without delay, and up to its limits, a hand with a resting target is passive.
 
@@ -132,6 +170,7 @@ class HandModel:
             _require(place is not None, "frame", parameters.frame, "world without a path")
             self._place = place
         self._times, self._positions = parameters.places()
+        self._orientation = parameters.orientation()
         random = np.random.default_rng(parameters.seed)
         low, high = parameters.tremor_band
         steps = np.arange(_TREMOR_LINES) + random.uniform(size=(3, _TREMOR_LINES))
@@ -146,14 +185,11 @@ class HandModel:
 
     def _coordinates(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the target in the hand's own frame, and its rate, shape (3,) each."""
-        last = len(self._times) - 1
-        i = min(max(int(np.searchsorted(self._times, time, side="right")) - 1, 0), last)
-        if i == last:
-            return self._positions[last], np.zeros(3)
-        duration = self._times[i + 1] - self._times[i]
+        i, share, rate = leg_at(self._times, time)
+        if i == len(self._times) - 1:
+            return self._positions[i], np.zeros(3)
         way = self._positions[i + 1] - self._positions[i]
-        x = (time - self._times[i]) / duration
-        return self._positions[i] + smooth_step(x) * way, smooth_step_slope(x) / duration * way
+        return self._positions[i] + share * way, rate * way
 
     def tremor(self, time: float) -> np.ndarray:
         """Return the trembling force, shape (3,) [N]."""
@@ -165,18 +201,26 @@ class HandModel:
         taking = smooth_step((time - self._times[0]) / ramp)
         return taking * (1.0 - smooth_step((time - self._parameters.release) / ramp))
 
-    def wanted(self, time: float, y_t: np.ndarray, twist: np.ndarray) -> np.ndarray:
+    def wanted(
+        self, time: float, y_t: np.ndarray, twist: np.ndarray, R_e: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return ``[f_c, tau_c]``, world axes, shape (6,) [N, Nm].
 
         Args:
             time: [s].
             y_t: Tool point [m], shape (3,).
             twist: ``[y_t', w]``, world axes, shape (6,) [m/s, rad/s].
+            R_e: Orientation of the tool, shape (3, 3); None where there is nothing to turn.
         """
         p_d, v_d = self.target(time)
         hand = self._parameters
         force = hand.stiffness * (p_d - y_t) + hand.damping * (v_d - twist[:3])
-        return np.concatenate([force, -hand.rotational_damping * twist[3:]])
+        torque = -hand.rotational_damping * twist[3:]
+        if self._orientation is not None and R_e is not None:
+            R_d, w_d = self._orientation.at(time)
+            (turn,) = rotation_vectors((R_d @ R_e.T)[None])
+            torque += hand.rotational_stiffness * turn + hand.rotational_damping * w_d
+        return np.concatenate([force, torque])
 
     def delivered(self, time: float, wanted: np.ndarray) -> np.ndarray:
         """Return the wrench on the tool, world axes, shape (6,) [N, Nm].

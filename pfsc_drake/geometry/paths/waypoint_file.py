@@ -94,6 +94,26 @@ def read_waypoints(csv_path: str | FilePath, progress: Progress | None = None) -
     return WaypointTable(positions, quaternions, parameters)
 
 
+def waypoints_text(table: WaypointTable, comment: str = "") -> str:
+    """Return waypoints as the content of a file that `read_waypoints` reads.
+
+    Positions are rounded to 0.1 um, quaternions to 1e-9.
+
+    Args:
+        table: The waypoints; their parameters are left out.
+        comment: One line, written first.
+    """
+    orientation = () if table.quaternions is None else _ORIENTATIONS["quaternion"]
+    lines = [f"# {comment}"] if comment else []
+    lines.append(",".join((*_POSITION, *orientation)))
+    for i, position in enumerate(table.positions.tolist()):
+        cells = [f"{value:.7f}" for value in position]
+        if table.quaternions is not None:
+            cells += [f"{value:.9f}" for value in table.quaternions[i].tolist()]
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
 def _check_header(place: str, header: list[str]) -> None:
     groups = list(_ORIENTATIONS.values())
     known = [*_POSITION, _PARAMETER, *(label for group in groups for label in group)]

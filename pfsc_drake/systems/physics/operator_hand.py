@@ -59,7 +59,7 @@ class OperatorHand(LeafSystem):
         last = context.get_discrete_state(self._last_pose).value()
         known = np.isfinite(last).all()
         twist = observed_twist(last, pose, self._period) if known else np.zeros(6)
-        return self._hand.wanted(context.get_time(), pose[:3], twist)
+        return self._hand.wanted(context.get_time(), pose[:3], twist, pose[3:].reshape(3, 3))
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         pose = self._tool_pose.Eval(context)

@@ -210,3 +210,14 @@ def test_a_robot_with_soft_joints_gives_way_to_the_target():
     simulator.AdvanceTo(4.0)
     y = kinematics.get_output_port().Eval(kinematics.GetMyContextFromRoot(root))[:3]
     assert np.linalg.norm(y - target) < 5e-3
+
+
+def test_it_turns_the_tool_as_it_sees_it():
+    """The tool is upright; the torque is that of the whole turn, about its axis."""
+    way = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 30.0])]
+    changes = {"rotational_stiffness": 4.0, "torque_limit": 1.5}
+    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": way}), 0.01)
+    assert wrench[-1] == pytest.approx([0, 0, 0, 1.5, 0, 0])
+    way = [HandWaypoint(0.0, np.zeros(3), [15.0, 0.0, 0.0])]
+    wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": way}), 0.01)
+    assert wrench[-1] == pytest.approx([0, 0, 0, 0, 0, 4.0 * np.deg2rad(15.0)])

@@ -1,0 +1,1 @@
+"""Teaching by hand: from a run in which a hand led the tool to a path that is followed."""

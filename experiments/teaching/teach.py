@@ -1,0 +1,192 @@
+"""From the results of a run in which a hand led the tool to a path that is followed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.catalog.scenario_file import read_scenario
+from experiments.results.run_log import RunLog
+from experiments.run import RunOutcome, run_scenario
+from experiments.teaching.comparison import (
+    Followed,
+    compare_fit,
+    compare_followed,
+    comparison_metrics,
+)
+from experiments.teaching.follow import CSV_NAME, YAML_NAME, follow_text
+from experiments.teaching.options import TeachingOptions
+from experiments.teaching.pictures import draw_pictures
+from experiments.teaching.taught import Taught, read_run, taught_path
+from pfsc_drake.geometry import waypoints_text
+from reporting.folder import ResultsFolder, check_folder, open_results
+from reporting.page import Report, report_page, write_report
+from reporting.provenance import standard_attributes
+
+KIND, FOLLOW = "teaching", "follow"
+_DESCRIPTION = (
+    "A hand led the tool, and turned it. Where encoders and model tell the tool to be was picked "
+    "as waypoints, by distance and angle; the path is the smoothest within a tolerance of them."
+)
+
+
+@dataclass(frozen=True)
+class TeachingOutcome:
+    """What came of teaching.
+
+    Attributes:
+        report: The page.
+        waypoints: CSV file of the waypoints; None if it could not be written.
+        scenario: YAML file of the scenario that follows them; None if it could not be written.
+        fault: Why the run along the path was stopped, or None.
+    """
+
+    report: Report
+    waypoints: Path | None
+    scenario: Path | None
+    fault: str | None = None
+
+
+def teach(
+    run: Path,
+    out: Path,
+    options: TeachingOptions | None = None,
+    *,
+    follow: bool = True,
+    progress: Callable[[str], None] = lambda line: None,
+) -> TeachingOutcome:
+    """Turn a run in which a hand led the tool into a path, and follow that.
+
+    Args:
+        run: Folder of its results.
+        out: Folder for ``taught.csv``, ``follow.yaml``, the page, and in ``follow`` the results
+            of the run along the path.
+        options: How the path is taught.
+        follow: Whether to run along the path.
+        progress: Told one line per step.
+
+    Raises:
+        InputError: If there is no such run, nothing was taught, no path fits, the robot cannot
+            follow it, or a folder cannot take the results.
+        KeyboardInterrupt: If the user stopped the run along the path.
+    """
+    chosen = options or TeachingOptions()
+    check_folders(out, run)
+    settings, log = read_run(run)
+    taught = taught_path(settings, log, chosen)
+    length, count = taught.path.length, len(taught.rows)
+    progress(f"{count} waypoints, a path of {length:.4g} m")
+    inputs = [run / "log.h5", run / "scenario.yaml"]
+    with open_results(out, KIND, inputs) as results:
+        comment = f"taught in {settings.name}: positions [m] and quaternions of the tool"
+        csv = results.write(CSV_NAME, waypoints_text(taught.table, comment))
+        scenario = results.write(YAML_NAME, follow_text(taught, chosen))
+        outcome = None
+        if follow and scenario is not None and results.explain_problems() is None:
+            outcome = run_and_tell(str(scenario), out / FOLLOW, progress)
+        fault = None if outcome is None else outcome.fault
+        report = _write_page(results, taught, chosen, outcome, out / FOLLOW)
+        return TeachingOutcome(report, csv, scenario, fault)
+
+
+def check_folders(out: Path, run: Path) -> None:
+    """Refuse folders that cannot take the results; changes nothing.
+
+    Args:
+        out: For the results.
+        run: Of the run in which a hand leads the tool.
+
+    Raises:
+        InputError: If so.
+    """
+    check_folder(out, KIND, [run / "log.h5", run / "scenario.yaml"])
+    check_folder(out / FOLLOW, "run")
+
+
+def run_and_tell(scenario: str, out: Path, progress: Callable[[str], None]) -> RunOutcome:
+    """Run a scenario, see :func:`run_scenario`, and tell a line about it.
+
+    Args:
+        scenario: Name or file.
+        out: Folder for its results.
+        progress: Told one line before and after.
+
+    Raises:
+        InputError: If it is wrong.
+        KeyboardInterrupt: If the user stopped it.
+    """
+    loaded = read_scenario(scenario, [])
+    progress(f"running {loaded.name}")
+    outcome = run_scenario(
+        loaded,
+        out=out,
+        duration=None,
+        figures=True,
+        recording=True,
+        progress=_Silent(),
+    )
+    if outcome.interrupted:
+        raise KeyboardInterrupt
+    for said in [*outcome.warnings, *filter(None, [outcome.fault, outcome.problem])]:
+        progress(f"{loaded.name}: {said}")
+    progress(f"{loaded.name}: open {outcome.report}")
+    return outcome
+
+
+class _Silent:
+    """Hears how far a run is, and says nothing."""
+
+    def expect(self, duration: float) -> None:
+        """See :class:`reporting.progress.ProgressListener`."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        """See :class:`reporting.progress.ProgressListener`."""
+
+
+def _write_page(
+    results: ResultsFolder,
+    taught: Taught,
+    options: TeachingOptions,
+    outcome: RunOutcome | None,
+    folder: Path,
+) -> Report:
+    fit, followed = compare_fit(taught), None
+    if outcome is not None and outcome.problem is None:
+        followed = compare_followed(taught, RunLog.read(folder / "log.h5"))
+        followed = followed if followed.eta.size else None
+    metrics = comparison_metrics(taught, fit, options.velocity, followed)
+    results.write("metrics.json", metrics.to_json())
+    pictures = draw_pictures(taught, fit, followed)
+    warnings = []
+    if "fault" in taught.log.attributes:
+        warnings.append(f"while it was taught: {taught.log.attributes['fault']}")
+    page = report_page(
+        kind="Teaching",
+        title=f"Taught in {taught.settings.name}",
+        description=_DESCRIPTION,
+        scenario_yaml_text=follow_text(taught, options),
+        metrics=metrics,
+        figures=pictures,
+        log_attributes=standard_attributes(taught.settings.name),
+        fault=None if outcome is None else outcome.fault,
+        warnings=warnings,
+        commands={
+            "follow the path once more": f"python -m experiments run {results.path / YAML_NAME}"
+        },
+        cards=_cards(followed),
+        details=f"Scenario {YAML_NAME}",
+    )
+    return write_report(results, pictures, page)
+
+
+def _cards(followed: Followed | None) -> list[str]:
+    cards = ["fit_distance_max", "fit_distance_rms", "largest_jerk_through_all"]
+    cards.append("largest_jerk_fitted")
+    if followed is None:
+        return cards
+    return [
+        *cards,
+        "follow_deviation_seen",
+        "follow_from_taught_max",
+        "model_error_of_place",
+        "model_error_left",
+    ]

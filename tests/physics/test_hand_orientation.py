@@ -1,0 +1,139 @@
+"""A hand that turns the tool: its target, its torque, and a body in it."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
+from pfsc_drake.physics.hand_orientation import OrientationTarget
+from pfsc_drake.physics.wandering import Wander
+from pfsc_drake.yaml.typed import load_typed
+
+TIMES = np.array([1.0, 3.0, 4.0])
+ANGLES = np.array([[170.0, 0.0, 0.0], [190.0, -20.0, 10.0], [190.0, -20.0, 30.0]])
+STILL = np.zeros(6)
+
+
+def rotation(zyx_deg):
+    return Rotation.from_euler("ZYX", zyx_deg, degrees=True)
+
+
+def turning_hand(*zyx_deg, **changes):
+    way = [HandWaypoint(1.0 + i, np.zeros(3), angles) for i, angles in enumerate(zyx_deg)]
+    options = {"waypoints": way, "rotational_stiffness": 5.0, "torque_limit": 100.0}
+    return HandModel(HandParameters(**options | changes))
+
+
+def test_the_target_rests_in_every_orientation():
+    target = OrientationTarget(TIMES, ANGLES)
+    for time, angles in zip([0.0, *TIMES, 99.0], ANGLES[[0, 0, 1, 2, 2]], strict=True):
+        R_d, w_d = target.at(time)
+        assert R_d == pytest.approx(rotation(angles).as_matrix(), abs=1e-12)
+        assert not np.any(w_d)
+
+
+def test_the_target_turns_about_one_axis_the_shorter_way():
+    target = OrientationTarget(TIMES, ANGLES)
+    whole = (rotation(ANGLES[1]) * rotation(ANGLES[0]).inv()).as_rotvec()
+    assert np.linalg.norm(whole) < np.deg2rad(40.0)  # not 340 deg back through zero
+    h = 1e-6
+    for time in (1.3, 2.0, 2.9, 3.5):
+        (R_0, _), (R_d, w_d), (R_1, _) = (target.at(time + dt) for dt in (-h, 0.0, h))
+        turned = (Rotation.from_matrix(R_1) * Rotation.from_matrix(R_0).inv()).as_rotvec()
+        assert turned / (2.0 * h) == pytest.approx(w_d, abs=1e-7)
+        if time < 3.0:
+            assert np.cross(w_d, whole) == pytest.approx(np.zeros(3), abs=1e-12)
+    # minimum jerk: half of the way in half of the time, at 1.875 of the mean rate
+    R_d, w_d = target.at(2.0)
+    half = (Rotation.from_matrix(R_d) * rotation(ANGLES[0]).inv()).as_rotvec()
+    assert half == pytest.approx(whole / 2.0)
+    assert w_d == pytest.approx(1.875 * whole / 2.0)
+
+
+def test_it_turns_like_a_spring_and_a_damper():
+    hand = turning_hand([10.0, 20.0, 30.0], rotational_damping=0.5)
+    axis, angle = np.array([0.6, 0.0, -0.8]), 0.4
+    R_e = (Rotation.from_rotvec(-angle * axis) * rotation([10, 20, 30])).as_matrix()
+    twist = np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3])
+    wanted = hand.wanted(5.0, np.zeros(3), twist, R_e)
+    assert wanted[3:] == pytest.approx(5.0 * angle * axis - 0.5 * twist[3:])
+    assert not np.any(wanted[:3])
+
+
+def test_it_damps_what_is_not_its_own_turning():
+    hand = turning_hand([0.0, 0.0, 0.0], [40.0, 0.0, 0.0], rotational_damping=0.5)
+    _, w_d = OrientationTarget(np.array([1.0, 2.0]), np.array([[0, 0, 0], [40, 0, 0]])).at(1.5)
+    R_e = rotation([20.0, 0.0, 0.0]).as_matrix()
+    along = np.concatenate([np.zeros(3), w_d])
+    assert hand.wanted(1.5, np.zeros(3), along, R_e) == pytest.approx(STILL, abs=1e-12)
+    assert hand.wanted(1.5, np.zeros(3), STILL, R_e)[3:] == pytest.approx(0.5 * w_d)
+
+
+def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
+    """By independent integration of the one angle there is about the common axis."""
+    inertia, K_r, D_r, step = 0.05, 5.0, 0.6, 2e-4
+    hand = turning_hand([0.0, 0.0, 35.0], rotational_damping=D_r, rotational_stiffness=K_r)
+    R_e, w, angles = Rotation.identity(), np.zeros(3), []
+    times = 2.0 + step * np.arange(5000)  # the grip is firm
+    for time in times:
+        angles.append(R_e.as_rotvec()[0])
+        wanted = hand.wanted(time, np.zeros(3), np.append(np.zeros(3), w), R_e.as_matrix())
+        w = w + step * hand.delivered(time, wanted)[3:] / inertia
+        R_e = Rotation.from_rotvec(step * w) * R_e
+    goal = np.deg2rad(35.0)
+    solution = solve_ivp(
+        lambda t, x: [x[1], (K_r * (goal - x[0]) - D_r * x[1]) / inertia],
+        (0.0, times[-1] - 2.0),
+        [0.0, 0.0],
+        t_eval=times - 2.0,
+        rtol=1e-9,
+    )
+    assert np.abs(solution.y[0] - angles).max() < 2e-3
+    assert angles[-1] == pytest.approx(goal, abs=0.01)
+
+
+def test_an_orientation_that_is_left_out_stays():
+    way = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 20.0]), HandWaypoint(1.0, np.ones(3))]
+    target = HandParameters(waypoints=way, rotational_stiffness=1.0).orientation()
+    assert target.at(2.0)[0] == pytest.approx(rotation([0.0, 0.0, 20.0]).as_matrix())
+
+
+def test_a_hand_without_stiffness_does_not_turn():
+    assert HandParameters().orientation() is None
+    wanted = HandModel(HandParameters()).wanted(0.0, np.zeros(3), STILL, np.diag([-1.0, -1, 1]))
+    assert not np.any(wanted)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"rotational_stiffness": 2.0}, "must be 0, or zyx_deg in the first waypoint"),
+        ({"rotational_stiffness": 2.0, "wander": Wander()}, "must be 0, or zyx_deg in the first"),
+        ({"rotational_stiffness": -1.0}, "must be zero or positive"),
+        (
+            {"waypoints": [HandWaypoint(0.0, np.zeros(3), np.zeros(3))]},
+            "must be positive where waypoints have zyx_deg",
+        ),
+    ],
+)
+def test_turning_that_makes_no_sense(changes, message):
+    with pytest.raises(InputError, match=f"^rotational_stiffness = .*: {message}"):
+        HandParameters(**changes)
+
+
+@pytest.mark.parametrize("angles", [[1.0, 2.0], [0.0, 0.0, np.nan], [0.0, 0.0, 4000.0]])
+def test_what_is_no_orientation(angles):
+    with pytest.raises(InputError, match=r"^zyx_deg = .*: must be empty or 3 finite numbers"):
+        HandWaypoint(0.0, np.zeros(3), angles)
+
+
+def test_orientations_come_from_a_file():
+    data = {
+        "waypoints": [{"time": 0.5, "position": [0, 0, 0], "zyx_deg": [10.0, 0, 0]}, {"time": 1.0}],
+        "rotational_stiffness": 4.0,
+    }
+    parameters = load_typed(HandParameters, data, "hand.yaml")
+    assert parameters.waypoints[0].zyx_deg == pytest.approx([10.0, 0.0, 0.0])
+    assert parameters.waypoints[1].zyx_deg.size == 0
