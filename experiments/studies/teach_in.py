@@ -15,6 +15,8 @@ def write_teach_in(
     progress: Callable[[str], None],
     scenario: str = SCENARIO,
     options: TeachingOptions | None = None,
+    *,
+    drawn: bool = True,
 ) -> Report:
     """Let a hand lead a tool, follow the path that this taught, and write a page.
 
@@ -24,6 +26,7 @@ def write_teach_in(
         progress: Told one line per step.
         scenario: Name or file of the scenario with the hand.
         options: How the path is taught.
+        drawn: Whether the two runs have figures and recordings.
 
     Returns:
         The page.
@@ -33,5 +36,5 @@ def write_teach_in(
         KeyboardInterrupt: If the user stopped a run.
     """
     check_folders(out, out / GUIDE)
-    run_and_tell(scenario, out / GUIDE, progress)
-    return teach(out / GUIDE, out, options, progress=progress).report
+    run_and_tell(scenario, out / GUIDE, progress, drawn=drawn)
+    return teach(out / GUIDE, out, options, drawn=drawn, progress=progress).report

@@ -39,6 +39,9 @@ def nearest_on_line(points: FloatArray, line: FloatArray) -> Nearest:
         points: Finite [m], shape (n, 3).
         line: Finite [m], shape (k, 3), k > 0; neighbours may coincide.
     """
+    # the last of each run of samples that coincide
+    apart = np.flatnonzero(np.append(np.any(np.diff(line, axis=0), axis=1), True))
+    line = line[apart]
     _, corner = cKDTree(line).query(points)
     best = Nearest(np.linalg.norm(points - line[corner], axis=1), corner, np.zeros(len(points)))
     distances, samples, shares = best.distances, best.samples, best.shares
@@ -52,4 +55,4 @@ def nearest_on_line(points: FloatArray, line: FloatArray) -> Nearest:
         closer = distance < distances
         distances = np.where(closer, distance, distances)
         samples, shares = np.where(closer, side, samples), np.where(closer, share, shares)
-    return Nearest(distances, samples, shares)
+    return Nearest(distances, apart[samples], shares)

@@ -52,6 +52,7 @@ def teach(
     options: TeachingOptions | None = None,
     *,
     follow: bool = True,
+    drawn: bool = True,
     progress: Callable[[str], None] = lambda line: None,
 ) -> TeachingOutcome:
     """Turn a run in which a hand led the tool into a path, and follow that.
@@ -62,6 +63,7 @@ def teach(
             of the run along the path.
         options: How the path is taught.
         follow: Whether to run along the path.
+        drawn: Whether that run has figures and a recording.
         progress: Told one line per step.
 
     Raises:
@@ -82,7 +84,7 @@ def teach(
         scenario = results.write(YAML_NAME, follow_text(taught, chosen))
         outcome = None
         if follow and scenario is not None and results.explain_problems() is None:
-            outcome = run_and_tell(str(scenario), out / FOLLOW, progress)
+            outcome = run_and_tell(str(scenario), out / FOLLOW, progress, drawn=drawn)
         fault = None if outcome is None else outcome.fault
         report = _write_page(results, taught, chosen, outcome, out / FOLLOW)
         return TeachingOutcome(report, csv, scenario, fault)
@@ -102,13 +104,16 @@ def check_folders(out: Path, run: Path) -> None:
     check_folder(out / FOLLOW, "run")
 
 
-def run_and_tell(scenario: str, out: Path, progress: Callable[[str], None]) -> RunOutcome:
+def run_and_tell(
+    scenario: str, out: Path, progress: Callable[[str], None], *, drawn: bool = True
+) -> RunOutcome:
     """Run a scenario, see :func:`run_scenario`, and tell a line about it.
 
     Args:
         scenario: Name or file.
         out: Folder for its results.
         progress: Told one line before and after.
+        drawn: Whether it has figures and a recording.
 
     Raises:
         InputError: If it is wrong.
@@ -120,8 +125,8 @@ def run_and_tell(scenario: str, out: Path, progress: Callable[[str], None]) -> R
         loaded,
         out=out,
         duration=None,
-        figures=True,
-        recording=True,
+        figures=drawn,
+        recording=drawn,
         progress=_Silent(),
     )
     if outcome.interrupted:

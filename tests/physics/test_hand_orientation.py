@@ -73,10 +73,10 @@ def test_it_damps_what_is_not_its_own_turning():
 
 def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
     """By independent integration of the one angle there is about the common axis."""
-    inertia, K_r, D_r, step = 0.05, 5.0, 0.6, 2e-4
+    inertia, K_r, D_r, step = 0.05, 5.0, 0.6, 5e-4
     hand = turning_hand([0.0, 0.0, 35.0], rotational_damping=D_r, rotational_stiffness=K_r)
     R_e, w, angles = Rotation.identity(), np.zeros(3), []
-    times = 2.0 + step * np.arange(5000)  # the grip is firm
+    times = 2.0 + step * np.arange(2000)  # the grip is firm
     for time in times:
         angles.append(R_e.as_rotvec()[0])
         wanted = hand.wanted(time, np.zeros(3), np.append(np.zeros(3), w), R_e.as_matrix())
@@ -90,7 +90,7 @@ def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
         t_eval=times - 2.0,
         rtol=1e-9,
     )
-    assert np.abs(solution.y[0] - angles).max() < 2e-3
+    assert np.abs(solution.y[0] - angles).max() < 4e-3
     assert angles[-1] == pytest.approx(goal, abs=0.01)
 
 

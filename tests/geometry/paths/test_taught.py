@@ -20,8 +20,8 @@ PICKING = Picking(SPACING, ANGLE)
 LAP = Picking(SPACING, ANGLE, closed=True)
 
 
-def line(length, step=1e-4):
-    x = np.arange(0.0, length, step)
+def line(length, begin=0.0, step=1e-4):
+    x = begin + np.arange(0.0, length, step)
     return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
 
 
@@ -56,8 +56,8 @@ def test_neighbours_are_as_far_apart_as_asked(seed):
 def test_a_rest_adds_no_waypoints():
     rest = np.tile([0.1, 0.0, 0.0], (20_000, 1))
     rest += np.random.default_rng(1).normal(scale=5e-4, size=rest.shape)
-    way = np.vstack([line(0.1), rest, line(0.1) + [0.1, 0.0, 0.0]])
-    straight = np.vstack([line(0.1), line(0.1) + [0.1, 0.0, 0.0]])
+    way = np.vstack([line(0.1), rest, line(0.1, 0.1)])
+    straight = np.vstack([line(0.1), line(0.1, 0.1)])
     picked, without = (pick_waypoints(y, None, PICKING) for y in (way, straight))
     assert abs(len(picked) - len(without)) <= 1
     inside = (picked > 1000) & (picked < 20_990)
@@ -76,16 +76,16 @@ def test_turning_adds_waypoints():
     assert apart == pytest.approx(np.full(len(apart), 0.5 * SPACING), abs=2e-4)
     assert turned == pytest.approx(np.full(len(apart), 3.0), abs=0.1)
     slow = Rotation.from_rotvec(0.1 * angles[:, None] * [0.0, 0.6, 0.8]).as_matrix()
-    assert np.array_equal(
-        pick_waypoints(way, slow, PICKING), pick_waypoints(way, None, PICKING)
-    )
+    assert np.array_equal(pick_waypoints(way, slow, PICKING), pick_waypoints(way, None, PICKING))
 
 
 def test_a_turn_where_the_tool_stands_is_refused():
-    way = np.vstack([line(0.05), np.tile([0.05, 0.0, 0.0], (300, 1)), line(0.05) + [0.05, 0, 0]])
+    way = np.vstack([line(0.05), np.tile([0.05, 0.0, 0.0], (300, 1)), line(0.05, 0.05)])
     angles = np.concatenate([np.zeros(500), np.linspace(0.0, 1.0, 300), np.ones(500)])
     R = Rotation.from_rotvec(angles[:, None] * [1.0, 0.0, 0.0]).as_matrix()
-    with pytest.raises(InputError, match=r"^taught path: the tool turned by 5\d.\d deg within 0.00\d+ m, aft"):
+    with pytest.raises(
+        InputError, match=r"^taught path: the tool turned by 5\d.\d deg within 0.00\d+ m, aft"
+    ):
         pick_waypoints(way, R, PICKING)
 
 

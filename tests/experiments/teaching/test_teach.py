@@ -1,0 +1,192 @@
+"""From the log of a tool that was led to waypoints, a path and a scenario."""
+
+import json
+
+import numpy as np
+import pytest
+
+from diagrams.scenario import Scenario, Waypoints
+from diagrams.tasks.path import make_path
+from experiments.catalog.scenario_file import read_scenario
+from experiments.cli import main
+from experiments.results.run_log import RunLog
+from experiments.teaching.comparison import compare_fit, compare_followed
+from experiments.teaching.follow import follow_scenario
+from experiments.teaching.options import TeachingOptions
+from experiments.teaching.taught import taught_path
+from experiments.teaching.teach import KIND, teach
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import read_waypoints
+from pfsc_drake.yaml.reading import read_yaml
+from pfsc_drake.yaml.typed import load_typed
+from reporting.folder import check_folder
+
+OPTIONS = TeachingOptions(tolerance=1e-3)
+
+
+def settings_of(tool, *changes):
+    scenario = read_scenario("teach_by_hand_6r", list(changes))
+    return load_typed(Scenario, scenario.data, "scenario")
+
+
+def test_waypoints_are_what_the_controller_saw(wave):
+    taught = taught_path(settings_of(wave), wave.log(), OPTIONS)
+    assert taught.table.positions == pytest.approx((wave.positions + wave.SHIFT)[taught.rows])
+    fit = compare_fit(taught)
+    # the tremor of 0.1 mm per axis is not followed, and all of it stays near
+    assert 1e-4 < fit.distances.max() <= 1e-3
+    assert fit.turns.max() <= np.deg2rad(1.0)
+    assert fit.shape.largest_curvature_rate < 0.1 * fit.shape_through.largest_curvature_rate
+    # the curve itself: 0.02 m sin(2 pi x), x = y / 0.3 m
+    begin, end = taught.path.position.domain
+    points = taught.path.position.derivatives(np.linspace(begin, end, 200), 0)[:, 0] - wave.SHIFT
+    wanted = 1.0 + 0.02 * np.sin(2.0 * np.pi * points[:, 1] / 0.3)
+    assert np.abs(points[:, 2] - wanted).max() < 1.5e-3
+    assert np.abs(points[:, 0] - 0.8).max() < 3e-4
+
+
+def test_a_robot_that_repeats_itself_has_the_same_error(wave):
+    """The tool goes there again, half as fast, with another tremor, as seen 0.1 mm off."""
+    log, again = wave.log(), wave.log()
+    taught = taught_path(settings_of(wave), log, OPTIONS)
+    again.signals["y_t"].values[:] += [1e-4, 0.0, 0.0]
+    again.add("xi_measured", np.tile([3e-4, 4e-4], (len(again.time), 1)), "m")
+    again.add("xi", np.tile([0.0, 2e-3], (len(again.time), 1)), "m")
+    again.add("eta", again.time, "m")
+    followed = compare_followed(taught, again)
+    assert followed.eta[0] == pytest.approx(0.5)
+    assert followed.seen == pytest.approx(np.full(len(followed.eta), 5e-4))
+    assert followed.true == pytest.approx(np.full(len(followed.eta), 2e-3))
+    assert followed.repeated.max() <= 1e-4 + 1e-12
+    error = wave.SHIFT - [1e-4, 0.0, 0.0]
+    assert followed.error == pytest.approx(np.full(len(followed.eta), np.linalg.norm(error)))
+    assert followed.error_change == pytest.approx(np.full(len(followed.eta), 1e-4), abs=1e-9)
+    assert followed.turns.max() < 1e-3
+
+
+def test_the_scenario_is_the_same_robot_on_the_path(wave):
+    settings = settings_of(wave)
+    taught = taught_path(settings, wave.log(), OPTIONS)
+    data = follow_scenario(taught, TeachingOptions(tolerance=1e-3, velocity=0.2))
+    made = load_typed(Scenario, data, "follow")
+    assert made.controller.manifold == "path"
+    for key in ("robot", "friction", "encoders", "model_error", "servo"):
+        assert getattr(made, key) == getattr(settings, key)
+    assert made.controller.gains == settings.controller.gains
+    assert made.hand is None
+    assert made.fixtures is None
+    assert not made.compliance.is_given
+    assert isinstance(made.path.shape, Waypoints)
+    assert made.path.shape.tolerance == 1e-3
+    assert made.reference.velocity == 0.2
+    assert made.reference.points[1] == pytest.approx(taught.path.length, abs=1e-4)
+    assert made.start.posture_deg == pytest.approx([-21, 89, -27, 12, 103, 4])
+
+
+def test_gains_across_the_path_are_those_along_it_where_there_are_none(wave):
+    gains = "{velocity_servo: {eta: {coefficients: [7]}, phi: {coefficients: [12]}}}"
+    settings = settings_of(wave, f"controller.gains={gains}")
+    made = follow_scenario(taught_path(settings, wave.log(), OPTIONS), OPTIONS)
+    assert made["controller"]["gains"]["velocity_servo"]["xi"] == {"coefficients": [7.0]}
+
+
+def test_a_tool_without_orientation_teaches_positions(wave):
+    settings = settings_of(wave, "fixtures.orientation={kind: none}")
+    taught = taught_path(settings, wave.log(), OPTIONS)
+    assert taught.table.quaternions is None
+    made = load_typed(Scenario, follow_scenario(taught, OPTIONS), "follow")
+    assert made.path.orientation.task == "none"
+
+
+def test_an_axis_that_was_kept_is_followed(wave):
+    axis = "{kind: given, task: tool_axis, tool_axis: [0, 0, 2]}"
+    settings = settings_of(wave, f"fixtures.orientation={axis}")
+    made = load_typed(
+        Scenario, follow_scenario(taught_path(settings, wave.log(), OPTIONS), OPTIONS), "follow"
+    )
+    assert made.path.orientation.task == "tool_axis"
+    assert made.path.orientation.tool_axis == [0.0, 0.0, 2.0]
+
+
+def test_files_that_can_be_run_by_themselves(wave, tmp_path):
+    run = wave.write(tmp_path / "guide")
+    outcome = teach(run, tmp_path / "out", OPTIONS, follow=False)
+    assert outcome.report.problem is None
+    assert {file.name for file in (tmp_path / "out").iterdir()} == {
+        "taught.csv", "follow.yaml", "metrics.json", "report.html", "manifest.json", "figures",
+    }  # fmt: skip
+    table = read_waypoints(outcome.waypoints)
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["waypoints"]["value"] == len(table.positions)
+    check_folder(tmp_path / "out", KIND)  # what it wrote itself may be replaced
+    moved = (tmp_path / "out").rename(tmp_path / "elsewhere")
+    settings = load_typed(Scenario, read_yaml(moved / "follow.yaml"), "follow")
+    path = make_path(settings.path, settings.controller.law, moved)
+    assert path.length == pytest.approx(metrics["path_length"]["value"], abs=1e-6)
+
+
+def test_a_users_own_waypoints_stay(wave, tmp_path, capsys):
+    run = wave.write(tmp_path / "guide")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "taught.csv").write_text("mine", encoding="utf-8")
+    assert "it holds taught.csv" in refused(capsys, run, "--out", tmp_path / "out")
+
+
+def refused(capsys, *arguments):
+    assert main(["teach", *map(str, arguments)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said
+
+
+def test_a_hand_that_never_moved(still, tmp_path, capsys):
+    run = still.write(tmp_path / "guide")
+    said = refused(capsys, run, "--out", tmp_path / "out")
+    assert "nothing was taught: the tool never went further than 0 m" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_too_few_waypoints(wave, tmp_path, capsys):
+    run = wave.write(tmp_path / "guide")
+    said = refused(capsys, run, "--out", tmp_path / "out", "--spacing", "0.15", "--angle", 20)
+    assert "taught path: 3 waypoints on 0." in said
+    assert "needs 4 or more" in said
+    assert "--spacing below 0.15 m" in said
+
+
+def test_runs_that_taught_nothing(wave, tmp_path, capsys):
+    assert "no such folder" in refused(capsys, tmp_path / "none", "--out", tmp_path / "out")
+    (tmp_path / "empty").mkdir()
+    assert "scenario.yaml" in refused(capsys, tmp_path / "empty", "--out", tmp_path / "out")
+    run = wave.write(tmp_path / "path", "controller.manifold=path")
+    said = refused(capsys, run, "--out", tmp_path / "out")
+    assert "controller.manifold = path; allowed: space" in said
+    run = wave.write(tmp_path / "fine")
+    assert "holds the results of a" not in refused(capsys, run, "--out", run)
+    assert "--spacing = 0.0; allowed: 0.0001 to 1 m" in refused(capsys, run, "--spacing", 0)
+
+
+def test_a_log_without_what_the_encoders_told(wave):
+    log = wave.log()
+    del log.signals["y_t_measured"]
+    with pytest.raises(InputError, match=r"^log.h5: has no y_t_measured"):
+        taught_path(settings_of(wave), log, OPTIONS)
+    perfect = RunLog(log.time, {name: log[name] for name in ("y_t", "R_e")})
+    taught = taught_path(settings_of(wave), perfect, OPTIONS)
+    assert taught.table.positions == pytest.approx(wave.positions[taught.rows])
+
+
+def test_it_runs_by_its_name(monkeypatch, tmp_path):
+    from experiments.studies import teach_in
+    from reporting.page import Report
+
+    seen = []
+
+    def write(out, progress):
+        seen.append(out)
+        return Report(out / "report.html", None)
+
+    monkeypatch.setattr(teach_in, "write_teach_in", write)
+    assert main(["run", "teach_in", "--out", str(tmp_path / "one")]) == 0
+    assert main(["study", "teach_in", "--out", str(tmp_path / "two")]) == 0
+    assert seen == [tmp_path / "one", tmp_path / "two"]
