@@ -116,12 +116,7 @@ def compare_followed(taught: Taught, log: RunLog) -> Followed:
         taught: The path.
         log: Of the run along it.
     """
-    between = slice(int(taught.rows[0]), int(taught.rows[-1]) + 1)
-    y_seen, _ = seen_tool(taught.log)
-    y_taught, R_taught = (values[between] for values in true_tool(taught.log))
-    error_taught = y_taught - y_seen[between]
-    good = np.isfinite(error_taught).all(axis=1)
-    y_taught, R_taught, error_taught = y_taught[good], R_taught[good], error_taught[good]
+    y_taught, R_taught, error_taught = _led_tool(taught)
     y_t, R_e = true_tool(log)
     seen, _ = seen_tool(log)
     xi = log["xi_measured" if "xi_measured" in log else "xi"].values
@@ -139,6 +134,29 @@ def compare_followed(taught: Taught, log: RunLog) -> Followed:
         np.linalg.norm(error, axis=1),
         change,
         y_t,
+    )
+
+
+def _led_tool(taught: Taught) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the tool was between first and last waypoint, how turned, and how far off.
+
+    From the last waypoint of a closed path it goes straight to the first.
+    """
+    y_seen, (y_t, R_e) = seen_tool(taught.log)[0], true_tool(taught.log)
+    error = y_t - y_seen
+    rows = np.arange(int(taught.rows[0]), int(taught.rows[-1]) + 1)
+    rows = rows[np.isfinite(error[rows]).all(axis=1)]
+    if not taught.path.closed:
+        return y_t[rows], R_e[rows], error[rows]
+    first, last = rows[0], rows[-1]
+    count = int(np.ceil(np.linalg.norm(y_t[first] - y_t[last]) / _LINE_STEP))
+    share = (np.arange(1, count + 1) / count)[:, None] if count else np.zeros((0, 1))
+    nearer = np.where(share[:, 0] < 0.5, last, first)
+    closing = [x[last] + share * (x[first] - x[last]) for x in (y_t, error)]
+    return (
+        np.vstack([y_t[rows], closing[0]]),
+        np.concatenate([R_e[rows], R_e[nearer]]),
+        np.vstack([error[rows], closing[1]]),
     )
 
 

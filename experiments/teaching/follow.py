@@ -1,5 +1,6 @@
 """The scenario of a robot that follows the path it was taught."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -99,7 +100,7 @@ def _gains(settings: Scenario) -> dict[str, Any]:
     given = _data(settings)["controller"]["gains"][law]
     gains = _pruned(given, default)
     if "xi" not in gains:
-        gains["xi"] = dict(gains["eta"])
+        gains["xi"] = copy.deepcopy(gains["eta"])
     return {law: gains}
 
 

@@ -76,7 +76,7 @@ def _draw_distances(fit: Fit, followed: Followed | None) -> Drawing:
             "model's error of place": followed.error,
             "from where it was taught": followed.repeated,
             "from the path, as measured": followed.seen,
-            "what the model's error leaves": followed.error_change,
+            "change of that error since teaching": followed.error_change,
         }
         for colour, (label, values) in zip(COLOURS, lines.items(), strict=False):
             panels[1].plot(followed.eta, _MILLI * values, color=colour, label=label)
@@ -86,8 +86,9 @@ def _draw_distances(fit: Fit, followed: Followed | None) -> Drawing:
         place_legend(panels[1], columns=2)
     panels[-1].set_xlabel(r"$\eta$ in m")
     caption = (
-        "Above: tremor and stops of the hand, smoothed by the fit. Below: the model is wrong by "
-        "millimetres about the place of the tool, and by the same while teaching and following."
+        "Above: corners, stops and tremor of the hand, which the fit smooths. Below: how far the "
+        "tool is from where the controller takes it to be, which was the same while teaching; from "
+        "where it truly was while it was taught; and from the path."
     )
     return Drawing("distances", "Distances", caption, canvas)
 

@@ -127,7 +127,7 @@ def run_and_tell(
         duration=None,
         figures=drawn,
         recording=drawn,
-        progress=_Silent(),
+        progress=_Quarters(loaded.name, progress),
     )
     if outcome.interrupted:
         raise KeyboardInterrupt
@@ -137,14 +137,22 @@ def run_and_tell(
     return outcome
 
 
-class _Silent:
-    """Hears how far a run is, and says nothing."""
+class _Quarters:
+    """Tells a line at each quarter of a run."""
+
+    def __init__(self, name: str, tell: Callable[[str], None]) -> None:
+        self._name, self._tell = name, tell
+        self._duration, self._told = 0.0, 0
 
     def expect(self, duration: float) -> None:
         """See :class:`reporting.progress.ProgressListener`."""
+        self._duration = duration
 
     def __call__(self, simulated_time: float, phase: str) -> None:
         """See :class:`reporting.progress.ProgressListener`."""
+        if self._duration > 0.0 and 4.0 * simulated_time / self._duration >= self._told + 1:
+            self._told += 1
+            self._tell(f"{self._name}: {simulated_time:.1f} of {self._duration:.1f} s")
 
 
 def _write_page(

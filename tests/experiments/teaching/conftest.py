@@ -51,3 +51,11 @@ def fixture_wave():
 @pytest.fixture(name="still")
 def fixture_still():
     return LedTool(np.tile([0.8, 0.0, 1.0], (500, 1)), np.tile([np.pi, 0.0, 0.0], (500, 1)))
+
+
+@pytest.fixture(name="lap")
+def fixture_lap():
+    """Once round a circle of 0.1 m, all but 5 mm."""
+    angle = np.linspace(0.0, 2.0 * np.pi - 0.05, 3000)
+    y = np.stack([0.8 + 0.1 * np.cos(angle), 0.1 * np.sin(angle), 1.0 + 0.0 * angle], axis=1)
+    return LedTool(y, np.tile([np.pi, 0.0, 0.0], (3000, 1)))

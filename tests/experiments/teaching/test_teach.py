@@ -10,14 +10,14 @@ from diagrams.tasks.path import make_path
 from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
 from experiments.results.run_log import RunLog
-from experiments.teaching.comparison import compare_fit, compare_followed
+from experiments.teaching.comparison import compare_fit, compare_followed, line_of
 from experiments.teaching.follow import follow_scenario
 from experiments.teaching.options import TeachingOptions
 from experiments.teaching.taught import taught_path
 from experiments.teaching.teach import KIND, teach
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints
-from pfsc_drake.yaml.reading import read_yaml
+from pfsc_drake.yaml.reading import dump_yaml, read_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder
 
@@ -64,6 +64,27 @@ def test_a_robot_that_repeats_itself_has_the_same_error(wave):
     assert followed.turns.max() < 1e-3
 
 
+def test_a_lap_is_followed_across_its_begin(lap):
+    log = lap.log()
+    taught = taught_path(settings_of(lap), log, TeachingOptions(closed=True, tolerance=5e-4))
+    assert taught.path.closed
+    assert taught.path.length == pytest.approx(2.0 * np.pi * 0.1, rel=5e-3)
+    points = line_of(taught.path)
+    again = RunLog(1.0 + 1e-3 * np.arange(len(points)))
+    again.add("y_t", points - lap.SHIFT, "m")
+    again.add("y_t_measured", points, "m")
+    for name in ("R_e", "R_e_measured"):
+        again.add(name, np.tile(lap.R[0].ravel(), (len(points), 1)), "1")
+    for name in ("xi", "eta"):
+        again.add(name, np.zeros((len(points), 1)), "m")
+    followed = compare_followed(taught, again)
+    assert followed.repeated.max() < 6e-4
+    assert followed.turns.max() < 1e-6
+    data = follow_scenario(taught, TeachingOptions(closed=True, tolerance=5e-4))
+    assert load_typed(Scenario, data, "follow").path.shape.closed
+    assert data["reference"]["points"][1] == pytest.approx(taught.path.length, abs=1e-6)
+
+
 def test_the_scenario_is_the_same_robot_on_the_path(wave):
     settings = settings_of(wave)
     taught = taught_path(settings, wave.log(), OPTIONS)
@@ -88,6 +109,7 @@ def test_gains_across_the_path_are_those_along_it_where_there_are_none(wave):
     settings = settings_of(wave, f"controller.gains={gains}")
     made = follow_scenario(taught_path(settings, wave.log(), OPTIONS), OPTIONS)
     assert made["controller"]["gains"]["velocity_servo"]["xi"] == {"coefficients": [7.0]}
+    assert "&" not in dump_yaml(made)
 
 
 def test_a_tool_without_orientation_teaches_positions(wave):
