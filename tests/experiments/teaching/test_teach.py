@@ -14,7 +14,7 @@ from experiments.teaching.comparison import compare_fit, compare_followed, line_
 from experiments.teaching.follow import follow_scenario
 from experiments.teaching.options import TeachingOptions
 from experiments.teaching.taught import taught_path
-from experiments.teaching.teach import KIND, teach
+from experiments.teaching.teach import KIND
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints
 from pfsc_drake.yaml.reading import dump_yaml, read_yaml
@@ -130,14 +130,17 @@ def test_an_axis_that_was_kept_is_followed(wave):
     assert made.path.orientation.tool_axis == [0.0, 0.0, 2.0]
 
 
-def test_files_that_can_be_run_by_themselves(wave, tmp_path):
+def test_files_that_can_be_run_by_themselves(wave, tmp_path, capsys):
     run = wave.write(tmp_path / "guide")
-    outcome = teach(run, tmp_path / "out", OPTIONS, follow=False)
-    assert outcome.report.problem is None
+    arguments = ["teach", run, "--out", tmp_path / "out", "--tolerance", 0.001, "--no-follow"]
+    assert main(list(map(str, arguments))) == 0
+    said = capsys.readouterr().out
+    assert "waypoints, a path of 0.3" in said
+    assert "report.html" in said
     assert {file.name for file in (tmp_path / "out").iterdir()} == {
         "taught.csv", "follow.yaml", "metrics.json", "report.html", "manifest.json", "figures",
     }  # fmt: skip
-    table = read_waypoints(outcome.waypoints)
+    table = read_waypoints(tmp_path / "out" / "taught.csv")
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
     assert metrics["waypoints"]["value"] == len(table.positions)
     check_folder(tmp_path / "out", KIND)  # what it wrote itself may be replaced
