@@ -19,6 +19,9 @@ def guidance_metrics(log: RunLog) -> Metrics:
     metrics = Metrics()
     if "region_distance" not in log or not log.time.size:
         return metrics
+    if "phi" in log:  # a tool that a hand turns is where it is asked to be, not at zero
+        error = np.linalg.norm(log["phi"].values - log["phi_p"].values, axis=1)
+        metrics.add("max_orientation_error", float(np.nanmax(error)), "rad")
     hard = np.setdiff1d(np.arange(log["region_distance"].values.shape[1]), soft_regions(log))
     distance = log["region_distance"].values
     if hard.size:

@@ -56,6 +56,10 @@ def test_a_torque_turns_a_tool_that_is_led(tmp_path):
     assert main([*arguments, *BARE, *changes]) == 0
     with h5py.File(tmp_path / "run" / "log.h5") as log:
         t, R = log["t"][:], Rotation.from_matrix(log["R_e"][:].reshape(-1, 3, 3))
+    # it is where it is asked to be, though not as it was at the start
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["max_orientation_error"]["value"] < 0.05
+    assert (R[-1] * R[0].inv()).magnitude() > 0.15
     begin, end = np.searchsorted(t, [0.5, 0.6])
     turned = (R[end - 1] * R[begin].inv()).as_rotvec()
     assert turned == pytest.approx([0.0, 0.0, 0.5 * (t[end - 1] - t[begin])], abs=5e-3)
