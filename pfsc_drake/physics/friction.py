@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.errors import InputError
 
@@ -78,18 +80,22 @@ class BristleFriction:
         return self.coulomb / self.presliding
 
     @cached_property
-    def _slope(self) -> np.ndarray:
-        return self.relaxation / self.presliding
+    def _bound(self) -> BoundFunction:
+        """``(s, v) -> (torque, rate)``; evaluated in every stage of an integration."""
+        s, v = ca.SX.sym("s", self.dimension), ca.SX.sym("v", self.dimension)
+        # unlike a minimum, a comparison lets NaN through
+        bent = s + (self.relaxation / self.presliding) * v
+        bent = ca.if_else(bent < -1.0, -1.0, bent)
+        bent = ca.if_else(bent > 1.0, 1.0, bent)
+        results = [self.coulomb * bent + self.viscous * v, (bent - s) / self.relaxation]
+        dense = [ca.densify(result) for result in results]
+        return BoundFunction(ca.Function("bristles", [s, v], dense, ["s", "v"], ["torque", "rate"]))
 
-    def bend(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return ``f_d / f_c = sat(s + tau v / delta)``, shape (N,).
-
-        Args:
-            s: Deflection of the bristles, shape (N,).
-            v: Velocity [rad/s], shape (N,).
-        """
-        # three times as fast as clip, which matters in every stage of an integration
-        return np.minimum(np.maximum(s + self._slope * v, -1.0), 1.0)
+    def _evaluate(self, s: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:
+        bound = self._bound
+        bound.arguments["s"][:], bound.arguments["v"][:] = s, v
+        bound.evaluate()
+        return bound.results
 
     def torque(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return ``tau_f`` [Nm], shape (N,), positive against a positive velocity.
@@ -98,7 +104,7 @@ class BristleFriction:
             s: Deflection of the bristles, shape (N,).
             v: Velocity [rad/s], shape (N,).
         """
-        return self.coulomb * self.bend(s, v) + self.viscous * v
+        return self._evaluate(s, v)["torque"].copy()
 
     def rate(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return ``s'`` [1/s], shape (N,).
@@ -107,7 +113,7 @@ class BristleFriction:
             s: Deflection of the bristles, shape (N,).
             v: Velocity [rad/s], shape (N,).
         """
-        return (self.bend(s, v) - s) / self.relaxation
+        return self._evaluate(s, v)["rate"].copy()
 
     def energy(self, s: np.ndarray) -> np.ndarray:
         """Return what the bent bristles store, ``f_c delta s^2 / 2`` [J], shape (N,).

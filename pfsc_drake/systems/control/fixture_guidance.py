@@ -10,6 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.fixtures.guidance import GuidanceStep
+from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import Lead, Vector
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.robot.robot_model import RobotModel, tool_velocity_function
@@ -52,6 +53,7 @@ class FixtureGuidance(LeafSystem):
             if not connected.
         reference (output): Derivatives 0..p of the reference by rows, shape ((p + 1) m,), of which
             only the first three columns, those of the tool point, are not zero.
+        mode (output): A :class:`~pfsc_drake.control.fixtures.labels.Mode`, shape (1,).
         record (output): What there is to log, laid out by ``layout``.
 
     A force that is not finite counts as zero; that the robot stops then is the affair of whoever
@@ -100,6 +102,7 @@ class FixtureGuidance(LeafSystem):
         self.DeclareVectorOutputPort(
             "record", layout.size, self._calc_record, prerequisites_of_calc=sources
         )
+        self.DeclareVectorOutputPort("mode", 1, self._calc_mode, prerequisites_of_calc=sources)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
         function = BoundFunction(tool_velocity_function(robot))
@@ -142,6 +145,10 @@ class FixtureGuidance(LeafSystem):
                 step.lead, motion[:3], step.velocity, self._order
             )
         output.SetFromVector(reference.ravel())
+
+    def _calc_mode(self, context: Context, output: BasicVector) -> None:
+        step, _ = self._step.Eval(context)
+        output.SetFromVector([Mode.FREE if step is None else step.mode])
 
     def _calc_record(self, context: Context, output: BasicVector) -> None:
         step, _ = self._step.Eval(context)

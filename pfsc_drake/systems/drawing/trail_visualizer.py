@@ -27,6 +27,7 @@ class TrailVisualizer(LeafSystem):
         color: Its colour, or the colour that a value gives the piece that ends there.
         meshcat: Where to draw, axes of the world.
         period: Time between frames [s].
+        longest: How many pieces stay; all of them by default.
     """
 
     def __init__(
@@ -35,8 +36,10 @@ class TrailVisualizer(LeafSystem):
         color: Rgba | Callable[[float], Rgba],
         meshcat: Meshcat,
         period: float,
+        longest: int | None = None,
     ) -> None:
         super().__init__()
+        self._longest = longest
         self._name, self._color, self._meshcat = name, color, meshcat
         self._last = self.DeclareDiscreteState(np.full(3, np.nan))
         self._frames = self.DeclareDiscreteState(1)
@@ -54,6 +57,8 @@ class TrailVisualizer(LeafSystem):
             return
         time = context.get_time()
         frame = int(context.get_discrete_state(self._frames).value()[0])
+        if self._longest is not None:
+            frame %= self._longest
         piece = f"{self._name}/trail/{frame:05d}"
         self._meshcat.SetLine(piece, ends, _WIDTH, self._piece_color(context))
         if time > 0.0:

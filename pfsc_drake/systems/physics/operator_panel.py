@@ -1,0 +1,50 @@
+"""What a person sets while a robot moves, sampled."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+
+class OperatorPanel(LeafSystem):
+    """Looks at a person's controls once per period.
+
+    Whatever the controls are connected to - a live session that fixes their values, or
+    :class:`RecordedControls` - only their values at the ticks have an effect: so a recording of
+    these repeats a run to the last bit.
+
+    Ports:
+        controls (input, optional): All parts, one after the other, shape (size,); nobody is
+            there while it is neither connected nor fixed, and all parts stay as they start.
+        NAME (output): One per part.
+
+    State:
+        Discrete: the controls at the last tick, shape (size,).
+
+    Args:
+        parts: How each part starts, by name, 1-dimensional.
+        period: Time between looks [s].
+    """
+
+    def __init__(self, parts: Mapping[str, np.ndarray], period: float) -> None:
+        super().__init__()
+        initial = np.concatenate(list(parts.values()))
+        memory = self.discrete_state_ticket(self.DeclareDiscreteState(initial))
+        self._controls = self.DeclareVectorInputPort("controls", len(initial))
+        begin = 0
+        for name, values in parts.items():
+            self._add_output(name, slice(begin, begin + len(values)), memory)
+            begin += len(values)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
+
+    def _add_output(self, name: str, part: slice, memory: object) -> None:
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(context.get_discrete_state_vector().value()[part])
+
+        self.DeclareVectorOutputPort(
+            name, part.stop - part.start, calc, prerequisites_of_calc={memory}
+        )
+
+    def _look(self, context: Context, state: DiscreteValues) -> None:
+        if self._controls.HasValue(context):
+            state.set_value(self._controls.Eval(context))
