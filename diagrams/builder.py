@@ -22,8 +22,10 @@ from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.notch import NotchedWorkpiece
+from diagrams.surroundings.operator import add_operator
 from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.following import Following, add_law, add_place
+from diagrams.tasks.guidance import MODES
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.make import make_task
@@ -75,11 +77,13 @@ def build_station(
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
-    forces = add_surroundings(builder, part, task, scenario, around)
+    operator = add_operator(builder, scenario, folder)
+    forces = add_surroundings(builder, part, task, scenario, around, operator)
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
         forces |= add_sensor(builder, part, scenario, states | forces)
-    controller, made = add_law(builder, following, place, forces)
+    wishes = {} if operator is None else operator.wishes
+    controller, made = add_law(builder, following, place, forces | wishes)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     signals |= add_drives(builder, part, scenario, signals | drive, initial_state)
@@ -108,6 +112,8 @@ def build_station(
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),
         workpiece,
+        operator,
+        MODES if "mode" in signals else (),
     )
 
 

@@ -1,5 +1,6 @@
 """What running, logging and measuring need to know of a station."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,7 @@ from pydrake.systems.framework import Context, Diagram
 from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
+from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import Task
 from diagrams.workpiece import FurtherLength, Workpiece
@@ -59,6 +61,8 @@ class Station:
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         warnings: What may not go as well as hoped, one sentence each.
         workpiece: What the tool may touch, if anything.
+        operator: Who guides the tool while the robot moves, if anybody does.
+        mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
     """
 
     diagram: Diagram
@@ -73,6 +77,8 @@ class Station:
     on_motors: bool
     warnings: list[str]
     workpiece: Workpiece | None = None
+    operator: Operator | None = None
+    mode_labels: Sequence[str] = ()
 
     @property
     def robot(self) -> RobotModel:
@@ -162,6 +168,14 @@ class Station:
         robot = self.part.belief.robot
         scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
         return FoundFault(describe(fault, scene), now.time)
+
+    def mode_name(self, mode: int) -> str:
+        """Return what a value of the signal ``mode`` is called.
+
+        Args:
+            mode: The value.
+        """
+        return self.mode_labels[mode] if 0 <= mode < len(self.mode_labels) else str(mode)
 
     def further_lengths(self, y_t: np.ndarray) -> dict[str, FurtherLength]:
         """Return what else is worth a look in a run, by name, if anything is.

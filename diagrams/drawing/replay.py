@@ -102,7 +102,7 @@ def build_replay(
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
     """
-    bodies = _body_origins(robot.plant, motion.positions[0])
+    bodies = body_origins(robot.plant, motion.positions[0])
     points = np.concatenate(manifold.outline())
     meshcat.SetCameraPose(*camera_and_target(points, bodies))
     if workpiece is not None:
@@ -234,8 +234,13 @@ def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarra
     return target + _DISTANCE * size * view, target
 
 
-def _body_origins(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
-    """Origins of all bodies but the world [m], shape (bodies, 3)."""
+def body_origins(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
+    """Return the origins of all bodies but the world [m], shape (bodies, 3).
+
+    Args:
+        plant: The plant.
+        q: Its positions.
+    """
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, q)
     bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]

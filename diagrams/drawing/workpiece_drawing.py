@@ -27,12 +27,22 @@ def add_workpiece_drawing(
         meshcat: Where to draw, axes of the inertial frame.
         period: Time between frames [s].
     """
-    surface = look.surface
-    meshcat.SetTriangleMesh("workpiece", surface.vertices.T, surface.triangles.T, _WORKPIECE)
+    draw_workpiece(look, meshcat)
     tool = builder.AddNamedSystem(
         "tool_visualizer", ToolVisualizer(look.tool_parts, meshcat, period)
     )
     builder.Connect(tool_pose, tool.GetInputPort("tool_pose"))
+
+
+def draw_workpiece(look: WorkpieceLook, meshcat: Meshcat) -> None:
+    """Draw a workpiece.
+
+    Args:
+        look: How it is drawn.
+        meshcat: Where to draw, axes of the inertial frame.
+    """
+    surface = look.surface
+    meshcat.SetTriangleMesh("workpiece", surface.vertices.T, surface.triangles.T, _WORKPIECE)
 
 
 def look_down_at(meshcat: Meshcat, target: np.ndarray) -> None:

@@ -39,6 +39,12 @@ class FixtureParameters:
     smoothing: float = 0.003
     looks: int = 0
 
+    @property
+    def names(self) -> list[str]:
+        """What the regions are called: kind of shape and number, from 1 on."""
+        kinds = (type(region.shape).__name__.lower() for region in self.regions)
+        return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
+
     def __post_init__(self) -> None:
         known = self.start_inside in _START
         require(known, "start_inside", self.start_inside, ", ".join(_START))

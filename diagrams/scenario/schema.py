@@ -19,6 +19,7 @@ from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.notch import NotchParameters
+from diagrams.scenario.operator import OperatorParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.simulation import SimulationParameters
@@ -65,6 +66,8 @@ class Scenario:
         pushes: Hands that take hold of links and move them.
         hand: An operator's hand on the tool, in addition to the forces; none without the block
             or with ``hand: null``.
+        operator: A person who guides the tool while the robot moves, in a live session or as
+            recorded in one. None without the block.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
         friction: Friction of the joints.
@@ -98,6 +101,7 @@ class Scenario:
     forces: list[ForcePulse] = dc.field(default_factory=list)
     pushes: list[LinkHandParameters] = dc.field(default_factory=list)
     hand: HandParameters | None = None
+    operator: OperatorParameters | None = None
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
     friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)

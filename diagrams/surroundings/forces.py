@@ -8,6 +8,7 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
+from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import Task
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -23,6 +24,7 @@ def add_surroundings(
     task: Task,
     scenario: Scenario,
     ports: dict[str, OutputPort],
+    operator: Operator | None = None,
 ) -> dict[str, OutputPort]:
     """Add the scenario's forces on the robot, and return their signals for the log.
 
@@ -32,6 +34,7 @@ def add_surroundings(
         task: What it is to do.
         scenario: The scenario.
         ports: ``joint_state``, the true one, ``manifold_point``.
+        operator: A person who guides the tool, if there is one.
 
     Returns:
         ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, and
@@ -42,6 +45,7 @@ def add_surroundings(
     """
     sources = _scripted(builder, part, task, scenario, ports)
     sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
+    sources += add_live_hand(builder, part.robot, scenario, operator, ports["joint_state"])
     pushes, signals = add_pushes(builder, part, task, scenario, ports)
     wrenches, held = [], None
     if part.contact is not None:

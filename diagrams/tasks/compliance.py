@@ -2,15 +2,23 @@
 
 import math
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceLaw
+from pfsc_drake.control.compliance.impedance import (
+    MASS,
+    STIFFNESS,
+    CoordinateImpedance,
+    ImpedanceLaw,
+)
+from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
+from pfsc_drake.systems.control.impedance_tuner import ImpedanceTuner
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.systems.control.pressing import Pressing
 
@@ -54,13 +62,13 @@ def add_compliance(
         linearization: Of the law that follows the reference.
         ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
             ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
-            derivatives up to :func:`reference_order`.
+            derivatives up to :func:`reference_order`; with an operator ``impedance_wish``.
         lap: Length of the path [m] if it is closed.
         end: When the external reference ends [s].
 
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
-        a force reference ``press``;
+        a force reference ``press``, with an operator ``impedance`` and ``tank``;
         ``compliance_status``, an :class:`ImpedanceStatus`.
 
     Raises:
@@ -99,12 +107,53 @@ def add_compliance(
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]
+    # where guidance leads along, the impedance is the scenario's
+    if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
+        signals |= _add_tuner(builder, scenario, linearization, law, impedance, ports)
     return signals | {
         "reference": reference,
         "desired_reference": desired,
         "manifold_force": force,
         "compliance_status": impedance.GetOutputPort("status"),
     }
+
+
+def _add_tuner(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    linearization: Linearization,
+    law: ImpedanceLaw,
+    impedance: ImpedanceFilter,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Let an operator change the impedance; return it as it is, and the tank that pays for it."""
+    assert scenario.operator is not None
+    coordinates = linearization.manifold.coordinates
+    given = law.impedance(np.zeros(len(coordinates)))
+    # what is rigid has no mass of its own
+    soft = np.isfinite(given[STIFFNESS])
+    along = given[MASS, indices(coordinates, Kind.TANGENTIAL)].max()
+    masses = np.where(soft, given[MASS], along)
+    masses[indices(coordinates, Kind.ROTATIONAL)] = given[
+        MASS, indices(coordinates, Kind.ROTATIONAL)
+    ]
+    tuning = ImpedanceTuning(
+        scenario.operator.tuning, coordinates, masses, law.period, varying=not law.is_constant
+    )
+    sources = {
+        "wish": ports["impedance_wish"],
+        "manifold_state": ports["manifold_state"],
+        "reference": impedance.GetOutputPort("reference"),
+        "desired_reference": ports["desired_reference"],
+    }
+    sizes = tuple(port.size() for port in list(sources.values())[1:])
+    tuner = builder.AddNamedSystem(
+        "impedance_tuner", ImpedanceTuner(tuning, law.impedance, sizes, law.period)
+    )
+    for name, port in sources.items():
+        builder.Connect(port, tuner.GetInputPort(name))
+    builder.Connect(tuner.GetOutputPort("impedance"), impedance.GetInputPort("impedance"))
+    return {name: tuner.GetOutputPort(name) for name in ("impedance", "tank")}
 
 
 def _add_press(

@@ -85,9 +85,9 @@ def make_fixtures(
             be refused.
     """
     fixtures = []
-    for number, said in enumerate(parameters.regions):
+    for number, (name, said) in enumerate(zip(parameters.names, parameters.regions, strict=True)):
         try:
-            fixtures.append(_make_fixture(number, said, folder, progress))
+            fixtures.append(_make_fixture(name, said, folder, progress))
         except InputError as error:
             raise InputError(f"fixtures.regions[{number}]: {error}") from None
     by_name = {fixture.name: fixture.region for fixture in fixtures}
@@ -102,9 +102,8 @@ def make_fixtures(
 
 
 def _make_fixture(
-    number: int, said: RegionParameters, folder: FilePath, progress: Progress | None
+    name: str, said: RegionParameters, folder: FilePath, progress: Progress | None
 ) -> Fixture:
-    name = f"{type(said.shape).__name__.lower()}_{number + 1}"
     region = make_region(said, folder, progress)
     stiffness = math.inf if said.stiffness is None else said.stiffness
     if isinstance(said.shape, Box):

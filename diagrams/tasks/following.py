@@ -29,6 +29,8 @@ from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.swinging_manifold import SwingingManifold
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
+# what guidance tells, for the log
+_GUIDANCE = {"guidance": "record", "mode": "mode"}
 # what an observer tells, for the log
 _OBSERVED = ("tau_ext_observed", "wrench_observed")
 
@@ -173,7 +175,7 @@ def add_law(
     if desired is None:
         guidance = _add_guidance(builder, following, signals)
         desired = guidance.GetOutputPort("reference")
-        made["guidance"] = guidance.GetOutputPort("record")
+        made |= {name: guidance.GetOutputPort(port) for name, port in _GUIDANCE.items()}
     desired = _add_smooth_start(builder, following, controller, desired)
     made = {"reference": desired} | made
     if scenario.compliance.is_given:

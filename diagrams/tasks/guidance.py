@@ -6,6 +6,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.space_guidance import SpaceTask
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.parameters import Admittance
@@ -15,6 +16,9 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance, Guidance
+
+# names of the values of the logged signal ``mode``
+MODES = tuple(mode.name.lower() for mode in Mode)
 
 
 def add_guidance(
@@ -34,7 +38,7 @@ def add_guidance(
         task: Leading it through space.
         order: Highest derivative of the reference that is needed.
         ports: ``joint_state`` as measured; ``wrench_measured`` and ``tared``, or without a sensor
-            ``wrench_observed`` and ``ready``.
+            ``wrench_observed`` and ``ready``; ``regions_on`` where a person can switch regions.
 
     Raises:
         InputError: If the rules do not suit the law.
@@ -57,6 +61,8 @@ def add_guidance(
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
     builder.Connect(ports[wrench], system.GetInputPort("wrench"))
     builder.Connect(ports[ready], system.GetInputPort("ready"))
+    if "regions_on" in ports:
+        builder.Connect(ports["regions_on"], system.GetInputPort("active"))
     return system
 
 

@@ -1,0 +1,159 @@
+"""A station in Meshcat while it runs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, InputPort
+
+from diagrams.drawing.delta_replay import arrange_scene
+from diagrams.drawing.replay import body_origins, camera_and_target
+from diagrams.drawing.robot_geometry import RobotDrawing
+from diagrams.drawing.workpiece_drawing import draw_workpiece
+from diagrams.robots.delta import DeltaPart
+from diagrams.station import Station
+from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer
+from pfsc_drake.systems.drawing.force_arrows import ForceArrows
+from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
+from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
+
+_WAY = Rgba(0.9, 0.25, 0.1, 1.0)
+_PIECES = 400  # of the tool's way that stay
+_TARGET, _TARGET_RADIUS, _HAND = "hand_target", 0.012, Rgba(0.95, 0.65, 0.05, 1.0)  # m
+
+
+@dataclass(frozen=True)
+class LiveFrame:
+    """What there is to see of a station at an instant.
+
+    Attributes:
+        positions: Of the plant that is drawn, shape (nq,).
+        tool_pose: ``[y_t, R_e]``, shape (12,).
+        manifold_point: The manifold next to the tool, shape (layout.size,).
+        force: On the tool point, world axes [N], shape (3,).
+        target: Where a hand that holds the tool wants it to be [m], shape (3,), if one does.
+    """
+
+    positions: np.ndarray
+    tool_pose: np.ndarray
+    manifold_point: np.ndarray
+    force: np.ndarray
+    target: np.ndarray | None = None
+
+
+class LiveView:
+    """Draws a station frame by frame.
+
+    It is a diagram of its own: what is simulated does not know who looks at it, and the time in
+    here counts frames.
+
+    Args:
+        station: The station.
+        drawing: What its robot looks like, if that had to be read.
+        first: The first frame.
+        meshcat: Where to draw.
+        largest_force: Whose arrow is the longest [N].
+    """
+
+    def __init__(
+        self,
+        station: Station,
+        drawing: RobotDrawing | None,
+        first: LiveFrame,
+        meshcat: Meshcat,
+        largest_force: float,
+    ) -> None:
+        builder, self._ports = DiagramBuilder(), dict[str, int]()
+        self._frames, self._meshcat = 0, meshcat
+        meshcat.SetObject(_TARGET, Sphere(_TARGET_RADIUS), _HAND)
+        # the time in here counts frames
+        period = 1.0
+        self._export(builder, "manifold_point", station.task.drawing.add(builder, meshcat, period))
+        trail = TrailVisualizer("path_following", _WAY, meshcat, period, longest=_PIECES)
+        builder.AddNamedSystem("trail", trail)
+        self._export(builder, "way", trail.GetInputPort("point"))
+        arrows = builder.AddNamedSystem(
+            "arrows", ForceArrows(1, largest_force, meshcat, period, "tool_force")
+        )
+        self._export(builder, "tool_point", arrows.GetInputPort("points"))
+        self._export(builder, "force", arrows.GetInputPort("forces"))
+        self._add_robot(builder, station, drawing, first, meshcat, period)
+        self._add_workpiece(builder, station, meshcat, period)
+        self._simulator = Simulator(builder.Build())
+        self._fix(first, interrupted=False)
+        self._simulator.Initialize()
+        self._show_target(first.target)
+
+    def draw(self, frame: LiveFrame, *, interrupted: bool = False) -> None:
+        """Draw a frame.
+
+        Args:
+            frame: The frame.
+            interrupted: Whether the tool's way does not lead there from the last one.
+        """
+        # what is remembered of the last frame is remembered when time leaves it
+        self._simulator.AdvanceTo(self._frames + 0.5)
+        self._fix(frame, interrupted=interrupted)
+        self._frames += 1
+        self._simulator.AdvanceTo(float(self._frames))
+        self._show_target(frame.target)
+
+    def _show_target(self, target: np.ndarray | None) -> None:
+        self._meshcat.SetProperty(_TARGET, "visible", target is not None)
+        if target is not None:
+            self._meshcat.SetTransform(_TARGET, RigidTransform(target))
+
+    def _fix(self, frame: LiveFrame, *, interrupted: bool) -> None:
+        tool_point = frame.tool_pose[:3]
+        values = {
+            "positions": frame.positions,
+            "tool_pose": frame.tool_pose,
+            "manifold_point": frame.manifold_point,
+            "tool_point": tool_point,
+            "way": np.full(3, np.nan) if interrupted else tool_point,
+            "force": frame.force,
+        }
+        diagram, root = self._simulator.get_system(), self._simulator.get_mutable_context()
+        for name, port in self._ports.items():
+            diagram.get_input_port(port).FixValue(root, values[name])
+
+    def _export(self, builder: DiagramBuilder, name: str, port: InputPort) -> None:
+        self._ports[name] = int(builder.ExportInput(port, name))
+
+    def _add_robot(
+        self,
+        builder: DiagramBuilder,
+        station: Station,
+        drawing: RobotDrawing | None,
+        first: LiveFrame,
+        meshcat: Meshcat,
+        period: float,
+    ) -> None:
+        """Add the robot, and look at it."""
+        outline = np.concatenate(station.task.drawing.outline())
+        if isinstance(station.part, DeltaPart):
+            delta = DeltaVisualizer(station.part.robot, meshcat, period)
+            builder.AddNamedSystem("robot", delta)
+            self._export(builder, "positions", delta.GetInputPort("slide_positions"))
+            arrange_scene(outline[:, 2], meshcat)
+            return
+        assert drawing is not None  # every other robot is read
+        robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, period)
+        builder.AddNamedSystem("robot", robot)
+        self._export(builder, "positions", robot.GetInputPort("positions"))
+        bodies = body_origins(drawing.plant, first.positions)
+        meshcat.SetCameraPose(*camera_and_target(outline, bodies))
+
+    def _add_workpiece(
+        self, builder: DiagramBuilder, station: Station, meshcat: Meshcat, period: float
+    ) -> None:
+        """Add what the tool may touch, if anything."""
+        if station.workpiece is None:
+            return
+        look = station.workpiece.look(station.part.gravity)
+        draw_workpiece(look, meshcat)
+        tool = builder.AddNamedSystem("tool", ToolVisualizer(look.tool_parts, meshcat, period))
+        self._export(builder, "tool_pose", tool.GetInputPort("tool_pose"))

@@ -1,0 +1,154 @@
+"""A person who guides the tool while the robot moves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+
+from diagrams.scenario import Scenario
+from diagrams.surroundings.operator_file import columns, read_controls
+from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, WISHES
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.live_hand import ASKED
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.physics.live_hand import LiveHand
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel
+from pfsc_drake.systems.physics.recorded_controls import RecordedControls
+
+PULL, WISH, REGIONS = slice(0, ASKED), slice(ASKED, ASKED + WISHES), slice(ASKED + WISHES, None)
+
+
+@dataclass(frozen=True)
+class Operator:
+    """Where a person's controls enter a station.
+
+    Attributes:
+        panel: What looks at them.
+        regions: Names of what can be switched on and off.
+    """
+
+    panel: OperatorPanel
+    regions: Sequence[str]
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the controls."""
+        return columns(self.regions)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """Controls of a person who does nothing, shape (size,)."""
+        return idle_controls(self.regions)
+
+    def fix(self, root: Context, controls: np.ndarray) -> None:
+        """Set what the panel sees from the next tick on, in a station without recorded controls.
+
+        Args:
+            root: Context of the diagram.
+            controls: Shape (size,).
+        """
+        context = self.panel.GetMyMutableContextFromRoot(root)
+        self.panel.GetInputPort("controls").FixValue(context, controls)
+
+    @property
+    def pull(self) -> OutputPort:
+        """What is asked of the hand, shape (7,), see :class:`LiveHand`."""
+        return self.panel.GetOutputPort("pull")
+
+    @property
+    def wishes(self) -> dict[str, OutputPort]:
+        """What is asked of the law: ``impedance_wish``, and ``regions_on`` if there are any."""
+        ports = {"impedance_wish": self.panel.GetOutputPort("wish")}
+        if self.regions:
+            ports["regions_on"] = self.panel.GetOutputPort("regions")
+        return ports
+
+
+def region_names(scenario: Scenario) -> list[str]:
+    """Return the names of what a person can switch on and off one by one.
+
+    The law of a tool that is led within regions finds the switches as ``regions_on``, shape
+    (len(names),), among the ports that it is built with: 1 is on. The page gets a switch for each,
+    and recorded takes a column ``region_NAME``.
+
+    Args:
+        scenario: The scenario.
+    """
+    led = scenario.controller.manifold == "space" and scenario.fixtures is not None
+    return scenario.fixtures.names if led and scenario.fixtures else []
+
+
+def idle_controls(regions: Sequence[str]) -> np.ndarray:
+    """Return the controls of a person who does nothing.
+
+    Args:
+        regions: Names of what can be switched on and off; they are on.
+    """
+    return np.concatenate([np.zeros(ASKED), np.full(WISHES, AS_GIVEN), np.ones(len(regions))])
+
+
+def add_operator(builder: DiagramBuilder, scenario: Scenario, folder: FilePath) -> Operator | None:
+    """Add the panel at which a person stands, and what was recorded of it, if anything.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        folder: Where relative file names start.
+
+    Returns:
+        None without the block ``operator``.
+
+    Raises:
+        InputError: If the recorded controls cannot be read.
+    """
+    if scenario.operator is None:
+        return None
+    period, regions = scenario.controller.sampling_time, region_names(scenario)
+    idle = idle_controls(regions)
+    parts = {"pull": idle[PULL], "wish": idle[WISH]}
+    if regions:
+        parts["regions"] = idle[REGIONS]
+    panel = builder.AddNamedSystem("operator_panel", OperatorPanel(parts, period))
+    if scenario.operator.inputs:
+        try:
+            recorded = read_controls(str(folder / scenario.operator.inputs), regions)
+        except InputError as error:
+            raise InputError(f"operator.inputs: {error}") from None
+        player = builder.AddNamedSystem("recorded_controls", RecordedControls(*recorded, period))
+        builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
+    return Operator(panel, regions)
+
+
+def add_live_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    scenario: Scenario,
+    operator: Operator | None,
+    joint_state: OutputPort,
+) -> list[OutputPort]:
+    """Add the hand of the person at the panel, which is where the tool really is.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        scenario: The scenario.
+        operator: Who stands at the panel, if anybody does.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        The wrench on the tool point, world axes, shape (6,) [N, Nm]; none without operator.
+    """
+    if operator is None:
+        return []
+    assert scenario.operator is not None
+    hand = builder.AddNamedSystem(
+        "live_hand", LiveHand(scenario.operator.hand, scenario.controller.sampling_time)
+    )
+    view = builder.AddNamedSystem("live_hand_view", ToolKinematics(robot))
+    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
+    builder.Connect(operator.pull, hand.GetInputPort("asked"))
+    return [hand.GetOutputPort("wrench")]
