@@ -1,9 +1,9 @@
-"""The command line: ``list`` scenarios, ``run`` one, ``compare`` runs, ``sweep`` many, ``teach``.
+"""The command line: ``list``, ``run``, ``live``, ``compare``, ``sweep``, ``teach`` and others.
 
 Exit status: 0 the run completed, or every run of a sweep has a row that says how it ended; 2 the
-input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, everything logged
-so far is kept; 4 results could not be written, one line says which and where they are instead; 130
-interrupted, everything logged so far is kept.
+input is wrong, nothing was run (one line on stderr); 3 a fault stopped the run, or a live session
+ended while one did, everything logged so far is kept; 4 results could not be written, one line
+says which and where they are instead; 130 interrupted, everything logged so far is kept.
 """
 
 import dataclasses
@@ -20,7 +20,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
-from experiments.outcomes import judge_run, judge_sweep, print_run, print_sweep
+from experiments.outcomes import (
+    judge_live,
+    judge_run,
+    judge_sweep,
+    print_live,
+    print_run,
+    print_sweep,
+)
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
 from reporting.commands import FAULT, interruptible, run_app, show_page
@@ -123,6 +130,59 @@ def run_command(
             )
         print_run(console, outcome)
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
+
+
+@app.command("live")
+def live_command(
+    scenario: ScenarioName,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder in which every take gets one of its own, take_1, take_2, ... "
+            "Default: out/SCENARIO_live"
+        ),
+    ] = None,
+    overrides: Overrides = None,
+    port: Annotated[
+        int, typer.Option(help="Of the page, on this machine alone; 0 for any that is free.")
+    ] = 0,
+    duration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SECONDS", help="Simulated time in s after which it ends. Default: 600"
+        ),
+    ] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
+    ] = True,
+) -> None:
+    """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
+    from experiments.catalog.scenario_file import read_scenario
+    from experiments.live.start import run_live
+
+    seconds = None if duration is None else _read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_live"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+
+        def tell(line: str) -> None:
+            text = f"{loaded.name}: {line}"
+            console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        outcome = run_live(
+            loaded,
+            out=folder,
+            port=port,
+            duration=seconds,
+            figures=figures,
+            recording=recording,
+            tell=tell,
+        )
+        print_live(console, outcome)
+        raise typer.Exit(judge_live(outcome))
 
 
 @app.command("compare")

@@ -13,7 +13,8 @@ from reporting.interruption import INTERRUPTED
 from reporting.terminal import print_error
 
 if TYPE_CHECKING:
-    from experiments.run import RunOutcome
+    from experiments.finished_run import RunOutcome
+    from experiments.live.start import LiveOutcome
     from experiments.sweep.sweep import SweepOutcome
     from reporting.metrics import Metric
 
@@ -39,6 +40,35 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
         status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
     elif ends:
         ends = [f"{ends[0]}, everything logged so far is kept in {out}"]
+    if ends:
+        print_error("; ".join(ends), after_echo=outcome.interrupted)
+    return status
+
+
+def print_live(console: Console, outcome: "LiveOutcome") -> None:
+    """What a live session has left."""
+    for kept in outcome.kept:
+        print_page(console, "Open the report", kept.outcome.report)
+        scenario = kept.folder / "scenario.yaml"
+        console.print(
+            f"  again, to the last bit: python -m experiments run {escape(str(scenario))}",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
+def judge_live(outcome: "LiveOutcome") -> int:
+    """Says in one line what went wrong in a session, if anything did; returns the exit status."""
+    status, ends = 0, []
+    if outcome.interrupted:
+        status, ends = INTERRUPTED, [f"interrupted at t = {outcome.time:.3f} s"]
+    if outcome.fault is not None:
+        status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {outcome.time:.3f} s"]
+    problems = [kept.outcome.problem for kept in outcome.kept if kept.outcome.problem is not None]
+    if problems:
+        status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
+    elif ends and outcome.kept:
+        ends = [f"{ends[0]}, everything logged so far is kept in {outcome.kept[-1].folder}"]
     if ends:
         print_error("; ".join(ends), after_echo=outcome.interrupted)
     return status

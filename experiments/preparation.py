@@ -11,6 +11,7 @@ from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
 from diagrams.scenario import Intersection, OnSurface, Scenario, Waypoints
+from diagrams.scenario.checks import require
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
@@ -50,6 +51,7 @@ def prepare(
     *,
     recording: bool,
     progress: ProgressListener,
+    live: bool = False,
 ) -> PreparedRun:
     """Build a scenario's station and check everything that can be checked beforehand.
 
@@ -58,6 +60,7 @@ def prepare(
         duration: Simulated time [s] instead of the scenario's.
         recording: Whether the motion will be recorded.
         progress: Told what goes on.
+        live: Whether there is a person at the controls of an operator.
 
     Raises:
         InputError: If the scenario is wrong.
@@ -65,6 +68,8 @@ def prepare(
     settings = load_typed(Scenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
     with naming(scenario.path):
+        nobody = settings.operator is not None and not settings.operator.inputs and not live
+        require(not nobody, "operator.inputs", "''", "a file that a live session has recorded")
         station = _build(settings, folder, progress)
         check_targets(settings, station)
         settings.name = settings.name or scenario.name
@@ -126,6 +131,8 @@ def _resolve_files(settings: Scenario, folder: Path) -> None:
     shape = settings.path.shape
     if isinstance(shape, Waypoints) or (isinstance(shape, OnSurface) and shape.file):
         shape.file = str((folder / shape.file).resolve())
+    if settings.operator and settings.operator.inputs:
+        settings.operator.inputs = str((folder / settings.operator.inputs).resolve())
     described: list[object] = [settings.surface.shape] if settings.surface else []
     if settings.fixtures:
         described += [region.shape for region in settings.fixtures.regions]

@@ -57,7 +57,7 @@ def simulate(
     station.set_start(root)
     simulator.Initialize()
     period = station.controller.period
-    last_tick, stride = int(duration / period + 1e-6), max(1, round(_CHUNK / period))
+    last_tick, stride = int(duration / period + 1e-6), chunk_ticks(period)
     wall, tick, fault, fault_time = 0.0, 0, None, None
     while root.get_time() < duration and not interrupted():
         tick += stride
@@ -76,6 +76,15 @@ def simulate(
             duration = root.get_time() + after_fault
             last_tick = int(duration / period + 1e-6)
     return SimulationResult(root, root.get_time() / max(wall, 1e-9), fault, fault_time)
+
+
+def chunk_ticks(period: float) -> int:
+    """Return how many ticks are simulated between two looks at faults.
+
+    Args:
+        period: Sampling time of the controller [s].
+    """
+    return max(1, round(_CHUNK / period))
 
 
 def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: float = 0.0) -> None:

@@ -25,6 +25,7 @@ MANIFEST = "manifest.json"
 FIGURES = "figures"
 RESULTS = (
     "scenario.yaml",
+    "operator.csv",
     "log.h5",
     "metrics.json",
     "recording.html",

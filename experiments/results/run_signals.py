@@ -10,6 +10,7 @@ from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
+from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
@@ -231,6 +232,20 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         for kind, part, names in _kinds(station):
             labels = [name.replace(kind.value, f"{kind.value}_d", 1) for name in names]
             log.add(f"{kind.value}_d", desired[:, part], kind.unit, labels)
+    if "impedance" in raw:
+        _add_impedance(log, station, raw)
+
+
+def _add_impedance(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
+    """Add what an operator has made of the impedance, where it is not as the scenario says."""
+    names = [coordinate.name for coordinate in station.task.place.coordinates]
+    impedance = raw["impedance"].reshape(len(log.time), 3, -1)
+    for name, row, unit in (
+        ("stiffness", STIFFNESS, "N/m, Nm/rad"),
+        ("damping", DAMPING, "N s/m, Nm s/rad"),
+    ):
+        log.add(name, impedance[:, row], unit, names)
+    log.add("tank", raw["tank"], "J")
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.catalog.scenario_file import read_scenario
+from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
-from experiments.run import RunOutcome, run_scenario
+from experiments.run import run_scenario
 from experiments.teaching.comparison import (
     Followed,
     compare_fit,

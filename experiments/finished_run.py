@@ -1,0 +1,287 @@
+"""What a run leaves when its simulation is over: log, metrics, figures, recording and report."""
+
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Meshcat, MeshcatParams
+
+from diagrams.builder import build_station_replay
+from diagrams.drawing.block_diagram import block_diagram_svg
+from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.scenario import Scenario
+from diagrams.wording import posture_text
+from experiments.figures.all import render_figures
+from experiments.preparation import PreparedRun
+from experiments.results.friction_metrics import friction_metrics
+from experiments.results.guidance_audit import Promise, audit
+from experiments.results.guidance_metrics import guidance_metrics
+from experiments.results.joint_limits import JointLimits
+from experiments.results.link_signals import lap_length
+from experiments.results.path_metrics import path_following_metrics
+from experiments.results.posture_metrics import posture_metrics
+from experiments.results.press_metrics import press_metrics
+from experiments.results.recorded_motion import collect_motion
+from experiments.results.run_log import RunLog
+from experiments.results.run_signals import collect_log
+from experiments.results.shape_metrics import shape_metrics
+from experiments.results.tick import measure_tick
+from experiments.simulation import SimulationResult
+from experiments.studies.margins.analysis import MarginAnalysis
+from experiments.studies.margins.words import metrics_of, one_line
+from reporting.folder import ResultsFolder
+from reporting.metrics import Metrics
+from reporting.page import Report, report_page, write_report
+from reporting.progress import ProgressListener
+from reporting.provenance import standard_attributes
+
+_MOVING = 0.01  # m/s, from which on the tool counts as moving
+
+
+@dataclass
+class RunOutcome:
+    """What a run left.
+
+    Attributes:
+        fault: Why the run was stopped, or None if it was not.
+        report: The page to open; None if it could not be written.
+        metrics: Its metrics.
+        warnings: What may not have gone as well as hoped, one sentence each.
+        interrupted: Whether the user stopped it.
+        problem: Which results could not be written, why, and where they are instead; or None.
+        margins: What the loop bears at the start, in one line; None if nobody asked.
+    """
+
+    fault: str | None
+    report: Path | None
+    metrics: Metrics
+    warnings: list[str]
+    interrupted: bool = False
+    problem: str | None = None
+    margins: str | None = None
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A run whose simulation is over.
+
+    Attributes:
+        prepared: What was simulated.
+        name: Of its scenario.
+        result: What came of it.
+        analysis: What the loop bears at the start, if somebody asked.
+        attributes: What else to note in the log.
+    """
+
+    prepared: PreparedRun
+    name: str
+    result: SimulationResult
+    analysis: MarginAnalysis | None = None
+    attributes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What was measured of a run.
+
+    Attributes:
+        log: All signals.
+        motion: What a recording needs of them.
+        metrics: Metrics with their targets.
+        warnings: What may not have gone as well as hoped, one sentence each.
+        fault: Why the run was stopped, or None.
+        end: When it ended [s].
+    """
+
+    log: RunLog
+    motion: RecordedMotion
+    metrics: Metrics
+    warnings: list[str]
+    fault: str | None
+    end: float
+
+
+def write_outcome(
+    run: FinishedRun,
+    results: ResultsFolder,
+    progress: ProgressListener,
+    interrupted: Callable[[], bool],
+    *,
+    figures: bool,
+    recording: bool,
+) -> RunOutcome:
+    """Write everything that a run leaves but its scenario.
+
+    Args:
+        run: The run.
+        results: The folder.
+        progress: Told what goes on.
+        interrupted: Whether to leave out what takes long.
+        figures: Whether to draw figures.
+        recording: Whether to record the motion.
+    """
+    measured = _measure(run, results, progress, interrupted)
+    page = None
+    if recording and len(measured.motion.times) > 1 and not interrupted():
+        progress(measured.end, "recording")
+        page = results.write("recording.html", _recording(run.prepared, measured.motion))
+    drawn = figures and not interrupted()
+    if drawn:
+        progress(measured.end, "drawing")
+    report = _report(run, measured, results, page, drawn, interrupted())
+    progress(measured.end, "done")
+    return RunOutcome(
+        measured.fault,
+        report.path,
+        measured.metrics,
+        measured.warnings,
+        interrupted(),
+        report.problem,
+        None if run.analysis is None else one_line(run.analysis),
+    )
+
+
+def _measure(
+    run: FinishedRun,
+    results: ResultsFolder,
+    progress: ProgressListener,
+    interrupted: Callable[[], bool],
+) -> _Measured:
+    """Write the log and the metrics of a simulation."""
+    prepared, result, analysis = run.prepared, run.result, run.analysis
+    settings, station = prepared.settings, prepared.station
+    with steady_clock():
+        end = float(result.root.get_time())
+        log = collect_log(station, result.root)
+        log["rcond"].limits = np.array([[settings.controller.min_rcond, np.inf]])
+        log.attributes = (
+            standard_attributes(run.name)
+            | run.attributes
+            | {
+                "integration": str(prepared.integration),
+                "start_posture": posture_text(station.robot, station.start_posture),
+            }
+        )
+        if analysis is not None:
+            log.attributes["margins"] = one_line(analysis)
+        if result.fault is not None:
+            log.attributes["fault"] = result.fault
+            if result.fault_time is not None:
+                log.attributes["fault_time"] = f"{result.fault_time:.6f}"
+        if interrupted():
+            log.attributes["interrupted"] = f"at t = {end:.3f} s"
+        results.write("log.h5", log.to_hdf5())
+        motion = collect_motion(
+            station,
+            result.root,
+            settings.simulation.frame_period,
+            log,
+            settings.reference.dwell,
+        )
+        progress(end, "measuring the tick")
+        tick = measure_tick(station, result.root, log) * 1e6
+    # the tool comes to the path during the first rest; from then on deviations count
+    metrics = path_following_metrics(
+        log, settings.settling_tolerance, settings.reference.dwell, _MOVING
+    )
+    metrics.update(press_metrics(log))
+    metrics.update(guidance_metrics(log))
+    metrics.update(_guidance_audit(log, settings))
+    metrics.update(friction_metrics(log))
+    metrics.update(shape_metrics(station.task.shape, station.task.fit))
+    limits = JointLimits.of(station.robot)
+    metrics.update(limits.metrics(log))
+    metrics.update(posture_metrics(log, lap_length(station)))
+    metrics.add("real_time_factor", result.real_time_factor, "1")
+    median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
+    metrics.add("controller_tick_us", float(median), "us", source="median")
+    metrics.add("controller_tick_us_p99", float(p99), "us")
+    if analysis is not None:
+        metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
+    for metric, target in settings.targets.get(settings.controller.law, {}).items():
+        # what another choice of the controller would tell has been checked, and is no metric here
+        if metric in metrics:
+            metrics.set_target(metric, target.bound, target.source)
+    results.write("metrics.json", metrics.to_json())
+    warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
+    return _Measured(log, motion, metrics, warnings, result.fault, end)
+
+
+def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
+    """Check what was promised of forbidden regions, if there were any."""
+    fixtures, along = settings.fixtures, settings.compliance.tangential
+    if fixtures is None or fixtures.guidance.rules != "program" or "near_regions" not in log:
+        return Metrics()
+    guidance = fixtures.guidance
+    return audit(
+        log,
+        Promise(
+            along.mass.value, along.damping.value, guidance.largest_speed, guidance.tank.capacity
+        ),
+    )
+
+
+def _sensor_warnings(log: RunLog) -> list[str]:
+    """Return what there is to say about a force sensor that was never of use."""
+    if "tared" not in log or log["tared"].values.any() or not log.time.size:
+        return []
+    return [
+        "the force/torque sensor was never tared: what should yield has rested, and no metric of "
+        "compliance counts; its residual did not rest within sensor.taring_spread for "
+        "sensor.taring_time, or its mean was above sensor.taring_bias"
+    ]
+
+
+def _report(
+    run: FinishedRun,
+    measured: _Measured,
+    results: ResultsFolder,
+    recording: Path | None,
+    drawn: bool,
+    interrupted: bool,
+) -> Report:
+    """Draw figures if wanted, and write the page that a person opens."""
+    prepared, task = run.prepared, run.prepared.station.task
+    pictures = render_figures(measured.log, task.drawing.outline(), task.fit) if drawn else []
+    page = report_page(
+        title=run.name,
+        description=prepared.settings.description,
+        warnings=measured.warnings,
+        scenario_yaml_text=prepared.text,
+        metrics=measured.metrics,
+        figures=pictures,
+        log_attributes=measured.log.attributes,
+        recording=_link(recording, results.path),
+        fault=measured.fault,
+        interrupted=interrupted,
+        diagram_svg=block_diagram_svg(prepared.station.diagram) if pictures else None,
+    )
+    return write_report(results, pictures, page)
+
+
+def _recording(prepared: PreparedRun, motion: RecordedMotion) -> str:
+    """Return the recording as a page of its own."""
+    meshcat, settings = Meshcat(MeshcatParams(host="localhost")), prepared.settings
+    diagram = build_station_replay(settings, prepared.station, prepared.drawing, motion, meshcat)
+    return record(diagram, meshcat, motion.times[-1], settings.simulation.frame_period)
+
+
+def _link(recording: Path | None, out: Path) -> str | None:
+    """Return where the report, in its folder, finds the recording."""
+    if recording is None:
+        return None
+    return recording.name if recording.parent == out else str(recording)
+
+
+@contextmanager
+def steady_clock() -> Iterator[None]:
+    """Keep the garbage collector from walking, amid the measured time, through all made before."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

@@ -1,0 +1,261 @@
+"""A live session: the loop between a person, a station in real time, and what is kept of it."""
+
+import gc
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from pydrake.geometry import Meshcat
+
+from diagrams.drawing.live_view import LiveView
+from experiments.finished_run import RunOutcome
+from experiments.live.controls import tuned_parameters
+from experiments.live.pacing import RealTimePace
+from experiments.live.panel import Command, Panel, Requests
+from experiments.live.simulation import LiveSimulation
+from experiments.live.status import LiveStatus
+from experiments.live.take import ControlRecord, TakeFolders
+from experiments.preparation import PreparedRun
+from reporting.progress import ProgressListener
+
+# steps between two frames, and between two looks at the signals for the status
+_FRAME, _STATUS = 4, 8
+# real-time factors below and above which a change is told
+_SLOW, _AT_REAL_TIME = 0.9, 0.97
+
+
+class Teller(Protocol):
+    """Who tells the person in words what happens."""
+
+    def __call__(self, line: str) -> None:
+        """Tell a line."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A take that was kept.
+
+    Attributes:
+        folder: Where.
+        outcome: What a run leaves.
+    """
+
+    folder: Path
+    outcome: RunOutcome
+
+
+@dataclass(frozen=True)
+class Output:
+    """What is to be left of a take.
+
+    Attributes:
+        folders: Where.
+        figures: Whether to draw figures.
+        recording: Whether to record the motion.
+    """
+
+    folders: TakeFolders
+    figures: bool = True
+    recording: bool = True
+
+
+class LiveSession:
+    """Runs a station in real time, as a person wants it.
+
+    The simulated time waits for the clock and never runs after it; while something is written it
+    stands still. A fault stops it until a reset. What was done since the last reset is kept when a
+    recording stops, or when the session ends.
+
+    Args:
+        prepared: A station with an operator.
+        name: Of its scenario.
+        meshcat: Where it is drawn, and where the controls are.
+        requests: What the page asks for.
+        status: What is told at every moment, kept up to date.
+        output: What is left of it.
+        tell: Told in words what happens.
+        pace: Makes simulated time wait; by default for the clock.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedRun,
+        name: str,
+        meshcat: Meshcat,
+        requests: Requests,
+        status: LiveStatus,
+        output: Output,
+        tell: Teller,
+        pace: RealTimePace | None = None,
+    ) -> None:
+        station, settings = prepared.station, prepared.settings
+        assert station.operator is not None
+        assert settings.operator is not None
+        self._prepared, self._name, self._output, self._tell = prepared, name, output, tell
+        self._station, self._operator = station, station.operator
+        self.status, self.kept = status, list[Kept]()
+        self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
+        self._record, self._meshcat = ControlRecord(station.operator), meshcat
+        limit = settings.operator.hand.force_limit
+        self._panel = Panel(
+            meshcat, requests, limit, tuned_parameters(settings, station), self._operator.regions
+        )
+        self._frame = self._simulation.frame(self._simulation.signals())
+        self._view = LiveView(station, prepared.drawing, self._frame, meshcat, limit)
+        self._steps, self._slow = 0, False
+
+    @property
+    def fault(self) -> str | None:
+        """Why time stands still, if it does."""
+        found = self._simulation.fault
+        return None if found is None else found.sentence
+
+    @property
+    def end(self) -> float:
+        """Simulated time now [s]."""
+        return self._simulation.time
+
+    def run(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
+        """Run until the person ends it, the scenario's duration is over, or it is interrupted.
+
+        Args:
+            interrupted: Whether the user has stopped it.
+            progress: Told what is written.
+        """
+        gc.collect()
+        gc.freeze()
+        try:
+            self._loop(interrupted, progress)
+            self._keep(interrupted, progress)
+        finally:
+            gc.unfreeze()
+            self.status.phase = "ended"
+
+    def _loop(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
+        self._restart()
+        while not interrupted():
+            self._panel.look()
+            for command in self._panel.commands():
+                if command is Command.END:
+                    return
+                if command is Command.RESET:
+                    self._reset(interrupted, progress)
+                elif command is Command.RECORD:
+                    self._toggle_recording(interrupted, progress)
+            if self.status.phase == "fault":
+                self._rest()
+                continue
+            self._step()
+            if self._simulation.fault is None and self._is_over():
+                self._tell(f"the session's duration is over, t = {self._simulation.time:.1f} s")
+                return
+
+    def _is_over(self) -> bool:
+        last = self._prepared.settings.duration - 0.5 * self._station.controller.period
+        return self._simulation.time > last
+
+    def _restart(self) -> None:
+        """Say that time runs from now on."""
+        self.status.phase, self.status.message = "running", ""
+        self._pace.restart(self._simulation.time)
+
+    def _step(self) -> None:
+        """Read the controls, go on, wait for the clock, show what is there."""
+        simulation = self._simulation
+        controls = self._panel.read(self._frame.tool_pose[:3])
+        self._record.note(simulation.tick, controls)
+        simulation.set(controls)
+        simulation.step()
+        self._pace.keep(simulation.time)
+        self._steps += 1
+        if self._steps % _FRAME == 0:
+            self._show(whole=self._steps % (_STATUS * _FRAME) == 0)
+        if simulation.fault is not None:
+            self._stop()
+
+    def _show(self, *, whole: bool) -> None:
+        """Draw, and bring the status up to date, all of it or what follows from the frame."""
+        signals = self._simulation.signals()
+        self._frame = self._simulation.frame(signals)
+        self._view.draw(self._frame)
+        self.status.time, self.status.factor = self._simulation.time, self._pace.factor
+        self.status.observe(self._station, signals)
+        self.status.controls = self._panel.content()
+        if whole:
+            self._meshcat.SetRealtimeRate(self.status.factor)
+            self._tell_speed()
+
+    def _tell_speed(self) -> None:
+        """Say when time becomes slower than the clock, and when it does no more."""
+        factor = self.status.factor
+        slow = factor < (_AT_REAL_TIME if self._slow else _SLOW)
+        if slow != self._slow:
+            how = f"slower than real time: {factor:.2f} x" if slow else "at real time"
+            self._tell(f"t = {self._simulation.time:.1f} s: {how}")
+        self._slow = slow
+
+    def _stop(self) -> None:
+        """Let time stand still after a fault."""
+        fault = self._simulation.fault
+        assert fault is not None
+        self._show(whole=False)
+        self.status.phase = "fault"
+        self.status.message = f"Fault: {fault.sentence}. Press X to reset."
+        self._tell(f"fault: {fault.sentence}; stopped at t = {self._simulation.time:.3f} s")
+
+    def _rest(self) -> None:
+        """Wait a moment, while time stands still."""
+        self._pace.wait()
+
+    def _reset(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
+        """Begin anew; what was not recorded is gone."""
+        if self.status.recording is not None:
+            self._keep(interrupted, progress)
+        self._panel.let_go()
+        self._simulation.restart()
+        self._record = ControlRecord(self._operator)
+        self.status.recording = None
+        self._frame = self._simulation.frame(self._simulation.signals())
+        self._view.draw(self._frame, interrupted=True)
+        self._tell("reset")
+        self._restart()
+
+    def _toggle_recording(
+        self, interrupted: Callable[[], bool], progress: ProgressListener
+    ) -> None:
+        if self.status.recording is None:
+            self.status.recording = self._simulation.time
+            self._tell(f"recording from t = {self._simulation.time:.1f} s")
+            return
+        self._keep(interrupted, progress)
+        if self._simulation.fault is None:
+            self._restart()
+        else:
+            self.status.phase = "fault"
+
+    def _keep(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
+        """Write what was done since the last reset, if anything; time stands still meanwhile."""
+        if self._simulation.tick == 0:
+            return
+        message = self.status.message
+        self.status.phase, self.status.message = "saving", "Time stands still while it is written."
+        attributes = {}
+        if self.status.recording is not None:
+            attributes["recorded_from"] = f"{self.status.recording:.3f} s"
+        self.status.recording = None
+        folder, outcome = self._output.folders.write(
+            self._prepared,
+            self._name,
+            self._simulation.result(),
+            self._record,
+            progress,
+            interrupted,
+            attributes=attributes,
+            figures=self._output.figures,
+            recording=self._output.recording,
+        )
+        self.kept.append(Kept(folder, outcome))
+        self.status.kept = [str(kept.folder) for kept in self.kept]
+        self.status.message = message
+        self._tell(f"kept in {folder}")

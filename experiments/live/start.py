@@ -1,0 +1,131 @@
+"""From a scenario to a live session, and how it ended."""
+
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+from pydrake.geometry import Meshcat, MeshcatParams
+
+from diagrams.scenario import Scenario
+from diagrams.surroundings.operator import region_names
+from experiments.catalog.scenario_file import ScenarioFile
+from experiments.live.panel import Requests
+from experiments.live.server import HOST, PageServer
+from experiments.live.session import Kept, LiveSession, Output, Teller
+from experiments.live.status import LiveStatus
+from experiments.live.take import TakeFolders
+from experiments.preparation import prepare
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.yaml.typed import load_typed
+from reporting.interruption import noticed_interruption
+
+# s, of one take
+DURATION = 600.0
+# what a written hand and a live one have in common
+_HAND = ("stiffness", "damping", "rotational_damping", "force_limit", "torque_limit")
+
+
+@dataclass(frozen=True)
+class LiveOutcome:
+    """How a session ended.
+
+    Attributes:
+        kept: The takes that were kept, the last of them when it ended.
+        fault: Why it stood still at the end, or None if it did not.
+        interrupted: Whether the user stopped it.
+        time: Simulated time at the end [s].
+    """
+
+    kept: list[Kept]
+    fault: str | None
+    interrupted: bool
+    time: float
+
+
+def run_live(
+    scenario: ScenarioFile,
+    *,
+    out: Path,
+    port: int,
+    duration: float | None,
+    figures: bool,
+    recording: bool,
+    tell: Teller,
+) -> LiveOutcome:
+    """Let a person guide a scenario's robot until they end it.
+
+    Args:
+        scenario: The scenario as read; its written hand, if any, gives way to the person's.
+        out: Folder in which takes get folders of their own.
+        port: Of the page; 0 for any that is free.
+        duration: Simulated time after which the session ends [s]; by default DURATION.
+        figures: Whether takes get figures.
+        recording: Whether takes get a recording.
+        tell: Told in words what is prepared, happens, and is written.
+
+    Raises:
+        InputError: If the scenario is wrong or has nothing to guide, the folder cannot be used, or
+            the port is taken.
+    """
+    progress = _ToldProgress(tell)
+    progress(0.0, "preparing")
+    guided = with_operator(scenario)
+    folders = TakeFolders(out, scenario.inputs())
+    status = LiveStatus(scenario.name)
+    meshcat = Meshcat(MeshcatParams(host=HOST, port=0))
+    requests: Requests = SimpleQueue()
+    server = PageServer(port, meshcat.web_url(), status.content, requests.put)
+    with closing(server):
+        prepared = prepare(
+            guided, duration or DURATION, recording=True, progress=progress, live=True
+        )
+        output = Output(folders, figures=figures, recording=recording)
+        session = LiveSession(prepared, scenario.name, meshcat, requests, status, output, tell)
+        for warning in prepared.warnings:
+            tell(f"warning: {warning}")
+        tell(f"open {server.url}")
+        with noticed_interruption() as interrupted:
+            session.run(interrupted, progress)
+            return LiveOutcome(session.kept, session.fault, interrupted(), session.end)
+
+
+class _ToldProgress:
+    """Tells in words what is prepared and written."""
+
+    def __init__(self, tell: Teller) -> None:
+        self._tell, self._phase = tell, ""
+
+    def expect(self, duration: float) -> None:
+        """Leave it to the person when it ends."""
+
+    def __call__(self, simulated_time: float, phase: str) -> None:
+        if phase != self._phase:
+            self._phase = phase
+            self._tell(phase)
+
+
+def with_operator(scenario: ScenarioFile) -> ScenarioFile:
+    """Return a scenario with a person at its controls, in place of its written hand.
+
+    Args:
+        scenario: The scenario as read.
+
+    Raises:
+        InputError: If it is wrong, or has nothing to guide.
+    """
+    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    if not settings.compliance.is_given and not region_names(settings):
+        raise InputError(
+            f"{scenario.path}: compliance = not given: nothing yields to a hand; allowed in a live "
+            "session: a scenario with compliance, such as vf_soft_circle"
+        )
+    data = dict(scenario.data)
+    operator = dict(data.get("operator") or {})
+    if settings.hand is not None and settings.operator is None:
+        hand = {key: getattr(settings.hand, key) for key in _HAND}
+        LiveHandParameters(**hand)
+        operator["hand"] = hand
+    operator["inputs"] = ""
+    return ScenarioFile(scenario.path, data | {"operator": operator, "hand": None})

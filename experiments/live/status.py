@@ -1,0 +1,107 @@
+"""What a live session tells the person, ten times a second."""
+
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from diagrams.station import Station
+from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
+from pfsc_drake.control.manifolds.manifold import Kind, indices
+
+# below it, time is said to be slower than the clock
+_SLOW = 0.95
+
+
+@dataclass
+class LiveStatus:
+    """What a session is doing.
+
+    Attributes:
+        scenario: Its name.
+        phase: ``running``, ``fault``, ``saving``, ``ended``.
+        time: Simulated time [s].
+        factor: Simulated over real time.
+        mode: Which mode the law is in, if it has several.
+        deviation: Transversal coordinates, by name [m].
+        progress: Tangential coordinates, by name [m].
+        angles: Rotational coordinates, by name [rad].
+        force: On the tool, world axes [N].
+        measured: What the sensor makes of it along the coordinates, by name [N, Nm].
+        stiffness: By coordinate [N/m, Nm/rad]; null where rigid.
+        damping: By coordinate [N s/m, Nm s/rad].
+        tank: Energy that stiffening springs may still take [J].
+        ready: Whether anything yields yet: a sensor is tared first.
+        recording: Since when a recording runs [s], or null.
+        kept: What was kept so far, by name of its folder.
+        message: What else there is to say: why it stopped, or what comes next.
+        controls: What can be set and how it is, see :class:`Panel`.
+    """
+
+    scenario: str
+    phase: str = "preparing"
+    time: float = 0.0
+    factor: float = 1.0
+    mode: str | None = None
+    deviation: dict[str, float] = field(default_factory=dict)
+    progress: dict[str, float] = field(default_factory=dict)
+    angles: dict[str, float] = field(default_factory=dict)
+    force: list[float] = field(default_factory=list)
+    measured: dict[str, float] = field(default_factory=dict)
+    stiffness: dict[str, float | None] = field(default_factory=dict)
+    damping: dict[str, float] = field(default_factory=dict)
+    tank: float | None = None
+    ready: bool = True
+    recording: float | None = None
+    kept: list[str] = field(default_factory=list)
+    message: str = ""
+    controls: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether simulated time is slower than the clock."""
+        return self.factor < _SLOW
+
+    def content(self) -> dict[str, object]:
+        """Return all of it for JSON, without numbers that JSON does not know."""
+        return {**{key: _plain(value) for key, value in asdict(self).items()}, "slow": self.is_slow}
+
+    def observe(self, station: Station, signals: dict[str, np.ndarray]) -> None:
+        """Take over what a station's signals say.
+
+        Args:
+            station: The station.
+            signals: See :meth:`SignalLog.now`.
+        """
+        coordinates = station.law.linearization.manifold.coordinates
+        names = [coordinate.name for coordinate in coordinates]
+        y = signals["law"][station.law.layout.manifold_state][: len(names)].tolist()
+
+        def of(kind: Kind, values: list[float]) -> dict[str, float]:
+            part = indices(coordinates, kind)
+            return dict(zip(names[part], values[part], strict=True))
+
+        self.deviation, self.progress = of(Kind.TRANSVERSAL, y), of(Kind.TANGENTIAL, y)
+        self.angles = of(Kind.ROTATIONAL, y)
+        self.force = signals["wrench_ext"][:3].tolist()
+        if "manifold_force" in signals:
+            forces = signals["manifold_force"].tolist()
+            self.measured = dict(zip(names, forces, strict=True))
+        if "impedance" in signals:
+            impedance = signals["impedance"].reshape(3, -1)
+            self.stiffness = dict(zip(names, impedance[STIFFNESS].tolist(), strict=True))
+            self.damping = dict(zip(names, impedance[DAMPING].tolist(), strict=True))
+            self.tank = float(signals["tank"][0])
+        self.ready = "tared" not in signals or bool(signals["tared"][0] > 0.5)
+        if "mode" in signals:
+            self.mode = station.mode_name(int(signals["mode"][0]))
+
+
+def _plain(value: object) -> object:
+    """Return a value without infinities and NaN, which become null."""
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_plain(entry) for entry in value]
+    return value

@@ -1,0 +1,169 @@
+"""A whole session without a browser and faster than the clock: what is done is repeated exactly."""
+
+import json
+from queue import SimpleQueue
+
+import h5py
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat, MeshcatParams
+
+from diagrams.surroundings.operator_file import read_controls
+from experiments.catalog.scenario_file import read_scenario
+from experiments.cli import main
+from experiments.live.pacing import RealTimePace
+from experiments.live.session import LiveSession, Output
+from experiments.live.start import with_operator
+from experiments.live.status import LiveStatus
+from experiments.live.take import TakeFolders
+from experiments.preparation import prepare
+
+RESET, RECORD, END = "reset (X)", "record (C)", "end (Q)"
+BARE = ("--no-figures", "--no-recording")
+
+
+class Silent:
+    """Is told how far it is."""
+
+    def expect(self, duration):
+        pass
+
+    def __call__(self, time, phase):
+        pass
+
+
+class Rehearsal:
+    """A session with a person who follows a script: what is set, and when [s]."""
+
+    def __init__(self, folder, name, *changes):
+        scenario = with_operator(read_scenario(name, list(changes)))
+        prepared = prepare(scenario, 60.0, recording=True, progress=Silent(), live=True)
+        self.status, self.said, self._requests = LiveStatus(name), [], SimpleQueue()
+        self.session = LiveSession(
+            prepared,
+            name,
+            Meshcat(MeshcatParams(host="127.0.0.1", port=0)),
+            self._requests,
+            self.status,
+            Output(TakeFolders(folder, []), figures=False, recording=False),
+            self.said.append,
+            RealTimePace(lambda: 0.0, lambda _: None),
+        )
+
+    def play(self, *script):
+        left, seen = list(script), []
+
+        def follow():
+            """Called once per round; a reset puts the time back."""
+            seen.append((self.session.end, self.status.phase, self.status.content()))
+            while left and left[0][0](self):
+                for request in left.pop(0)[1]:
+                    self._requests.put(request)
+            return False
+
+        self.session.run(follow, Silent())
+        assert not left
+        return seen
+
+
+def at(time, **sets):
+    """What is set from a time on; names of sliders and buttons as they are labelled."""
+    return (lambda rehearsal: rehearsal.session.end >= time - 1e-9), [
+        (name, 1.0 if value is True else value) for name, value in sets.items()
+    ]
+
+
+def in_fault(*requests):
+    return (lambda rehearsal: rehearsal.status.phase == "fault"), list(requests)
+
+
+def datasets(folder):
+    with h5py.File(folder / "log.h5") as file:
+        return {name: dataset[:] for name, dataset in file.items()}, dict(file.attrs)
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, values in one.items():
+        assert values.tobytes() == other[name].tobytes(), name
+
+
+def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
+    rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
+    seen = rehearsal.play(
+        at(0.15, **{"pull z [N]": 30.0}),
+        at(0.25, **{RESET: True}),
+        ((lambda r: r.session.end < 0.1), []),  # after the reset
+        at(0.4, **{"pull y [N]": 25.0, "pull z [N]": -15.0}),
+        at(0.6, **{RECORD: True, "across k [N/m]": 1500.0}),
+        at(0.8, **{"guide (K, J)": 0.0, "hold (T, G)": 1.0}),
+        at(1.0, **{"guide (K, J)": 1.0, "along d [Ns/m]": 30.0, "hold dy [m]": 0.1}),
+        at(1.3, **{RECORD: True}),
+        at(1.45, **{END: True}),
+    )
+    first, second = (kept.folder for kept in rehearsal.session.kept)
+    log, attributes = datasets(first)
+    assert attributes["recorded_from"] == "0.600 s"
+    assert log["t"][-1] == pytest.approx(1.3)
+    # led along, and off by what is asked; before the reset nothing counts
+    assert log["wrench_ext"][350, 1] == 0.0
+    assert log["wrench_ext"][790, 1] == pytest.approx(25.0, rel=0.01)
+    assert log["eta"][-1, 0] > 0.05
+    # two wishes, each for two time constants; back to the first one as far as it can be paid for
+    free = (1500.0 + 3500.0 * np.exp(-2.0)) * np.exp(-2.0)
+    assert log["stiffness"][1000, 1] == pytest.approx(free, rel=2e-3)
+    assert 2.0 * free < log["stiffness"][-1, 1] <= 1500.0
+    ticks, _ = read_controls(str(first / "operator.csv"), [])
+    assert ticks[0] == 0
+    assert ticks[1] == 400
+
+    # a recording that stops does not disturb what goes on
+    further, _ = datasets(second)
+    assert further["t"][-1] == pytest.approx(1.45)
+    assert_same(log, {name: values[: len(log["t"])] for name, values in further.items()})
+
+    capsys.readouterr()
+    again = tmp_path / "again"
+    assert main(["run", str(second / "scenario.yaml"), "--out", str(again), *BARE]) == 0
+    assert_same(further, datasets(again)[0])
+    status = seen[-1][2]
+    json.dumps(status, allow_nan=False)
+    assert set(status["deviation"]) == {"xi_1", "xi_2"}
+
+
+def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
+    """A force sensor that fails at 0.3 s."""
+    failing = "simulation.force_sensor_failure={time: 0.3, component: 0}"
+    rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle", failing)
+    seen = rehearsal.play(
+        at(0.1, **{RECORD: True}),
+        in_fault(),
+        in_fault((RESET, 1.0)),
+        ((lambda r: r.status.phase == "running" and r.session.end < 0.1), []),
+        in_fault((END, 1.0)),
+    )
+    stopped = [entry for entry in seen if entry[1] == "fault"]
+    assert len({entry[0] for entry in stopped}) == 1
+    assert stopped[0][0] == pytest.approx(0.31, abs=0.011)
+    assert "Press X to reset" in stopped[0][2]["message"]
+    assert rehearsal.session.fault is not None
+    assert any(line.startswith("fault: ") for line in rehearsal.said)
+    assert rehearsal.session.kept[-1].outcome.fault == rehearsal.session.fault
+    # a recording that a reset ends is kept, what was done after it when the session ends
+    recorded, last = rehearsal.session.kept
+    assert datasets(recorded.folder)[1]["recorded_from"] == "0.100 s"
+    log, attributes = datasets(last.folder)
+    assert "recorded_from" not in attributes
+    assert attributes["fault"] in stopped[0][2]["message"]
+    scenario = rehearsal.session.kept[-1].folder / "scenario.yaml"
+    again = tmp_path / "again"
+    assert main(["run", str(scenario), "--out", str(again), *BARE]) == 3
+    assert_same(log, datasets(again)[0])
+    assert np.isfinite(log["q_J"]).all()
+
+
+def test_who_does_nothing_leaves_nothing(tmp_path):
+    rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
+    rehearsal.play(((lambda _: True), [(END, 1.0)]))
+    assert rehearsal.session.kept == []
+    assert not (tmp_path / "takes").exists()

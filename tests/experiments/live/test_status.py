@@ -1,0 +1,60 @@
+"""What a session tells the page."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+
+from diagrams.station import Station
+from experiments.live.status import LiveStatus
+from pfsc_drake.control.manifolds.path import PathManifold
+
+COORDINATES = PathManifold(2, oriented=False).coordinates
+STATION = SimpleNamespace(
+    law=SimpleNamespace(
+        linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=COORDINATES)),
+        layout=SimpleNamespace(manifold_state=slice(2, 8)),
+    ),
+    mode_labels=("free", "surface", "edge"),
+)
+STATION.mode_name = lambda mode: Station.mode_name(STATION, mode)
+SIGNALS = {
+    "law": np.array([9.0, 9.0, 0.4, 0.001, -0.002, 1.0, 1.0, 1.0]),
+    "wrench_ext": np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3]),
+    "manifold_force": np.array([5.0, 6.0, 7.0]),
+    "impedance": np.array([3.0, 3.0, 3.0, 90.0, 0.0, 150.0, 0.0, np.inf, 5000.0]),
+    "tank": np.array([0.25]),
+    "tared": np.array([0.0]),
+    "mode": np.array([1.0]),
+}
+
+
+def test_it_says_where_the_tool_is_what_acts_and_what_yields():
+    status = LiveStatus("mine", phase="running", factor=0.5)
+    status.observe(STATION, SIGNALS)
+    content = json.loads(json.dumps(status.content(), allow_nan=False))
+    assert content["progress"] == {"eta": 0.4}
+    assert content["deviation"] == {"xi_1": 0.001, "xi_2": -0.002}
+    assert content["force"] == [1.0, 2.0, 3.0]
+    assert content["measured"] == {"eta": 5.0, "xi_1": 6.0, "xi_2": 7.0}
+    assert content["stiffness"] == {"eta": 0.0, "xi_1": None, "xi_2": 5000.0}
+    assert content["damping"]["xi_2"] == 150.0
+    assert content["tank"] == 0.25
+    assert content["ready"] is False
+    assert content["slow"] is True
+    assert content["mode"] == "surface"
+
+
+def test_without_modes_there_is_none_and_unknown_ones_are_numbers():
+    status = LiveStatus("mine")
+    status.observe(STATION, {name: SIGNALS[name] for name in ("law", "wrench_ext")})
+    assert status.mode is None
+    assert status.ready
+    status.observe(STATION, SIGNALS | {"mode": np.array([7.0])})
+    assert status.mode == "7"
+
+
+def test_what_is_not_finite_is_null():
+    status = LiveStatus("mine")
+    status.observe(STATION, SIGNALS | {"wrench_ext": np.full(6, np.nan)})
+    assert status.content()["force"] == [None] * 3
