@@ -178,6 +178,16 @@ class HandModel:
         self._phases = random.uniform(0.0, 2.0 * np.pi, (3, _TREMOR_LINES))
         self._amplitude = parameters.tremor * np.sqrt(2.0 / _TREMOR_LINES)
 
+    @property
+    def begin(self) -> float:
+        """When the hand takes hold [s]."""
+        return float(self._times[0])
+
+    @property
+    def end(self) -> float:
+        """When the target comes to rest for good [s]."""
+        return float(self._times[-1])
+
     def target(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return ``p_d`` [m] and ``p_d'`` [m/s], in the world, shape (3,) each."""
         coordinates, rates = self._coordinates(time)
@@ -202,7 +212,12 @@ class HandModel:
         return taking * (1.0 - smooth_step((time - self._parameters.release) / ramp))
 
     def wanted(
-        self, time: float, y_t: np.ndarray, twist: np.ndarray, R_e: np.ndarray | None = None
+        self,
+        time: float,
+        y_t: np.ndarray,
+        twist: np.ndarray,
+        R_e: np.ndarray | None = None,
+        reach: float = np.inf,
     ) -> np.ndarray:
         """Return ``[f_c, tau_c]``, world axes, shape (6,) [N, Nm].
 
@@ -211,8 +226,11 @@ class HandModel:
             y_t: Tool point [m], shape (3,).
             twist: ``[y_t', w]``, world axes, shape (6,) [m/s, rad/s].
             R_e: Orientation of the tool, shape (3, 3); None where there is nothing to turn.
+            reach: Distance from which on a target counts as one that waits [m].
         """
         p_d, v_d = self.target(time)
+        if np.linalg.norm(p_d - y_t) > reach:
+            v_d = np.zeros(3)
         hand = self._parameters
         force = hand.stiffness * (p_d - y_t) + hand.damping * (v_d - twist[:3])
         torque = -hand.rotational_damping * twist[3:]

@@ -4,7 +4,8 @@ import enum
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Union
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
@@ -15,6 +16,7 @@ from pfsc_drake.control.compliance.impedance_functions import (
     reference_function,
     update_function,
 )
+from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.schema_check import REQUIRED
@@ -69,6 +71,11 @@ class Profile:
             raise InputError(f"at: {self.at}; must be finite and increasing")
         if not all(math.isfinite(v) and v >= 0.0 for v in self.values):
             raise InputError(f"values: {self.values}; must be finite, none negative")
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is no constant."""
+        return bool(self.at)
 
     def interpolant(self, lap: float | None = None) -> Callable[[float], float]:
         """Return the parameter as a function of what it goes over.
@@ -128,19 +135,23 @@ class Profile:
         )
 
 
+# the first is what one without a tag means
+Damping = Union[Profile, SlowEnds]  # noqa: UP007 (Drake's YAML needs it)
+
+
 @dataclass
 class CoordinateImpedance:
     """Mass, damping and stiffness of one kind of coordinate.
 
     Attributes:
         mass: ``m`` [kg or kg m^2], positive.
-        damping: ``d`` [N s/m or Nm s/rad]; zero is allowed.
+        damping: ``d`` [N s/m or Nm s/rad]; zero is allowed; ``!SlowEnds`` for (5.4).
         stiffness: ``k`` [N/m or Nm/rad]; zero is allowed, and infinity is position
             control: ``y_p = y_d``.
     """
 
     mass: Profile = field(default_factory=lambda: Profile(1.0), metadata=REQUIRED)
-    damping: Profile = field(default_factory=Profile, metadata=REQUIRED)
+    damping: Damping = field(default_factory=Profile, metadata=REQUIRED)
     stiffness: Profile = field(default_factory=lambda: Profile(math.inf), metadata=REQUIRED)
 
     def __post_init__(self) -> None:
@@ -148,7 +159,7 @@ class CoordinateImpedance:
         if not all(0.0 < mass < math.inf for mass in masses):
             raise InputError(f"mass: {masses}; must be positive and finite")
         # profiles themselves refuse the rest
-        if not math.isfinite(self.damping.value):
+        if isinstance(self.damping, Profile) and not math.isfinite(self.damping.value):
             raise InputError(f"damping: {self.damping.value}; must be finite")
 
 
@@ -166,6 +177,11 @@ class ImpedanceParameters:
     transversal: CoordinateImpedance = field(default_factory=CoordinateImpedance)
     rotational: CoordinateImpedance = field(default_factory=CoordinateImpedance)
 
+    def on_path(self, length: float) -> "ImpedanceParameters":
+        """Return them with the length of a path [m] where slow ends do not say one."""
+        kinds = (self.tangential, self.transversal, self.rotational)
+        return ImpedanceParameters(*(_on_path(kind, length) for kind in kinds))
+
     def of(self, kind: Kind) -> CoordinateImpedance:
         """Return the impedance of a kind of coordinates."""
         return {
@@ -173,6 +189,12 @@ class ImpedanceParameters:
             Kind.TRANSVERSAL: self.transversal,
             Kind.ROTATIONAL: self.rotational,
         }[kind]
+
+
+def _on_path(kind: CoordinateImpedance, length: float) -> CoordinateImpedance:
+    if isinstance(kind.damping, SlowEnds) and kind.damping.length == 0.0:
+        return replace(kind, damping=replace(kind.damping, length=length))
+    return kind
 
 
 class ImpedanceLaw:
@@ -246,11 +268,11 @@ class ImpedanceLaw:
             c.name: lap for c in coordinates if c.kind is Kind.TANGENTIAL and lap is not None
         }
         self._profiles = [
-            [(p.over if p.at else _ACROSS, p.interpolant(round_trip.get(p.over))) for p in row]
+            [(p.over if p.varies else _ACROSS, p.interpolant(round_trip.get(p.over))) for p in row]
             for row in table
         ]
         self._row = [list(used).index(coordinate.kind) for coordinate in coordinates]
-        self.is_constant = not any(p.at for row in table for p in row)
+        self.is_constant = not any(p.varies for row in table for p in row)
         self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], 0.0))
         # the impedance that the coefficients belong to
         self._key, self._coefficients = b"", np.zeros((8, m))
@@ -263,7 +285,7 @@ class ImpedanceLaw:
             for name in ("mass", "damping", "stiffness"):
                 profile = getattr(impedance, name)
                 over = profile.over
-                if profile.at and over not in allowed:
+                if profile.varies and over not in allowed:
                     raise InputError(
                         f"compliance.{kind.name.lower()}.{name}.over: {over!r}; must be one of "
                         f"{', '.join(allowed)}"

@@ -12,7 +12,12 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from pfsc_drake.control.compliance.impedance import STIFFNESS, ImpedanceLaw, ImpedanceStatus
+from pfsc_drake.control.compliance.impedance import (
+    DAMPING,
+    STIFFNESS,
+    ImpedanceLaw,
+    ImpedanceStatus,
+)
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 
@@ -48,6 +53,7 @@ class ImpedanceFilter(LeafSystem):
             shape (3 m,), in place of the law's own.
         reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
         status (output): :class:`ImpedanceStatus` of the last update, shape (1,).
+        damping (output): d of the last interval, shape (m,) [N s/m, Nm s/rad].
 
     State:
         Discrete: y_p, y_p', and force, mass, damping, stiffness of the last interval, each
@@ -93,6 +99,9 @@ class ImpedanceFilter(LeafSystem):
             self._calc_reference,
             prerequisites_of_calc={memory, self._desired.ticket()},
         )
+        self.DeclareVectorOutputPort(
+            "damping", m, self._calc_damping, prerequisites_of_calc={memory}
+        )
         self.DeclareVectorOutputPort("status", 1, self._calc_status, prerequisites_of_calc={memory})
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(law.period, 0.0, self._update)
@@ -137,6 +146,10 @@ class ImpedanceFilter(LeafSystem):
 
     def _calc_status(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector([context.get_discrete_state_vector().value()[self._status]])
+
+    def _calc_damping(self, context: Context, output: BasicVector) -> None:
+        memory = context.get_discrete_state_vector().value()[self._filter]
+        output.SetFromVector(memory.reshape(self._shape)[3 + DAMPING])
 
     def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
         memory = state.get_mutable_value()

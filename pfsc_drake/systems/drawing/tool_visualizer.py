@@ -7,8 +7,6 @@ from pydrake.geometry import Meshcat, Rgba, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-_ROOT = "tool"
-
 
 @dataclass(frozen=True, eq=False)
 class ToolPart:
@@ -39,19 +37,22 @@ class ToolVisualizer(LeafSystem):
         parts: What to draw.
         meshcat: Where to draw, axes of the inertial frame.
         period: Time between frames [s].
+        root: Path of all parts.
     """
 
-    def __init__(self, parts: Sequence[ToolPart], meshcat: Meshcat, period: float) -> None:
+    def __init__(
+        self, parts: Sequence[ToolPart], meshcat: Meshcat, period: float, root: str = "tool"
+    ) -> None:
         super().__init__()
-        self._parts, self._meshcat = parts, meshcat
+        self._parts, self._meshcat, self._root = parts, meshcat, root
         self._tool_pose = self.DeclareVectorInputPort("tool_pose", 12)
         self.DeclareInitializationPublishEvent(self._draw_parts)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
 
     def _draw_parts(self, context: Context) -> EventStatus:
         for part in self._parts:
-            self._meshcat.SetObject(f"{_ROOT}/{part.name}", part.shape, part.color)
-            self._meshcat.SetTransform(f"{_ROOT}/{part.name}", part.X_TP)
+            self._meshcat.SetObject(f"{self._root}/{part.name}", part.shape, part.color)
+            self._meshcat.SetTransform(f"{self._root}/{part.name}", part.X_TP)
         self._draw(context)
         return EventStatus.Succeeded()
 
@@ -59,4 +60,4 @@ class ToolVisualizer(LeafSystem):
         pose = self._tool_pose.Eval(context)
         # interpolated between two frames, hence no rotation exactly
         R_WT = RotationMatrix.ProjectToRotationMatrix(pose[3:].reshape(3, 3))
-        self._meshcat.SetTransform(_ROOT, RigidTransform(R_WT, pose[:3]), context.get_time())
+        self._meshcat.SetTransform(self._root, RigidTransform(R_WT, pose[:3]), context.get_time())

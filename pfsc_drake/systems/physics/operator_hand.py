@@ -59,6 +59,10 @@ class OperatorHand(LeafSystem):
         last = context.get_discrete_state(self._last_pose).value()
         known = np.isfinite(last).all()
         twist = observed_twist(last, pose, self._period) if known else np.zeros(6)
+        return self._answer(context, pose, twist)
+
+    def _answer(self, context: Context, pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
+        """Return the wrench that the hand wants, having seen a pose and a twist."""
         return self._hand.wanted(context.get_time(), pose[:3], twist, pose[3:].reshape(3, 3))
 
     def _update(self, context: Context, state: DiscreteValues) -> None:

@@ -1,0 +1,168 @@
+"""Suction cups: rubber that holds a plate while there is a vacuum."""
+
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.errors import InputError
+
+FREE = -1.0  # index of the plate of a cup that holds none
+_DEEPEST = 0.02  # m, below which a rim is not in the face of a plate, but somewhere else
+
+
+@dataclass
+class SuctionParameters:
+    """Properties of a gripper's cups; of the order of bellows of 30 mm at 0.6 bar.
+
+    Attributes:
+        cups: Middles of their rims in the tool's frame [m], one ``[x, y]`` each, at z = 0.
+        stiffness: Of the rubber of one cup, in every direction [N/m].
+        damping: Of the same [N s/m].
+        press: Depth from which on a cup that is pressed on a plate is tight [m].
+        pull_off: Tension at which a cup comes off [N].
+        shear: Force along the plate at which a cup slips [N].
+    """
+
+    cups: list[list[float]] = field(
+        default_factory=lambda: [[0.07, 0.045], [0.07, -0.045], [-0.07, 0.045], [-0.07, -0.045]]
+    )
+    stiffness: float = 1e4
+    damping: float = 40.0
+    press: float = 2e-4
+    pull_off: float = 40.0
+    shear: float = 25.0
+
+    def __post_init__(self) -> None:
+        for key in ("stiffness", "press", "pull_off", "shear"):
+            value = getattr(self, key)
+            if not 0.0 < value < np.inf:
+                raise InputError(f"{key} = {value}; allowed: a positive number")
+        if not 0.0 <= self.damping < np.inf:
+            raise InputError(f"damping = {self.damping}; allowed: zero or a positive number")
+        table = [len(cup) == 2 and bool(np.isfinite(cup).all()) for cup in self.cups]
+        if len(table) < 3 or not all(table):
+            raise InputError(f"cups = {self.cups}; allowed: three or more [x, y] in m")
+
+
+def free_cups(count: int) -> np.ndarray:
+    """Return the state of cups that hold nothing, shape (4 count,)."""
+    return np.tile([FREE, 0.0, 0.0, 0.0], count)
+
+
+def holding_cups(
+    parameters: SuctionParameters,
+    plate: int,
+    R_PT: np.ndarray,
+    p_PT: np.ndarray,
+    load: np.ndarray,
+) -> np.ndarray:
+    """Return the state of cups that all hold a plate, shape (4n,).
+
+    Args:
+        parameters: The cups.
+        plate: Index of the plate.
+        R_PT: Orientation of the tool in the plate's frame, shape (3, 3).
+        p_PT: Tool point in the plate's frame [m], shape (3,).
+        load: What they bear together, each the same, axes of the plate [N], shape (3,).
+    """
+    rims = np.column_stack([parameters.cups, np.zeros(len(parameters.cups))])
+    anchors = p_PT + rims @ R_PT.T + load / (len(rims) * parameters.stiffness)
+    return np.column_stack([np.full(len(rims), float(plate)), anchors]).ravel()
+
+
+def cups_function(
+    parameters: SuctionParameters, half_size: np.ndarray, num_plates: int
+) -> ca.Function:
+    """Return what a gripper's n cups do to the tool and to K plates, and when they hold.
+
+    A cup is a spring and a damper at its rim. One that holds a plate sits at an *anchor*, the
+    point of the plate where it took hold, and bears forces in every direction::
+
+        f = -k (p - a) - d p'          in the axes of the plate,
+
+    p being the rim and a the anchor. One that holds none is pushed back by a plate that it is
+    pressed into, along the plate's normal alone, and never pulled. With a vacuum a cup takes hold
+    when it is pressed deep enough; it lets go when the vacuum ends or when it is torn off, and its
+    anchor slips where the force along the plate would exceed what friction bears.
+
+    The *state* has four numbers for each cup: index of its plate or -1, and the anchor in the axes
+    of the plate [m]. A plate's frame has its origin in the middle of the face that is gripped, and
+    z points into the plate.
+
+    Args:
+        parameters: The cups.
+        half_size: Half length and half width of the plates [m], shape (2,).
+        num_plates: K.
+
+    Returns:
+        ``(state, tool_motion, plate_state, vacuum) -> (wrench, pushes, next)``: ``tool_motion``
+        as of :class:`ToolMotion`, shape (18,); ``plate_state`` of K free bodies of a
+        MultibodyPlant, quaternion and position of each, then angular velocity and velocity of
+        each, shape (13 K,); ``vacuum`` above 0.5 if there is one. ``wrench`` ``[force, torque]``
+        on the tool at the tool point, shape (6,); ``pushes`` ``[force, torque]`` on each plate at
+        its origin, shape (6 K,), world axes [N, Nm]; ``next`` state.
+    """
+    count = len(parameters.cups)
+    state, vacuum = ca.SX.sym("state", 4 * count), ca.SX.sym("vacuum")
+    tool, plates = ca.SX.sym("tool_motion", 18), ca.SX.sym("plate_state", 13 * num_plates)
+    wrench, pushes, after = ca.SX(6, 1), [ca.SX(6, 1) for _ in range(num_plates)], []
+    for i, (x, y) in enumerate(parameters.cups):
+        cup = state[4 * i : 4 * i + 4]
+        arm = ca.reshape(tool[3:12], 3, 3).T @ ca.DM([x, y, 0.0])
+        rim, velocity = tool[:3] + arm, tool[12:15] + ca.cross(tool[15:], arm)
+        following = ca.vertcat(FREE, 0.0, 0.0, 0.0)
+        for k in range(num_plates):
+            R, arm_k, rate = _relative(plates, num_plates, k, rim, velocity)
+            p, u = R.T @ arm_k, R.T @ rate
+            holds, touches = cup[0] == k, ca.logic_and(cup[0] < 0.0, _is_in(p, half_size))
+            stretched = p - cup[1:]
+            held = -parameters.stiffness * stretched - parameters.damping * u
+            push = ca.fmax(parameters.stiffness * p[2] + parameters.damping * u[2], 0.0)
+            pressed = ca.vertcat(0.0, 0.0, -push)
+            force = R @ (ca.if_else(holds, held, 0.0) + ca.if_else(touches, pressed, 0.0))
+            wrench += ca.vertcat(force, ca.cross(arm, force))
+            pushes[k] -= ca.vertcat(force, ca.cross(arm_k, force))
+            kept = ca.vertcat(cup[0], _slipped(parameters, cup[1:], stretched))
+            torn = -parameters.stiffness * stretched[2] > parameters.pull_off
+            seizes = ca.logic_and(touches, p[2] >= parameters.press)
+            following = ca.if_else(ca.logic_and(holds, ca.logic_not(torn)), kept, following)
+            following = ca.if_else(seizes, ca.vertcat(k, p[0], p[1], 0.0), following)
+        nothing = ca.vertcat(FREE, 0.0, 0.0, 0.0)
+        after.append(ca.if_else(vacuum > 0.5, following, nothing))
+    results = [wrench, ca.vertcat(*pushes), ca.vertcat(*after)]
+    return ca.Function(
+        "suction_cups",
+        [state, tool, plates, vacuum],
+        ca.cse([ca.densify(result) for result in results]),
+        ["state", "tool_motion", "plate_state", "vacuum"],
+        ["wrench", "pushes", "next"],
+    )
+
+
+def _relative(
+    plates: ca.SX, num_plates: int, k: int, rim: ca.SX, velocity: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return a plate's orientation, a rim's place and velocity beside it, world axes."""
+    q, v = plates[7 * k : 7 * k + 7], plates[7 * num_plates + 6 * k :][:6]
+    arm = rim - q[4:]
+    return _orientation(q[:4]), arm, velocity - v[3:] - ca.cross(v[:3], arm)
+
+
+def _orientation(q: ca.SX) -> ca.SX:
+    """Return the rotation matrix of a quaternion of any length."""
+    w, S = q[0], ca.skew(q[1:])
+    return ca.SX.eye(3) + 2.0 * (w * S + S @ S) / ca.dot(q, q)
+
+
+def _is_in(p: ca.SX, half_size: np.ndarray) -> ca.SX:
+    """Return whether a rim is pressed into the face of a plate."""
+    over = ca.logic_and(ca.fabs(p[0]) <= half_size[0], ca.fabs(p[1]) <= half_size[1])
+    return ca.logic_and(over, ca.logic_and(p[2] > 0.0, p[2] < _DEEPEST))
+
+
+def _slipped(parameters: SuctionParameters, anchor: ca.SX, stretched: ca.SX) -> ca.SX:
+    """Return the anchor, moved along the plate by what friction does not bear."""
+    size, most = ca.norm_2(stretched[:2]), parameters.shear / parameters.stiffness
+    excess = ca.fmax(1.0 - most / ca.fmax(size, most), 0.0)
+    return anchor + ca.vertcat(excess * stretched[:2], 0.0)

@@ -1,0 +1,51 @@
+"""Where the tool is and how it moves."""
+
+import casadi as ca
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.robot_model import RobotModel
+
+
+class ToolMotion(LeafSystem):
+    """Direct kinematics (2.5) of a robot's links, and their rates (2.11).
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        tool_motion (output): ``[y_t, R_e by rows, v, w]``: tool point [m], orientation, velocity
+            of the tool point [m/s] and angular velocity [rad/s], world axes, shape (18,).
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        super().__init__()
+        n = robot.dimension
+        self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
+        self.DeclareVectorOutputPort(
+            "tool_motion",
+            18,
+            self._calc_motion,
+            prerequisites_of_calc={self._joint_state.ticket()},
+        )
+        function = BoundFunction(motion_function(robot))
+        self._q, self._v = function.arguments["q"], function.arguments["v"]
+        self._motion, self._evaluate = function.results["motion"], function.evaluate
+
+    def _calc_motion(self, context: Context, output: BasicVector) -> None:
+        state, n = self._joint_state.Eval(context), len(self._q)
+        self._q[:], self._v[:] = state[:n], state[n : 2 * n]
+        self._evaluate()
+        output.SetFromVector(self._motion)
+
+
+def motion_function(robot: RobotModel) -> ca.Function:
+    """Return ``(q, v) -> [y_t, R_e by rows, v, w]``, shapes (N,), (N,) and (18,)."""
+    q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
+    y, R = robot.tool_pose([Jet([q[i], v[i]]) for i in range(robot.dimension)])
+    (position, velocity), (orientation, rate) = y.coefficients[:2], R.coefficients[:2]
+    w = ca.inv_skew(rate @ orientation.T)
+    motion = ca.densify(ca.vertcat(position, ca.vec(orientation.T), velocity, w))
+    return ca.Function("tool_motion", [q, v], ca.cse([motion]), ["q", "v"], ["motion"])
