@@ -21,6 +21,9 @@ from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.signal_log import add_log
 from diagrams.station import Station
 from diagrams.surroundings.forces import add_surroundings
+from diagrams.surroundings.mounting import Mounting, make_mounting
+from diagrams.surroundings.mounting_look import mounting_look
+from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.surroundings.operator import add_operator
 from diagrams.surroundings.patch import PressedWorkpiece
@@ -59,11 +62,11 @@ def build_station(
         InputError: If the scenario cannot be built.
     """
     builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
-    workpiece = _workpiece(scenario, task)
+    workpiece, mounting = _workpiece(scenario, task), make_mounting(scenario, task)
     part = _add_robot(builder, scenario, folder, workpiece)
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
-    begin = cache(lambda: _start(scenario, task, part, workpiece))
+    begin = cache(lambda: _start(scenario, task, part, workpiece, mounting))
     rest = cache(lambda: _rest(task, part, *begin()))
     law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
     start, initial_state = begin()
@@ -78,10 +81,12 @@ def build_station(
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     operator = add_operator(builder, scenario, folder)
-    forces = add_surroundings(builder, part, task, scenario, around, operator)
+    forces = add_surroundings(builder, part, task, scenario, around, start, operator, mounting)
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
         forces |= add_sensor(builder, part, scenario, states | forces)
+        if mounting is not None:
+            forces |= add_payload(builder, scenario, mounting, place.signals | forces)
     wishes = {} if operator is None else operator.wishes
     controller, made = add_law(builder, following, place, forces | wishes)
     signals = place.signals | forces | made
@@ -114,6 +119,7 @@ def build_station(
         workpiece,
         operator,
         MODES if "mode" in signals else (),
+        mounting,
     )
 
 
@@ -145,7 +151,11 @@ def _add_robot(
 
 
 def _start(
-    scenario: Scenario, task: Task, part: RobotPart, workpiece: Workpiece | None
+    scenario: Scenario,
+    task: Task,
+    part: RobotPart,
+    workpiece: Workpiece | None,
+    mounting: Mounting | None,
 ) -> tuple[StartPoint, np.ndarray]:
     """Return where the tool starts, and the state of the plant there, at rest.
 
@@ -158,6 +168,8 @@ def _start(
     start = task.start(shift)
     if workpiece is not None:
         workpiece.check_start(start.target.y_t)
+    if mounting is not None:
+        start = mounting.start(start, task)
     q_J = part.posture(start.target, scenario.start)
     for position, where in task.way():
         part.check_reach(position, where)
@@ -207,4 +219,5 @@ def build_station_replay(
         robot = station.part.robot
         return build_delta_replay(robot, drawn, motion, meshcat, period, look)
     assert drawing is not None  # draw_station knows every other robot
-    return build_replay(drawing, drawn, motion, meshcat, period, look)
+    plates = None if station.mounting is None else mounting_look(station.mounting)
+    return build_replay(drawing, drawn, motion, meshcat, period, look, plates)

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context, Diagram
 from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
 from diagrams.signal_log import SignalLog
+from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import Task
@@ -63,6 +64,7 @@ class Station:
         workpiece: What the tool may touch, if anything.
         operator: Who guides the tool while the robot moves, if anybody does.
         mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
+        mounting: Where plates come from and go, if there are any.
     """
 
     diagram: Diagram
@@ -79,6 +81,7 @@ class Station:
     workpiece: Workpiece | None = None
     operator: Operator | None = None
     mode_labels: Sequence[str] = ()
+    mounting: Mounting | None = None
 
     @property
     def robot(self) -> RobotModel:

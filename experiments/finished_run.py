@@ -13,6 +13,7 @@ from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import Scenario
+from diagrams.tasks.space_guidance import free_motion
 from diagrams.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
@@ -21,6 +22,7 @@ from experiments.results.guidance_audit import Promise, audit
 from experiments.results.guidance_metrics import guidance_metrics
 from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import lap_length
+from experiments.results.mounting_metrics import mounting_metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.posture_metrics import posture_metrics
 from experiments.results.press_metrics import press_metrics
@@ -190,6 +192,7 @@ def _measure(
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
     metrics.update(_guidance_audit(log, settings))
+    metrics.update(mounting_metrics(log))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)
@@ -212,15 +215,13 @@ def _measure(
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
     """Check what was promised of forbidden regions, if there were any."""
-    fixtures, along = settings.fixtures, settings.compliance.tangential
+    fixtures = settings.fixtures
     if fixtures is None or fixtures.guidance.rules != "program" or "near_regions" not in log:
         return Metrics()
-    guidance = fixtures.guidance
+    motion, guidance = free_motion(settings), fixtures.guidance
     return audit(
         log,
-        Promise(
-            along.mass.value, along.damping.value, guidance.largest_speed, guidance.tank.capacity
-        ),
+        Promise(motion.mass, motion.damping, guidance.largest_speed, guidance.tank.capacity),
     )
 
 

@@ -15,6 +15,7 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.drawing.manifold_drawing import ManifoldDrawing
+from diagrams.drawing.mounting_drawing import MountingLook, add_mounting_drawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
 from diagrams.workpiece import WorkpieceLook
@@ -70,6 +71,7 @@ class RecordedMotion:
         tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
         region_clock: Of regions that move [s], shape (frames,).
+        plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
     """
 
     times: np.ndarray
@@ -82,6 +84,7 @@ class RecordedMotion:
     tool_force: np.ndarray | None = None
     trail: np.ndarray | None = None
     region_clock: np.ndarray | None = None
+    plates: np.ndarray | None = None
 
 
 def build_replay(
@@ -91,6 +94,7 @@ def build_replay(
     meshcat: Meshcat,
     period: float,
     workpiece: WorkpieceLook | None = None,
+    mounting: MountingLook | None = None,
 ) -> Diagram:
     """Return a diagram that draws a recorded motion while its time advances.
 
@@ -101,6 +105,7 @@ def build_replay(
         meshcat: Where to draw.
         period: Time between frames [s].
         workpiece: What its tool touches, if anything.
+        mounting: How the plates of the motion are drawn, if there are any.
     """
     bodies = body_origins(robot.plant, motion.positions[0])
     points = np.concatenate(manifold.outline())
@@ -109,11 +114,31 @@ def build_replay(
         look_down_at(meshcat, points.mean(axis=0))
     builder = DiagramBuilder()
     positions = add_motion(builder, manifold, motion, workpiece, meshcat, period)
+    if mounting is not None:
+        _add_mounting(builder, mounting, motion, meshcat, period)
     body = builder.AddNamedSystem(
         "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
     )
     builder.Connect(positions, body.GetInputPort("positions"))
     return builder.Build()
+
+
+def _add_mounting(
+    builder: DiagramBuilder,
+    look: MountingLook,
+    motion: RecordedMotion,
+    meshcat: Meshcat,
+    period: float,
+) -> None:
+    """Add plates and gripper, and what the plates are taken from and mounted into."""
+    assert motion.plates is not None
+    count = motion.plates.shape[1] // 12
+    poses = [motion.tool_pose, *np.hsplit(motion.plates, count)]
+    tool, *plates = (
+        add_source(builder, f"mounting_pose_{k}", motion.times, pose)
+        for k, pose in enumerate(poses)
+    )
+    add_mounting_drawing(builder, look, tool, plates, meshcat, period)
 
 
 def add_motion(

@@ -21,6 +21,7 @@ from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.notch import NotchParameters
 from diagrams.scenario.operator import OperatorParameters
 from diagrams.scenario.path import PathParameters
+from diagrams.scenario.plate import PlateParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.simulation import SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
@@ -81,6 +82,8 @@ class Scenario:
             starts in the middle of the notch, ``start.offset`` beside. None without the block.
         workpiece: Workpiece under the surface, and a ball on the tool that presses on it. None
             without the block.
+        plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
+            without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
@@ -112,6 +115,7 @@ class Scenario:
     faults: FaultParameters = dc.field(default_factory=FaultParameters)
     notch: NotchParameters | None = None
     workpiece: WorkpieceParameters | None = None
+    plate: PlateParameters | None = None
     duration: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)

@@ -8,9 +8,11 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.surroundings.hand import add_hand
+from diagrams.surroundings.mounting import Mounting
+from diagrams.surroundings.mounting_parts import add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
-from diagrams.tasks.task import Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -24,7 +26,9 @@ def add_surroundings(
     task: Task,
     scenario: Scenario,
     ports: dict[str, OutputPort],
+    start: StartPoint,
     operator: Operator | None = None,
+    mounting: Mounting | None = None,
 ) -> dict[str, OutputPort]:
     """Add the scenario's forces on the robot, and return their signals for the log.
 
@@ -34,26 +38,34 @@ def add_surroundings(
         task: What it is to do.
         scenario: The scenario.
         ports: ``joint_state``, the true one, ``manifold_point``.
+        start: Where the tool starts.
         operator: A person who guides the tool, if there is one.
+        mounting: Plates that are mounted, if there are any.
 
     Returns:
-        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, and
-        what :func:`add_pushes` returns of the links.
+        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, what
+        :func:`add_pushes` returns of the links and :func:`add_mounting` of plates.
 
     Raises:
         InputError: If a force does not suit the robot.
     """
     sources = _scripted(builder, part, task, scenario, ports)
-    sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
+    if mounting is None or mounting.parameters.operator is None:
+        sources += add_hand(builder, part.robot, task, scenario, ports["joint_state"])
     sources += add_live_hand(builder, part.robot, scenario, operator, ports["joint_state"])
     pushes, signals = add_pushes(builder, part, task, scenario, ports)
-    wrenches, held = [], None
+    if mounting is not None:
+        wrenches, mounted = add_mounting(
+            builder, mounting, part.robot, task, scenario, start, ports["joint_state"]
+        )
+        sources, signals = sources + wrenches, signals | mounted
+    acting, held = [], None
     if part.contact is not None:
         # the law's own pose is what encoders make of it, or that of the motors
         view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
         builder.Connect(ports["joint_state"], view.GetInputPort("joint_state"))
         builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
-        wrenches.append(part.contact.GetOutputPort("wrench"))
+        acting.append(part.contact.GetOutputPort("wrench"))
     if sources:
         total = _sum(builder, "wrench", sources)
         # held over a tick, so that it is computed once and not in every stage of the integrator
@@ -62,13 +74,13 @@ def add_surroundings(
         )
         builder.Connect(total, hold.get_input_port())
         held = hold.get_output_port()
-        wrenches.append(held)
+        acting.append(held)
     if pushes is not None and isinstance(part, Arm):
         part.connect_pushes(builder, pushes, held, ports["joint_state"])
     elif held is not None:
         part.connect_wrench(builder, held, ports["joint_state"])
-    if wrenches:
-        signals["wrench_ext"] = _sum(builder, "all_wrenches", wrenches)
+    if acting:
+        signals["wrench_ext"] = _sum(builder, "all_wrenches", acting)
     return signals
 
 

@@ -1,13 +1,19 @@
 """An operator whose hand guides the tool."""
 
+from collections.abc import Callable
+from typing import TypeVar
+
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_model import HandParameters, Place
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.operator_hand import OperatorHand
+
+Hand = TypeVar("Hand", bound=OperatorHand)
 
 
 def add_hand(
@@ -37,15 +43,43 @@ def add_hand(
     """
     if scenario.hand is None:
         return []
-    if scenario.hand.frame == "manifold":
-        for i, place in enumerate(scenario.hand.places()[1]):
+    hand = connect_hand(builder, robot, task, scenario, joint_state, OperatorHand)
+    return [hand.GetOutputPort("wrench")]
+
+
+def connect_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    task: Task,
+    scenario: Scenario,
+    joint_state: OutputPort,
+    make: Callable[[HandParameters, float, Place], Hand],
+) -> Hand:
+    """Add a hand of some kind that sees where the tool really is.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        task: See :func:`add_hand`.
+        scenario: The scenario, with a hand.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        make: Makes it of its properties, the sampling time [s] and what tells where coordinates
+            of the manifold are.
+
+    Raises:
+        InputError: See :func:`add_hand`.
+    """
+    parameters = scenario.hand
+    assert parameters is not None
+    if parameters.frame == "manifold":
+        for i, place in enumerate(parameters.places()[1]):
             task.check_place(place, f"hand.waypoints[{i}].position")
     try:
-        hand = OperatorHand(scenario.hand, scenario.controller.sampling_time, task.target())
+        hand = make(parameters, scenario.controller.sampling_time, task.target())
     except InputError as error:
         raise InputError(f"hand.{error}") from None
     builder.AddNamedSystem("operator_hand", hand)
     view = builder.AddNamedSystem("hand_view", ToolKinematics(robot))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
-    return [hand.GetOutputPort("wrench")]
+    return hand

@@ -53,6 +53,7 @@ def add_compliance(
     ports: dict[str, OutputPort],
     lap: float | None = None,
     end: float = math.inf,
+    length: float = 0.0,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
@@ -65,10 +66,12 @@ def add_compliance(
             derivatives up to :func:`reference_order`; with an operator ``impedance_wish``.
         lap: Length of the path [m] if it is closed.
         end: When the external reference ends [s].
+        length: Of the path [m], if there is one.
 
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
-        a force reference ``press``, with an operator ``impedance`` and ``tank``;
+        a force reference ``press``, with an operator ``impedance`` and ``tank``, else where it
+        varies ``damping`` of every coordinate;
         ``compliance_status``, an :class:`ImpedanceStatus`.
 
     Raises:
@@ -80,7 +83,7 @@ def add_compliance(
         # guidance leads along, see add_guidance
         impedance_parameters.tangential = CoordinateImpedance()
     law = ImpedanceLaw(
-        impedance_parameters,
+        impedance_parameters.on_path(length),
         manifold.coordinates,
         linearization.relative_degree,
         period,
@@ -110,6 +113,8 @@ def add_compliance(
     # where guidance leads along, the impedance is the scenario's
     if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
         signals |= _add_tuner(builder, scenario, linearization, law, impedance, ports)
+    elif not law.is_constant:
+        signals["damping"] = impedance.GetOutputPort("damping")
     return signals | {
         "reference": reference,
         "desired_reference": desired,

@@ -183,8 +183,16 @@ def add_law(
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),
         }
-        lap, end = following.task.lap, following.task.motion.domain[1]
-        made |= add_compliance(builder, scenario, law.linearization, inputs, lap, end)
+        task = following.task
+        made |= add_compliance(
+            builder,
+            scenario,
+            law.linearization,
+            inputs,
+            task.lap,
+            task.motion.domain[1],
+            task.length,
+        )
     _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):

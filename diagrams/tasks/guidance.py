@@ -4,12 +4,11 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
-from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.space_guidance import SpaceTask, free_motion
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
-from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -77,8 +76,7 @@ def make_guidance(scenario: Scenario, task: SpaceTask) -> Guidance:
         InputError: If the rules do not suit the law.
     """
     parameters = scenario.fixtures or FixtureParameters()
-    along, period = scenario.compliance.tangential, scenario.controller.sampling_time
-    admittance = Admittance(along.mass.value, along.damping.value, period)
+    admittance, period = free_motion(scenario), scenario.controller.sampling_time
     regions = [fixture.region for fixture in task.fixtures]
     nearby = ScheduledRegions(
         regions,

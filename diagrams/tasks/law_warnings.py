@@ -11,6 +11,7 @@ from pfsc_drake.control.compliance.observed_inertia import (
     bearable_inertia_error,
     bearable_mass_error,
 )
+from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError
@@ -225,7 +226,9 @@ def _observed_forces(
     ]
 
 
-def _least(profile: Profile) -> float:
+def _least(profile: Profile | SlowEnds) -> float:
+    if isinstance(profile, SlowEnds):
+        return profile.least
     return min(profile.values, default=profile.value)
 
 

@@ -85,6 +85,11 @@ class PathTask(Task):
         """See :class:`Task`."""
         return self.path.length if self.path.closed else None
 
+    @property
+    def length(self) -> float:
+        """See :class:`Task`."""
+        return self.path.length
+
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""
         if surface_of_path(self._scenario) is None:

@@ -13,6 +13,8 @@ from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.surface import followed_axis, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from pfsc_drake.control.compliance.impedance import Profile
+from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
@@ -47,7 +49,7 @@ class SpaceTask(Task):
     ) -> None:
         self._scenario = scenario
         parameters = scenario.fixtures or FixtureParameters()
-        _require_admittance(scenario)
+        free_motion(scenario)  # refuses what a hand could not move
         said = parameters.orientation
         self.place = SpaceManifold(
             RELATIVE_DEGREE[scenario.controller.law],
@@ -137,17 +139,22 @@ class SpaceTask(Task):
         """See :class:`Task`; all of space is there."""
 
 
-def _require_admittance(scenario: Scenario) -> None:
-    """Refuse a tool that a hand could not move.
+def free_motion(scenario: Scenario) -> Admittance:
+    """Return the motion of a tool that is led through space.
+
+    Args:
+        scenario: The scenario.
 
     Raises:
-        InputError: If so.
+        InputError: If a hand could not move it.
     """
     along = scenario.compliance.tangential
-    free = not along.stiffness.at and along.stiffness.value == 0.0
-    constant = not (along.mass.at or along.damping.at) and along.damping.value > 0.0
-    if not (free and constant):
+    mass, damping, stiffness = along.mass, along.damping, along.stiffness
+    free = not stiffness.at and stiffness.value == 0.0
+    constant = isinstance(damping, Profile) and not (mass.at or damping.at)
+    if not (free and constant and isinstance(damping, Profile) and damping.value > 0.0):
         raise InputError(
             "compliance.tangential: controller.manifold = space needs a constant mass, a constant "
             "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
         )
+    return Admittance(mass.value, damping.value, scenario.controller.sampling_time)

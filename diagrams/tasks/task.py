@@ -67,6 +67,11 @@ class Task(ABC):
         """Length of the manifold [m] if it is closed in its only direction."""
         return None
 
+    @property
+    def length(self) -> float:
+        """Length of the manifold [m] if it is a path; else 0."""
+        return 0.0
+
     @abstractmethod
     def require_joints(self, num_joints: int) -> None:
         """Refuse a robot that cannot follow, or would lose its orientation by oversight.

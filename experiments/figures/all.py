@@ -11,6 +11,7 @@ from experiments.figures.coordinates import (
     draw_progress,
     draw_transversal,
 )
+from experiments.figures.damping import draw_damping, has_varying_damping
 from experiments.figures.drives import (
     draw_deflection,
     draw_efforts,
@@ -27,6 +28,7 @@ from experiments.figures.guidance import (
     has_contact,
     has_regions,
 )
+from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.figures.notch import draw_notch_position
 from experiments.figures.path import draw_path
 from experiments.figures.polish import draw_force_map, draw_pressing
@@ -97,11 +99,15 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (has_regions, draw_guidance),
     (has_contact, draw_contact),
     (gives_energy, draw_energy),
+    (_has("seat_gap", "manifold_force", "damping"), draw_use_case),
+    (_has("seat_gap"), draw_mounting),
+    (_has("eta"), draw_progress),
     (_has("xi"), draw_transversal),
     (_has("phi"), draw_orientation),
     (_has("angles_e", "angles_d"), draw_angles),
     (_has("axis_e", "axis_d"), draw_axis),
     (has_forces, draw_forces),
+    (has_varying_damping, draw_damping),
     (_has("notch_position"), draw_notch_position),
     (_has("normal_force", "xi"), draw_pressing),
     (_has("normal_force", "eta"), draw_force_map),

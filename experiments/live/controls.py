@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance
+from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS
 from pfsc_drake.control.manifolds.manifold import Kind
 
@@ -107,7 +107,7 @@ def _of_kind(
             high if rigid else value,
         )
         found.append(TunedParameter(index, slider, top_is_rigid=rigid))
-    if not given.damping.at:
+    if isinstance(given.damping, Profile) and not given.damping.at:
         value = soft_damping if rigid or given.damping.value == 0.0 else given.damping.value
         high = _round_up(_RANGE * value)
         name = f"{_WORDS[kind]} d [{per[1]}]"

@@ -49,6 +49,7 @@ def collect_motion(
         log["wrench_ext"].values[frames, :3] if "wrench_ext" in log else None,
         _lifted(station, log["y_t"].values[frames], points),
         region_times(log, station)[frames] if "region_clock" in log else None,
+        log["plate_pose"].values[frames] if "plate_pose" in log else None,
     )
 
 

@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context
 from diagrams.station import Station
 from experiments.results.guidance_signals import add_guidance
 from experiments.results.link_signals import add_link_signals
+from experiments.results.mounting_signals import PLATE_SIGNALS, add_mounting_signals
 from experiments.results.orientation_signals import add_orientation
 from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.press_signals import add_pressing, is_pressed
@@ -67,6 +68,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     _add_forces(log, station, raw)
     add_pressing(log, station, raw, points)
     add_guidance(log, station, raw, pose[:, :3])
+    add_mounting_signals(log, station, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
     for name, length in station.further_lengths(pose[:, :3]).items():
@@ -83,6 +85,8 @@ def optional_signals(station: Station) -> set[str]:
     names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
     if is_pressed(station):
         names.add("normal_force")
+    if station.mounting is not None:
+        names |= PLATE_SIGNALS
     if "desired_reference" in names:
         names.add("xi_d")
     if "friction_torque" in names:
@@ -215,6 +219,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         "wrench_measured": ("N, Nm", wrench),
         "wrench_observed": ("N, Nm", wrench),
         "manifold_force": ("N, Nm", manifold),
+        "damping": ("N s/m, Nm s/rad", [name.replace("tau", "d", 1) for name in manifold]),
         "tared": ("1", None),
         "sensor_fault": ("1", None),
     }

@@ -1,0 +1,153 @@
+"""What takes part in mounting plates beside the robot: plates, gripper and operator."""
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from diagrams.scenario import Scenario
+from diagrams.scenario.plate import PlateParameters
+from diagrams.surroundings.hand import connect_hand
+from diagrams.surroundings.mounting import Mounting, tool_transform
+from diagrams.surroundings.plate_plant import add_plate_plant
+from diagrams.tasks.task import StartPoint, Task
+from pfsc_drake.physics.hand_model import HandParameters, Place
+from pfsc_drake.physics.suction import holding_cups
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.control.payload_compensation import PayloadCompensation
+from pfsc_drake.systems.physics.mounting_operator import MountingOperator
+from pfsc_drake.systems.physics.suction_gripper import SuctionGripper
+from pfsc_drake.systems.physics.tool_motion import ToolMotion
+
+
+def add_mounting(
+    builder: DiagramBuilder,
+    mounting: Mounting,
+    robot: RobotModel,
+    task: Task,
+    scenario: Scenario,
+    start: StartPoint,
+    joint_state: OutputPort,
+) -> tuple[list[OutputPort], dict[str, OutputPort]]:
+    """Add plates, gripper and operator.
+
+    Args:
+        builder: Builder of the diagram.
+        mounting: Where the plates come from and go.
+        robot: The robot, as it is.
+        task: What it is to do.
+        scenario: The scenario.
+        start: Where its tool starts.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        Wrenches on the tool point, world axes, each (6,) [N, Nm], and signals for the log:
+        ``plate_state``, ``plate_contact``, ``held``, ``gripper_wrench``, with an operator
+        ``hand_wrench`` and ``phase``.
+
+    Raises:
+        InputError: If the operator's hand does not suit the task.
+    """
+    plate, period = mounting.parameters, scenario.controller.sampling_time
+    places, gravity = mounting.plates(start), np.array(scenario.robot.gravity)
+    world = add_plate_plant(builder, plate, mounting.X_WM, mounting.X_WF, places, gravity)
+    motion = builder.AddNamedSystem("tool_motion", ToolMotion(robot))
+    builder.Connect(joint_state, motion.GetInputPort("joint_state"))
+    held = None
+    if plate.start != "magazine":
+        X_PT = places[0].inverse() @ tool_transform(start)
+        # one that lies in the frame bears its weight itself
+        weight = plate.mass * gravity * (plate.start == "held")
+        load = places[0].rotation().matrix().T @ weight
+        held = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
+    half_size = np.array(plate.size[:2]) / 2.0
+    gripper = builder.AddNamedSystem(
+        "gripper", SuctionGripper(plate.suction, half_size, world.bodies, period, held)
+    )
+    state = world.plant.get_state_output_port()
+    builder.Connect(motion.GetOutputPort("tool_motion"), gripper.GetInputPort("tool_motion"))
+    builder.Connect(state, gripper.GetInputPort("plate_state"))
+    builder.Connect(
+        gripper.GetOutputPort("applied_spatial_force"),
+        world.plant.get_applied_spatial_force_input_port(),
+    )
+    signals = {
+        "plate_state": state,
+        "plate_contact": world.contact.GetOutputPort("forces"),
+        "held": gripper.GetOutputPort("held"),
+        "gripper_wrench": gripper.GetOutputPort("wrench"),
+    }
+    wrenches = [gripper.GetOutputPort("wrench")]
+    if plate.operator is None:
+        builder.Connect(_scheduled_vacuum(builder, plate), gripper.GetInputPort("vacuum"))
+        return wrenches, signals
+    operator = _add_operator(builder, mounting, robot, task, scenario, joint_state)
+    builder.Connect(gripper.GetOutputPort("held"), operator.GetInputPort("held"))
+    builder.Connect(operator.GetOutputPort("vacuum"), gripper.GetInputPort("vacuum"))
+    signals["hand_wrench"] = operator.GetOutputPort("wrench")
+    signals["phase"] = operator.GetOutputPort("phase")
+    return [*wrenches, operator.GetOutputPort("wrench")], signals
+
+
+def _scheduled_vacuum(builder: DiagramBuilder, plate: PlateParameters) -> OutputPort:
+    """Return a vacuum that ends at a time."""
+    if np.isinf(plate.release):
+        always = builder.AddNamedSystem("vacuum", ConstantVectorSource([1.0]))
+        return always.get_output_port()
+    times = plate.release * np.arange(3.0)
+    ending = PiecewisePolynomial.ZeroOrderHold(times, np.array([[1.0, 0.0, 0.0]]))
+    return builder.AddNamedSystem("vacuum", TrajectorySource(ending)).get_output_port()
+
+
+def _add_operator(
+    builder: DiagramBuilder,
+    mounting: Mounting,
+    robot: RobotModel,
+    task: Task,
+    scenario: Scenario,
+    joint_state: OutputPort,
+) -> MountingOperator:
+    operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
+    goal = mounting.X_WF.translation(), mounting.X_WF.rotation().matrix()
+
+    def make(hand: HandParameters, period: float, place: Place) -> MountingOperator:
+        assert operator is not None
+        return MountingOperator(hand, operator, goal, pin_length, period, place)
+
+    return connect_hand(builder, robot, task, scenario, joint_state, make)
+
+
+def add_payload(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    mounting: Mounting,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Take the plate's weight off what the force/torque sensor measures while it is held.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        mounting: Its plates.
+        ports: ``wrench_measured``, ``tared``, ``tool_pose`` as measured, and ``held``.
+
+    Returns:
+        ``wrench_measured`` without the payload.
+    """
+    plate = mounting.parameters
+    center = np.array([0.0, 0.0, plate.size[2] / 2.0])
+    system = builder.AddNamedSystem(
+        "payload_compensation",
+        PayloadCompensation(
+            plate.believed_mass,
+            center,
+            np.array(scenario.robot.gravity),
+            scenario.controller.sampling_time,
+        ),
+    )
+    inputs = {
+        "wrench": "wrench_measured", "tool_pose": "tool_pose", "held": "held", "tared": "tared",
+    }  # fmt: skip
+    for name, signal in inputs.items():
+        builder.Connect(ports[signal], system.GetInputPort(name))
+    return {"wrench_measured": system.GetOutputPort("payload_free")}

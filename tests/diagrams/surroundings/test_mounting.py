@@ -1,0 +1,165 @@
+"""Where plates, magazine and frame are, what is refused, and how they take part."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from diagrams.builder import build_station
+from diagrams.scenario import Scenario
+from diagrams.scenario.plate import CarrierParameters, PlateParameters, RandomMisplacement
+from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.catalog.scenario_file import load_scenario_data
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import quaternion_to_matrix
+from pfsc_drake.yaml.typed import load_typed
+
+SHIFT, TURN = np.array([9.0e-4, -6.3e-4, 0.0]), np.array([7.0e-3, -5.0e-3, 9.8e-3])
+EXACT = ("encoders={}", "model_error={}", "friction={}")
+
+
+def load(*changes, name="plate_mounting"):
+    file = SCENARIO_DIRECTORY / f"{name}.yaml"
+    return load_typed(Scenario, load_scenario_data(file, list(changes)), str(file))
+
+
+def build(*changes, name="plate_mounting"):
+    return build_station(load(*EXACT, *changes, name=name), SCENARIO_DIRECTORY)
+
+
+@pytest.fixture(name="station", scope="module")
+def fixture_station():
+    return build()
+
+
+def taught(station, eta):
+    """Return tool point and orientation at an arc length."""
+    path = station.path
+    evaluator = path.evaluator(1)
+    point = evaluator.evaluate_at(path.arc_length.parameter(eta))
+    layout = evaluator.layout
+    return point[layout.position][:3], quaternion_to_matrix(point[layout.quaternion][:4])
+
+
+def test_the_frame_stands_beside_where_it_was_taught(station):
+    plate = station.mounting.parameters
+    p, R = taught(station, plate.frame.at)
+    X_WF = station.mounting.X_WF
+    np.testing.assert_allclose(X_WF.translation() - p, R @ SHIFT, atol=1e-12)
+    turned = R.T @ X_WF.rotation().matrix()
+    np.testing.assert_allclose(Rotation.from_matrix(turned).as_rotvec(), TURN, atol=1e-12)
+    assert np.linalg.norm(SHIFT) == pytest.approx(1.1e-3, abs=1e-5)
+    assert np.linalg.norm(TURN) == pytest.approx(13e-3, abs=1e-4)
+
+
+def test_the_magazine_stands_where_it_was_taught(station):
+    p, R = taught(station, station.mounting.parameters.magazine.at)
+    np.testing.assert_allclose(station.mounting.X_WM.translation(), p, atol=1e-12)
+    np.testing.assert_allclose(station.mounting.X_WM.rotation().matrix(), R, atol=1e-12)
+
+
+def plate_state(station):
+    system = station.diagram.GetSubsystemByName("plates")
+    root = station.diagram.CreateDefaultContext()
+    station.set_start(root)
+    return system.get_state_output_port().Eval(system.GetMyContextFromRoot(root)), root
+
+
+def held(station, root):
+    gripper = station.diagram.GetSubsystemByName("gripper")
+    return gripper.GetOutputPort("held").Eval(gripper.GetMyContextFromRoot(root))[0]
+
+
+def test_a_plate_lies_in_the_magazine_at_the_start(station):
+    state, root = plate_state(station)
+    np.testing.assert_allclose(state[4:7], station.mounting.X_WM.translation(), atol=1e-12)
+    assert held(station, root) == 0.0
+    gripper = station.diagram.GetSubsystemByName("gripper")
+    wrench = gripper.GetOutputPort("wrench").Eval(gripper.GetMyContextFromRoot(root))
+    assert not wrench.any()
+
+
+def test_a_plate_that_is_held_is_where_the_tool_is():
+    station = build("plate.start=held", "reference.points=[0.5, 0.5]", "start.posture_deg=[]")
+    state, root = plate_state(station)
+    p, _ = taught(station, 0.5)
+    np.testing.assert_allclose(state[4:7], p, atol=1e-9)
+    assert held(station, root) == 1.0
+    gripper = station.diagram.GetSubsystemByName("gripper")
+    wrench = gripper.GetOutputPort("wrench").Eval(gripper.GetMyContextFromRoot(root))
+    weight = [0.0, 0.0, -9.81 * station.mounting.parameters.mass]
+    np.testing.assert_allclose(wrench, [*weight, 0, 0, 0], atol=1e-3)  # 1e4 N/m and 1e-8 m
+
+
+def test_the_way_back_starts_where_the_frame_stands():
+    station = build(name="plate_return")
+    state, root = plate_state(station)
+    assert len(state) == 26
+    np.testing.assert_allclose(state[4:7], station.mounting.X_WF.translation(), atol=1e-12)
+    np.testing.assert_allclose(state[11:14], station.mounting.X_WM.translation(), atol=1e-12)
+    assert held(station, root) == 1.0
+    view = station.diagram.GetSubsystemByName("tool_motion")
+    motion = view.GetOutputPort("tool_motion").Eval(view.GetMyContextFromRoot(root))
+    np.testing.assert_allclose(motion[:3], station.mounting.X_WF.translation(), atol=1e-7)
+    R = station.mounting.X_WF.rotation().matrix()
+    np.testing.assert_allclose(motion[3:12].reshape(3, 3), R, atol=1e-7)
+
+
+def test_random_misplacements_fill_two_balls():
+    draws = [RandomMisplacement(seed, 1.5e-3, 0.015).draw() for seed in range(300)]
+    for column, radius in ((0, 1.5e-3), (1, 0.015)):
+        vectors = np.array([draw[column] for draw in draws])
+        sizes = np.linalg.norm(vectors, axis=1)
+        assert sizes.max() <= radius
+        assert np.mean(sizes**3) == pytest.approx(radius**3 / 2.0, rel=0.1)  # uniform in volume
+        assert np.abs(vectors.mean(axis=0)).max() < 0.1 * radius
+    frame = CarrierParameters(shift=[1e-3, 0.0, 0.0], random=RandomMisplacement(3, 1e-3, 0.01))
+    np.testing.assert_allclose(frame.misplacement()[0] - [1e-3, 0, 0], frame.random.draw()[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ("plate.frame.clearance=0", "clearance = 0.0; allowed: a positive number"),
+        ("plate.frame.clearance=-1.0e-4", "clearance = -0.0001; allowed: a positive number"),
+        ("plate.frame.size=[0.2, 0.2]", "bores at least frame.ring = 0.016 m inside of frame.size"),
+        ("plate.frame.wedges=4", "wedges = 4; allowed: 8 to 64"),
+        ("plate.frame.ring=4.0e-3", "frame.ring = 0.004; allowed: more than the radius of a bore"),
+        ("plate.frame.shift=[0.1, 0, 0]", "shift = [0.1, 0.0, 0.0]; allowed: a vector of at most"),
+        ("plate.frame.turn=[0, 0.3, 0]", "allowed: a vector of at most 0.2 rad"),
+        ("plate.frame.at=1.2", "plate.frame.at = 1.2; allowed: 0 to 1.08103 m"),
+        ("plate.magazine.at=-0.1", "at = -0.1; allowed: zero or a positive number"),
+        ("plate.frame.random.shift=0.1", "shift = 0.1"),
+        ("plate.pins.positions=[[0.1, 0.06], [0.2, 0.06]]", "a place on the plate"),
+        ("plate.pins.positions=[[0.1, 0.06], [0.08, 0.06]]", "apart"),
+        ("plate.pins.length=3.0e-3", "length = 0.003; allowed: more than the radius"),
+        ("plate.rests=[[0.1, 0.06], [0.1, -0.06], [-0.1, 0]]", "from every pin"),
+        ("plate.start=table", "start = table; allowed: magazine, held, frame"),
+        ("plate.start=frame", "plate.start = frame; allowed: frame where"),
+        ("plate.mass=0", "mass = 0.0; allowed: a positive number"),
+        ("plate.contact.time_step=7.0e-4", "plate.contact.time_step = 0.0007 s; must be a whole"),
+        ("plate.suction.cups=[[0, 0]]", "three or more [x, y] in m"),
+        ("plate.operator.task=mend", "task = mend; allowed: mount or return"),
+        ("hand=null", "hand = null; allowed: given for plate.operator"),
+        ("plate.magazine.shift=[0, 0, -6.0e-3]", "a cup starts 2 mm inside of the plate"),
+        ("notch={}", "notch = given; allowed: null where there is a plate"),
+        ("path.orientation.task=none", "plate = given: allowed: null unless"),
+        ("compliance.tangential.damping=!SlowEnds {least: 9, most: 3}", "most = 3.0; allowed: 9"),
+    ],
+)
+def test_wrong_plates_are_refused(change, part):
+    with pytest.raises(InputError) as refusal:
+        build(change)
+    assert part in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_start_with_a_pin_in_the_frame_is_refused():
+    changes = ("plate.start=held", "reference.points=[1.07, 1.07]", "start.posture_deg=[]")
+    with pytest.raises(InputError, match=r"starts \d.* mm deep in the frame"):
+        build(*changes)
+    # within the clearance of its bores a plate may start
+    build(*changes, "plate.frame.shift=[0, 0, 0]", "plate.frame.turn=[0, 0, 0]")
+
+
+def test_defaults_are_a_plate_that_fits():
+    PlateParameters()
