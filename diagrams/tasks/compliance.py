@@ -5,7 +5,7 @@ import math
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import ComplianceParameters, Scenario
 from pfsc_drake.control.compliance.impedance import (
     MASS,
     STIFFNESS,
@@ -26,6 +26,19 @@ from pfsc_drake.systems.control.pressing import Pressing
 _DESIRED_ORDER = 4
 
 
+def has_impedance(scenario: Scenario) -> bool:
+    """Return whether the reference of the law is one that an impedance lets yield.
+
+    In space a tool is led along by guidance, so that only the angles need an impedance.
+
+    Args:
+        scenario: The scenario.
+    """
+    if scenario.controller.manifold != SpaceManifold.name:
+        return scenario.compliance.is_given
+    return ComplianceParameters(rotational=scenario.compliance.rotational).is_given
+
+
 def reference_order(scenario: Scenario, linearization: Linearization) -> int:
     """Return the highest derivative of the external reference that is needed.
 
@@ -36,7 +49,7 @@ def reference_order(scenario: Scenario, linearization: Linearization) -> int:
     Raises:
         InputError: If there is compliance that the law cannot have.
     """
-    if not scenario.compliance.is_given:
+    if not has_impedance(scenario):
         return linearization.relative_degree
     if linearization.manifold.follows_time:
         raise InputError(

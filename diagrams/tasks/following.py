@@ -8,7 +8,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 from diagrams.safety import supervision
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.tasks.compliance import add_compliance, reference_order
+from diagrams.tasks.compliance import add_compliance, has_impedance, reference_order
 from diagrams.tasks.external_torque import add_external_torque
 from diagrams.tasks.friction import Coefficients, add_friction_compensation
 from diagrams.tasks.guidance import add_guidance
@@ -178,7 +178,7 @@ def add_law(
         made |= {name: guidance.GetOutputPort(port) for name, port in _GUIDANCE.items()}
     desired = _add_smooth_start(builder, following, controller, desired)
     made = {"reference": desired} | made
-    if scenario.compliance.is_given:
+    if has_impedance(scenario):
         inputs = signals | {
             "desired_reference": desired,
             "manifold_state": controller.GetOutputPort("manifold_state"),

@@ -1,0 +1,92 @@
+"""Time of one tick of guidance within ten regions, alone and as a whole chain in the robot's loop.
+
+The chain is everything between the measured joint state and the reference of the velocity servos.
+Run with ``pytest tests/benchmarks --benchmark-enable``; otherwise every benchmark runs once.
+"""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from diagrams.builder import build_station
+from diagrams.scenario import Scenario
+from experiments.catalog.scenario_catalog import find_scenario
+from experiments.integration import choose_integration
+from experiments.simulation import configure
+from pfsc_drake.compiled.bound_function import compiled_when_bound
+from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.lead import ServoLead
+from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
+from pfsc_drake.geometry.regions.shapes import HalfSpace, SphereRegion
+from pfsc_drake.yaml.typed import load_file
+
+PERIOD, REGIONS, TICKS = 1e-3, 10, 200
+PULLS = {
+    "free": ((0.3, 0.3, 0.3), (0.0, 0.0, 0.0)),
+    "surface": ((0.3, 0.3, 0.0), (1.0, 0.0, -10.0)),
+    "edge": ((0.0, 0.3, 0.0), (-10.0, 0.5, -10.0)),
+}
+
+
+@pytest.mark.parametrize("place", PULLS)
+def test_rules_alone(benchmark, place):
+    """Time of 200 ticks; those in a table are 200 times as long."""
+    far = np.random.default_rng(0).uniform(-0.5, 0.5, (REGIONS - 2, 3)) + np.array([0, 0, 1.2])
+    regions = [HalfSpace([0, 0, 0], [0, 0, 1]), HalfSpace([0, 0, 0], [1, 0, 0])]
+    regions += [SphereRegion(centre, 0.05, inside=False) for centre in far]
+    parameters = GuidanceParameters()
+    guidance = ProgramGuidance(
+        parameters,
+        Admittance(3.0, 90.0, PERIOD),
+        ServoLead(5e-3, 2e-3, PERIOD),
+        ScheduledRegions(regions, parameters, PERIOD),
+        [math.inf] * REGIONS,
+    )
+    y, force = PULLS[place]
+    state = [guidance.start(y), list(y)]
+
+    def ticks():
+        memory, y = state
+        for _ in range(TICKS):
+            step = guidance.step(memory, y, (0.0, 0.0, 0.0), force)
+            memory = step.memory
+            y = [a + PERIOD * b for a, b in zip(y, step.velocity, strict=True)]
+        state[:] = memory, y
+
+    benchmark.pedantic(ticks, rounds=20, warmup_rounds=2)
+
+
+def test_whole_chain(benchmark):
+    """A hand presses the tool on the cylinder of `vf_forbidden_region`, six balls around it."""
+    file = find_scenario("vf_forbidden_region")
+    scenario = load_file(Scenario, file)
+    balls = load_file(Scenario, find_scenario("vf_many_surfaces")).fixtures.regions[3:]
+    start = np.array(scenario.start.position)
+    clear = [b for b in balls if np.linalg.norm(start - b.shape.origin) > b.shape.radius + 0.05]
+    scenario.fixtures.regions += clear[: REGIONS - len(scenario.fixtures.regions)]
+    scenario.hand.waypoints = scenario.hand.waypoints[:1]
+    scenario.hand.waypoints[0].position = start + np.array([0.03, 0.0, 0.0])
+    with compiled_when_bound():
+        station = build_station(scenario, file.parent)
+    simulator = Simulator(station.diagram)
+    integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
+    configure(simulator, integration.scheme, integration.step)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.AdvanceTo(1.5)
+    assert station.mode_name(int(station.log.now(root)["mode"][0])) == "surface"
+    controller = station.controller.GetMyContextFromRoot(root)
+    drive = station.controller.GetOutputPort(station.controller.drive_port)
+    plant = station.part.plant
+    context = plant.GetMyMutableContextFromRoot(root)
+    state = plant.GetPositionsAndVelocities(context)
+    nudges = itertools.cycle([0.0, 1e-9])
+
+    def change():
+        plant.SetPositionsAndVelocities(context, state + next(nudges))
+
+    benchmark.pedantic(lambda: drive.Eval(controller), setup=change, rounds=500, warmup_rounds=20)
