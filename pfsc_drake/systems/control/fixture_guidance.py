@@ -11,8 +11,9 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.fixtures.guidance import GuidanceStep
 from pfsc_drake.control.fixtures.labels import Mode
-from pfsc_drake.control.fixtures.lead import Lead, Vector
+from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.fixtures.vectors import Vector
 from pfsc_drake.robot.robot_model import RobotModel, tool_velocity_function
 
 _STILL = (0.0, 0.0, 0.0)
