@@ -101,7 +101,6 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (gives_energy, draw_energy),
     (_has("seat_gap", "manifold_force", "damping"), draw_use_case),
     (_has("seat_gap"), draw_mounting),
-    (_has("eta"), draw_progress),
     (_has("xi"), draw_transversal),
     (_has("phi"), draw_orientation),
     (_has("angles_e", "angles_d"), draw_angles),
