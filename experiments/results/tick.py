@@ -25,7 +25,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
         Wall clock time of each evaluation [s].
     """
     drive = station.controller.GetOutputPort(station.controller.drive_port)
-    sensor = _sensor(station, root)
+    sensor, rest = _sensor(station, root), _guidance(station, root)
     controller = station.controller.GetMyMutableContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
@@ -42,6 +42,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
         root.SetTime(log.time[k])
         station.projector.set_place(projector, places[k - 1])
         station.place_robot(root, x)
+        rest(log["y_t"].values[k - 1])
         # the controller compares what it measures with what it measured before
         station.controller.set_last_state(controller, states[k - 1])
         sensor()  # what the plant needs to know its forces is not the controller's time
@@ -59,3 +60,13 @@ def _sensor(station: Station, root: Context) -> Callable[[], object]:
     sensor = station.diagram.GetSubsystemByName(name)
     load, context = sensor.GetOutputPort("load"), sensor.GetMyContextFromRoot(root)
     return lambda: load.Eval(context)
+
+
+def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:
+    """Return what lets guidance, if there is any, have been at a place before."""
+    name = "fixture_guidance"
+    if not station.diagram.HasSubsystemNamed(name):
+        return lambda y_t: None
+    guidance = station.diagram.GetSubsystemByName(name)
+    context = guidance.GetMyMutableContextFromRoot(root)
+    return lambda y_t: guidance.set_place(context, y_t)

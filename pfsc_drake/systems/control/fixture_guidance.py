@@ -115,6 +115,16 @@ class FixtureGuidance(LeafSystem):
         """How much later the tool is where the rules see it [s]."""
         return self._guidance.lead.lag
 
+    def set_place(self, context: Context, y_t: np.ndarray) -> None:
+        """Let the tool have rested at a place until now.
+
+        Args:
+            context: The system's own.
+            y_t: Tool point [m], shape (3,).
+        """
+        x, y, z = y_t.tolist()
+        context.SetAbstractState(0, self._guidance.start((x, y, z)))
+
     def _tool(self, context: Context) -> list[float]:
         """Return ``[y_t, y_t']`` as measured."""
         state = self._joint_state.Eval(context)
