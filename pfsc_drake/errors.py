@@ -21,3 +21,19 @@ def shortened(text: str, length: int = 60) -> str:
         return text
     tail = (length - 3) // 3
     return f"{text[: length - 3 - tail]}...{text[len(text) - tail :]}"
+
+
+def require(condition: bool, key: str, value: object, allowed: str) -> None:
+    """Refuse a value.
+
+    Args:
+        condition: Whether the value is allowed.
+        key: Its key.
+        value: The value.
+        allowed: What is allowed, for people.
+
+    Raises:
+        InputError: If it is not.
+    """
+    if not condition:
+        raise InputError(f"{key} = {value}; allowed: {allowed}")

@@ -5,25 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.errors import require as require
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns
 _ROUNDING = 1e-6
-
-
-def require(condition: bool, key: str, value: object, allowed: str) -> None:
-    """Refuse a value.
-
-    Args:
-        condition: Whether the value is allowed.
-        key: Its key.
-        value: The value.
-        allowed: What is allowed, for people.
-
-    Raises:
-        InputError: If it is not.
-    """
-    if not condition:
-        raise InputError(f"{key} = {value}; allowed: {allowed}")
 
 
 def require_positive(key: str, value: float) -> None:

@@ -77,8 +77,9 @@ def region_names(scenario: Scenario) -> list[str]:
     Args:
         scenario: The scenario.
     """
-    led = scenario.controller.manifold == "space" and scenario.fixtures is not None
-    return scenario.fixtures.names if led and scenario.fixtures else []
+    if scenario.controller.manifold != "space" or scenario.fixtures is None:
+        return []
+    return scenario.fixtures.names
 
 
 def idle_controls(regions: Sequence[str]) -> np.ndarray:

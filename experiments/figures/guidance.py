@@ -6,6 +6,7 @@ from matplotlib.axes import Axes
 from experiments.figures.forces import shade_pushes
 from experiments.results.guidance_signals import slots_of
 from experiments.results.run_log import FloatArray, RunLog
+from pfsc_drake.control.fixtures.record import SLOT
 from reporting.style import (
     COLOURS,
     INK,
@@ -137,7 +138,7 @@ def gives_energy(log: RunLog) -> bool:
 
 
 def _moves(slots: FloatArray) -> bool:
-    u = slots.reshape(len(slots), -1, 10)[..., 5]
+    u = slots.reshape(len(slots), -1, len(SLOT))[..., SLOT.index("u")]
     return bool(np.any(u != 0.0))
 
 

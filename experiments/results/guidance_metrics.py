@@ -22,12 +22,11 @@ def guidance_metrics(log: RunLog) -> Metrics:
     if "phi" in log:  # a tool that a hand turns is where it is asked to be, not at zero
         error = np.linalg.norm(log["phi"].values - log["phi_p"].values, axis=1)
         metrics.add("max_orientation_error", float(np.nanmax(error)), "rad")
-    hard = np.setdiff1d(np.arange(log["region_distance"].values.shape[1]), soft_regions(log))
-    distance = log["region_distance"].values
+    distance, soft = log["region_distance"].values, soft_regions(log)
+    hard = np.setdiff1d(np.arange(distance.shape[1]), soft)
     if hard.size:
         deepest = max(0.0, float(-np.nanmin(distance[:, hard])))
         metrics.add("deepest_violation", deepest, "m")
-    soft = soft_regions(log)
     if soft.size:
         metrics.add("deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft]))), "m")
     command = log["velocity_command"].values

@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import FRAMES, smooth_step
+from pfsc_drake.physics.hand_checks import require
 from pfsc_drake.physics.hand_orientation import OrientationTarget, leg_at, rotation_vectors
 from pfsc_drake.physics.wandering import Wander
 
@@ -98,22 +99,22 @@ class HandParameters:
     def __post_init__(self) -> None:
         for key in ("stiffness", "force_limit", "torque_limit", "grip_ramp"):
             value, allowed = getattr(self, key), f"positive, at most {_LARGEST:g}"
-            _require(0.0 < value <= _LARGEST, key, value, allowed)
+            require(0.0 < value <= _LARGEST, key, value, allowed)
         weak = ("damping", "rotational_stiffness", "rotational_damping", "reaction_delay", "tremor")
         for key in weak:
             value, allowed = getattr(self, key), f"zero or positive, at most {_LARGEST:g}"
-            _require(0.0 <= value <= _LARGEST, key, value, allowed)
-        _require(self.seed >= 0, "seed", self.seed, "zero or positive")
-        _require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
+            require(0.0 <= value <= _LARGEST, key, value, allowed)
+        require(self.seed >= 0, "seed", self.seed, "zero or positive")
+        require(self.frame in FRAMES, "frame", self.frame, f"one of {', '.join(FRAMES)}")
         band = np.asarray(self.tremor_band, dtype=float)
         fits = band.shape == (2,) and bool(0.0 < band[0] < band[1] < np.inf)
-        _require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
+        require(fits, "tremor_band", band.tolist(), "2 positive and ascending frequencies")
         times = self.places()[0]
         ascending = times.size > 0 and bool(
             np.all(np.diff(times) > 0.0) and np.all(np.isfinite(times))
         )
-        _require(ascending, "waypoints", times.tolist(), "one or more with ascending times")
-        _require(self.release > times[0], "release", self.release, f"after {times[0]:g} s")
+        require(ascending, "waypoints", times.tolist(), "one or more with ascending times")
+        require(self.release > times[0], "release", self.release, f"after {times[0]:g} s")
         self._check_turning()
 
     def _check_turning(self) -> None:
@@ -121,9 +122,9 @@ class HandParameters:
         turns, allowed = self.rotational_stiffness > 0.0, "0, or zyx_deg in the first waypoint"
         if turns or any(given):
             first = bool(given) and given[0]
-            _require(first, "rotational_stiffness", self.rotational_stiffness, allowed)
+            require(first, "rotational_stiffness", self.rotational_stiffness, allowed)
             allowed = "positive where waypoints have zyx_deg"
-            _require(turns, "rotational_stiffness", self.rotational_stiffness, allowed)
+            require(turns, "rotational_stiffness", self.rotational_stiffness, allowed)
 
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Return when the target is where, shapes (k,) [s] and (k, 3) [m]."""
@@ -167,7 +168,7 @@ class HandModel:
     def __init__(self, parameters: HandParameters, place: Place | None = None) -> None:
         self._parameters, self._place = parameters, None
         if parameters.frame == "manifold":
-            _require(place is not None, "frame", parameters.frame, "world without a path")
+            require(place is not None, "frame", parameters.frame, "world without a path")
             self._place = place
         self._times, self._positions = parameters.places()
         self._orientation = parameters.orientation()
@@ -270,8 +271,3 @@ def observed_twist(before: np.ndarray, now: np.ndarray, period: float) -> np.nda
 def _limited(vector: np.ndarray, limit: float) -> np.ndarray:
     norm = float(np.linalg.norm(vector))
     return vector if norm <= limit else vector * (limit / norm)
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}: must be {allowed}")

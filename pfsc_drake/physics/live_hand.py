@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_checks import require
 
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
 _SLOWEST = 10.0  # s
@@ -42,14 +42,12 @@ class LiveHandParameters:
     def __post_init__(self) -> None:
         for key in ("stiffness", "force_limit", "torque_limit"):
             value = getattr(self, key)
-            _require(0.0 < value <= _LARGEST, key, value, f"positive, at most {_LARGEST:g}")
+            require(0.0 < value <= _LARGEST, key, value, f"positive, at most {_LARGEST:g}")
         for key in ("damping", "rotational_damping"):
             value = getattr(self, key)
-            _require(
-                0.0 <= value <= _LARGEST, key, value, f"zero or positive, at most {_LARGEST:g}"
-            )
+            require(0.0 <= value <= _LARGEST, key, value, f"zero or positive, at most {_LARGEST:g}")
         time = self.response_time
-        _require(0.0 < time <= _SLOWEST, "response_time", time, f"positive, at most {_SLOWEST:g} s")
+        require(0.0 < time <= _SLOWEST, "response_time", time, f"positive, at most {_SLOWEST:g} s")
 
 
 class LiveHandModel:
@@ -125,8 +123,3 @@ def _hand_function(hand: LiveHandParameters, period: float) -> ca.Function:
 def _limited(vector: ca.SX, limit: float) -> ca.SX:
     size = ca.norm_2(vector)
     return ca.if_else(size > limit, vector * (limit / size), vector)
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}: must be {allowed}")

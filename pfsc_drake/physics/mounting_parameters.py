@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import require
 
 TASKS = ("mount", "return")
 
@@ -74,23 +74,18 @@ class MountingHandParameters:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        _require(self.task in TASKS, "task", self.task, " or ".join(TASKS))
+        require(self.task in TASKS, "task", self.task, " or ".join(TASKS))
         for key in (
             "press", "reach", "insert", "leave", "leave_distance", "hover", "eye_gap", "side_limit",
             "turning_limit", "search_time", "search_period", "captured", "relaxation",
             "patience", "look_time",
         ):  # fmt: skip
             value = getattr(self, key)
-            _require(0.0 < value < np.inf, key, value, "a positive number")
+            require(0.0 < value < np.inf, key, value, "a positive number")
         for key in (
             "eye_error", "eye_angle", "stiffness", "persistence", "turning_stiffness",
             "turning_persistence", "search_radius", "wobble",
         ):  # fmt: skip
             value = getattr(self, key)
-            _require(0.0 <= value < np.inf, key, value, "zero or a positive number")
-        _require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}; allowed: {allowed}")
+            require(0.0 <= value < np.inf, key, value, "zero or a positive number")
+        require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")

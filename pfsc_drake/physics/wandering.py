@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.physics.hand_checks import require
 
 
 @dataclass
@@ -31,13 +31,13 @@ class Wander:
         self.low, self.high = (np.asarray(x, dtype=float) for x in (self.low, self.high))
         corners = [self.low.tolist(), self.high.tolist()]
         box = self.low.shape == self.high.shape == (3,) and bool(np.all(self.low <= self.high))
-        _require(box, "low, high", corners, "3 numbers each, none of low above that of high")
+        require(box, "low, high", corners, "3 numbers each, none of low above that of high")
         times = [self.begin, self.end]
         later = bool(np.isfinite(times).all()) and self.begin < self.end
-        _require(later, "begin, end", times, "finite numbers, the end after the begin")
+        require(later, "begin, end", times, "finite numbers, the end after the begin")
         between = [self.shortest, self.longest]
         positive = 0.01 <= self.shortest <= self.longest < np.inf
-        _require(positive, "shortest, longest", between, "0.01 s or more, the longest the longer")
+        require(positive, "shortest, longest", between, "0.01 s or more, the longest the longer")
 
     def places(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Return times [s], shape (k,), ascending, and places [m], shape (k, 3).
@@ -50,8 +50,3 @@ class Wander:
         times = self.begin + np.cumsum(random.uniform(self.shortest, self.longest, count))
         times = np.concatenate([[self.begin], times[times < self.end]])
         return times, random.uniform(self.low, self.high, (len(times), 3))
-
-
-def _require(condition: bool, key: str, value: object, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}: must be {allowed}")

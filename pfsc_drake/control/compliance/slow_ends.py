@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, require
 
 
 @dataclass
@@ -36,11 +36,11 @@ class SlowEnds:
 
     def __post_init__(self) -> None:
         for key in ("start_rate", "end_rate"):
-            _require(0.0 < getattr(self, key) < math.inf, key, getattr(self, key), "positive")
+            require(0.0 < getattr(self, key) < math.inf, key, getattr(self, key), "positive")
         for key in ("least", "length"):
             good = 0.0 <= getattr(self, key) < math.inf
-            _require(good, key, getattr(self, key), "zero or positive")
-        _require(self.least <= self.most < math.inf, "most", self.most, f"{self.least:g} or more")
+            require(good, key, getattr(self, key), "zero or positive")
+        require(self.least <= self.most < math.inf, "most", self.most, f"{self.least:g} or more")
 
     @property
     def over(self) -> str:
@@ -73,8 +73,3 @@ class SlowEnds:
             return least + span * (slow + math.tanh(end_rate * (eta - length)))
 
         return value
-
-
-def _require(condition: bool, key: str, value: float, allowed: str) -> None:
-    if not condition:
-        raise InputError(f"{key} = {value}; allowed: {allowed}")
