@@ -107,7 +107,10 @@ class SpaceManifold:
         tool_axis: np.ndarray | None = None,
     ) -> None:
         self.layout = SpacePointLayout(order, quaternion is not None)
-        self._quaternion = np.zeros(0) if quaternion is None else np.array(quaternion, dtype=float)
+        self._point = np.zeros(self.layout.size)
+        self._point[self.layout.status] = ProjectionStatus.OK
+        if quaternion is not None:
+            self._point[self.layout.quaternion] = quaternion
         tool = ToolOrientation(self.is_oriented, tool_axis, self.name)
         self.alignment, self.tool_axis = tool.alignment, tool.tool_axis
         self.coordinates = (*_TRANSLATIONAL, *tool.coordinates)
@@ -119,7 +122,9 @@ class SpaceManifold:
 
     def point(self, y_t: Sequence[float]) -> np.ndarray:
         """Return the manifold's point at a tool point [m], shape (layout.size,)."""
-        return np.array([*y_t, 0.0, float(ProjectionStatus.OK), *self._quaternion])
+        point = self._point.copy()
+        point[:3] = y_t
+        return point
 
     def orientation(self, points: np.ndarray) -> np.ndarray:
         """Return the orientation to keep, shape (samples, 3, 3)."""

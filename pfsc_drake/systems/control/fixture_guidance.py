@@ -96,9 +96,11 @@ class FixtureGuidance(LeafSystem):
         self._step = self.DeclareAbstractOutputPort(
             "step", lambda: Value(None), self._calc_step, prerequisites_of_calc=sources
         )
-        size = (order + 1) * num_outputs
+        # written at every evaluation
+        self._reference = np.zeros((order + 1) * num_outputs)
+        self._of_tool = self._reference.reshape(order + 1, num_outputs)[:, :3]
         self.DeclareVectorOutputPort(
-            "reference", size, self._calc_reference, prerequisites_of_calc=sources
+            "reference", self._reference.size, self._calc_reference, prerequisites_of_calc=sources
         )
         self.DeclareVectorOutputPort(
             "record", layout.size, self._calc_record, prerequisites_of_calc=sources
@@ -149,13 +151,13 @@ class FixtureGuidance(LeafSystem):
 
     def _calc_reference(self, context: Context, output: BasicVector) -> None:
         step, motion = self._step.Eval(context)
-        reference = np.zeros((self._order + 1, self._num_outputs))
-        reference[0, :3] = motion[:3]
+        self._of_tool[:] = 0.0
+        self._of_tool[0] = motion[:3]
         if step is not None:
-            reference[:, :3] = self._guidance.lead.reference(
+            self._of_tool[:] = self._guidance.lead.reference(
                 step.lead, motion[:3], step.velocity, self._order
             )
-        output.SetFromVector(reference.ravel())
+        output.SetFromVector(self._reference)
 
     def _calc_mode(self, context: Context, output: BasicVector) -> None:
         step, _ = self._step.Eval(context)

@@ -73,11 +73,10 @@ class JointEncoders(LeafSystem):
             raise InputError(
                 f"encoders: filter_time = {options.filter_time!r} s; must be finite, not negative"
             )
-        self._resolution = np.zeros(4 * n)
-        self._resolution.reshape(4, n)[[0, 2]] = encoder_resolution(robot, options)
-        self._quantized = self._resolution > 0.0
-        rows = np.arange(4 * n).reshape(4, n)
-        self._positions, self._velocities = rows[[0, 2]].ravel(), rows[[1, 3]].ravel()
+        resolution = np.zeros((2, 2, n))
+        resolution[:, 0] = encoder_resolution(robot, options)
+        self._counted = np.flatnonzero(resolution)
+        self._resolution, self._shape = resolution.ravel()[self._counted], resolution.shape
         time_constant = options.filter_time
         self._weight = 1.0 - np.exp(-period / time_constant) if time_constant else 1.0
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
@@ -94,20 +93,20 @@ class JointEncoders(LeafSystem):
 
     def _quantize(self, state: np.ndarray) -> np.ndarray:
         measured = state.copy()
-        r = self._resolution[self._quantized]
-        measured[self._quantized] = r * np.round(state[self._quantized] / r)
+        r = self._resolution
+        measured[self._counted] = r * np.rint(state[self._counted] / r)
         return measured
 
     def _calc_measured(self, context: Context, output: BasicVector) -> None:
         measured = self._quantize(self._joint_state.Eval(context))
         if self._has_memory:
             memory = context.get_discrete_state_vector().value()
-            last = memory[:-1]
-            velocity = last[self._velocities]
-            if context.get_time() - memory[-1] > self._period * (1.0 - _ROUNDING):
-                quotient = (measured - last)[self._positions] / self._period
+            now, last = measured.reshape(self._shape), memory[:-1].reshape(self._shape)
+            velocity = last[:, 1]
+            if context.get_time() - memory.item(-1) > self._period * (1.0 - _ROUNDING):
+                quotient = (now[:, 0] - last[:, 0]) / self._period
                 velocity = velocity + self._weight * (quotient - velocity)
-            measured[self._velocities] = velocity
+            now[:, 1] = velocity
         output.SetFromVector(measured)
 
     def _start(self, context: Context, state: DiscreteValues) -> EventStatus:
