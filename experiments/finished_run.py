@@ -219,10 +219,8 @@ def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
     if fixtures is None or fixtures.guidance.rules != "program" or "near_regions" not in log:
         return Metrics()
     motion, guidance = free_motion(settings), fixtures.guidance
-    return audit(
-        log,
-        Promise(motion.mass, motion.damping, guidance.largest_speed, guidance.tank.capacity),
-    )
+    damping = motion.damping if settings.operator is None else None
+    return audit(log, Promise(motion.mass, damping, guidance.largest_speed, guidance.tank.capacity))
 
 
 def _sensor_warnings(log: RunLog) -> list[str]:

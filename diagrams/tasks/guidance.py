@@ -1,10 +1,13 @@
 """The reference of a tool that is led by hand, within virtual fixtures."""
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import MatrixGain
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.space_guidance import SpaceTask, free_motion
+from pfsc_drake.control.compliance.tuned_impedance import KINDS, WISHES
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
@@ -12,6 +15,7 @@ from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance, Guidance
@@ -37,7 +41,8 @@ def add_guidance(
         task: Leading it through space.
         order: Highest derivative of the reference that is needed.
         ports: ``joint_state`` as measured; ``wrench_measured`` and ``tared``, or without a sensor
-            ``wrench_observed`` and ``ready``; ``regions_on`` where a person can switch regions.
+            ``wrench_observed`` and ``ready``; where a person can change them, ``regions_on`` and
+            ``impedance_wish``, see :class:`ImpedanceTuner`.
 
     Raises:
         InputError: If the rules do not suit the law.
@@ -62,6 +67,12 @@ def add_guidance(
     builder.Connect(ports[ready], system.GetInputPort("ready"))
     if "regions_on" in ports:
         builder.Connect(ports["regions_on"], system.GetInputPort("active"))
+    if "impedance_wish" in ports:
+        picked = np.zeros((1, WISHES))
+        picked[0, 2 * KINDS.index(Kind.TANGENTIAL) + 1] = 1.0
+        damping = builder.AddNamedSystem("free_damping", MatrixGain(picked))
+        builder.Connect(ports["impedance_wish"], damping.get_input_port())
+        builder.Connect(damping.get_output_port(), system.GetInputPort("damping"))
     return system
 
 

@@ -8,6 +8,7 @@ from diagrams.station import Station
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS
 from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.control.manifolds.space import SpaceManifold
 
 # steps of a slider
 _STEPS = 200
@@ -78,8 +79,13 @@ def tuned_parameters(settings: Scenario, station: Station) -> list[TunedParamete
         settings: The scenario.
         station: Its station.
     """
-    kinds = {coordinate.kind for coordinate in station.law.linearization.manifold.coordinates}
+    manifold = station.law.linearization.manifold
+    kinds = {coordinate.kind for coordinate in manifold.coordinates}
     parameters, given = [], settings.compliance.impedance()
+    if manifold.name == SpaceManifold.name:
+        # guidance leads along, without a spring
+        along = KINDS.index(Kind.TANGENTIAL)
+        return _of_kind(2 * along, Kind.TANGENTIAL, given.tangential, stiffness=False)
     for i, kind in enumerate(KINDS):
         # a force that is to be pressed with takes the place of a stiffness
         pressed = kind is Kind.TRANSVERSAL and settings.compliance.press is not None

@@ -26,13 +26,13 @@ class Promise:
 
     Attributes:
         mass: m [kg].
-        damping: d [N s/m].
+        damping: d [N s/m]; None where a person may change it, so that the log's counts.
         largest_speed: Of the free motion [m/s].
         capacity: Of the tank [J].
     """
 
     mass: float
-    damping: float
+    damping: float | None
     largest_speed: float
     capacity: float
 
@@ -82,10 +82,13 @@ def audit(log: RunLog, promise: Promise) -> Metrics:
     v, f, T = v[:count], f[:count], float(np.median(np.diff(log.time)))
     slots = _read(log["near_regions"].values[:count])
     before = np.vstack([np.zeros(3), v[:-1]])
-    metrics.add("audit_stationarity", _stationarity(v, before, f, slots, promise, T), "m/s")
+    d = log["free_damping"].values[:count, 0]
+    if promise.damping is not None:
+        d = np.full(count, promise.damping)
+    metrics.add("audit_stationarity", _stationarity(v, before, f, slots, promise, d, T), "m/s")
     metrics.add("audit_allowance", _allowance(v, slots), "m/s")
     work = T * np.sum(f * v, axis=1)
-    lost = T * promise.damping * np.sum(v * v, axis=1)
+    lost = T * d * np.sum(v * v, axis=1)
     out = np.where(slots.hard, np.maximum(0.0, -slots.beta), 0.0)
     given = T * np.sum(slots.used * slots.phi * (slots.u + out), axis=1)
     spring = (
@@ -117,9 +120,15 @@ def _read(values: FloatArray) -> _Slots:
 
 
 def _stationarity(
-    v: FloatArray, before: FloatArray, f: FloatArray, slots: _Slots, promise: Promise, T: float
+    v: FloatArray,
+    before: FloatArray,
+    f: FloatArray,
+    slots: _Slots,
+    promise: Promise,
+    d: FloatArray,
+    T: float,
 ) -> float:
-    inertia = promise.mass + T * promise.damping
+    inertia = (promise.mass + T * d)[:, None]
     wanted = (promise.mass * before + T * f) / inertia
     size = np.linalg.norm(wanted, axis=1, keepdims=True)
     wanted *= np.minimum(1.0, promise.largest_speed / np.maximum(size, 1e-12))

@@ -28,7 +28,9 @@ def guidance_metrics(log: RunLog) -> Metrics:
         deepest = max(0.0, float(-np.nanmin(distance[:, hard])))
         metrics.add("deepest_violation", deepest, "m")
     if soft.size:
-        metrics.add("deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft]))), "m")
+        metrics.add(
+            "deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft], initial=np.inf))), "m"
+        )
     command = log["velocity_command"].values
     steps = np.linalg.norm(np.diff(command, axis=0), axis=1)
     metrics.add("largest_command_step", float(np.nanmax(steps, initial=0.0)), "m/s")

@@ -18,6 +18,7 @@ _SINGLE = {
     "clock": ("region_clock", "s", ["s"]),
     "rate": ("region_rate", "1", ["rho"]),
     "spring": ("spring_energy", "J", ["V"]),
+    "damping": ("free_damping", "N s/m", ["d"]),
     "squeezed": ("squeezed", "1", ["squeezed"]),
 }
 _SLOT_UNITS = "1, m, 1, 1, 1, m/s, m/s, N, N/m, m"
@@ -46,9 +47,10 @@ def add_guidance(
     names = [fixture.name for fixture in task.fixtures]
     slots = [f"{key}_{slot}" for slot in range(MOST_NEAR) for key in SLOT]
     log.add("near_regions", rows["near"], _SLOT_UNITS, slots)
-    for name in ("labels", "evaluated"):
+    for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), "1", names)
     distances = task.distances(y_t, region_times(log, station))
+    distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, "m", names)
 
 

@@ -6,7 +6,14 @@ from typing import Any, Protocol
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+    State,
+)
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.fixtures.guidance import GuidanceStep
@@ -36,6 +43,7 @@ class Guidance(Protocol):
         velocity: Sequence[float],
         force: Vector,
         active: Sequence[float] | None = None,
+        damping: float | None = None,
     ) -> GuidanceStep:
         """Return what to do at a tick."""
 
@@ -52,6 +60,8 @@ class FixtureGuidance(LeafSystem):
         ready (input): Until it first rises above 0.5, forces count as zero, shape (1,).
         active (input, optional): Which regions are switched on, above 0.5, shape (M,); all of them
             if not connected.
+        damping (input, optional): Of the free motion, shape (1,) [N s/m]; that of the rules where
+            it is negative, or not connected.
         reference (output): Derivatives 0..p of the reference by rows, shape ((p + 1) m,), of which
             only the first three columns, those of the tool point, are not zero.
         mode (output): A :class:`~pfsc_drake.control.fixtures.labels.Mode`, shape (1,).
@@ -91,8 +101,10 @@ class FixtureGuidance(LeafSystem):
         self._wrench = self.DeclareVectorInputPort("wrench", 6)
         self._ready = self.DeclareVectorInputPort("ready", 1)
         self._active = self.DeclareVectorInputPort("active", layout.num_regions)
+        self._damping = self.DeclareVectorInputPort("damping", 1)
         states = {self.abstract_state_ticket(memory), self.discrete_state_ticket(force)}
-        sources = {self._joint_state.ticket(), self._active.ticket(), *states}
+        inputs = (self._joint_state, self._active, self._damping)
+        sources = {*(port.ticket() for port in inputs), *states}
         self._step = self.DeclareAbstractOutputPort(
             "step", lambda: Value(None), self._calc_step, prerequisites_of_calc=sources
         )
@@ -145,8 +157,15 @@ class FixtureGuidance(LeafSystem):
             memory = self._guidance.start((motion[0], motion[1], motion[2]))
         f_x, f_y, f_z, ready = context.get_discrete_state_vector().value().tolist()
         force = (f_x, f_y, f_z) if ready else _STILL
-        active = self._active.Eval(context).tolist() if self._active.HasValue(context) else None
-        step = self._guidance.step(memory, motion[:3], motion[3:], force, active)
+        (asked,) = _value(self._damping, context) or (-1.0,)
+        step = self._guidance.step(
+            memory,
+            motion[:3],
+            motion[3:],
+            force,
+            _value(self._active, context),
+            asked if asked >= 0.0 else None,
+        )
         output.set_value((step, motion))
 
     def _calc_reference(self, context: Context, output: BasicVector) -> None:
@@ -166,7 +185,7 @@ class FixtureGuidance(LeafSystem):
     def _calc_record(self, context: Context, output: BasicVector) -> None:
         step, _ = self._step.Eval(context)
         force = context.get_discrete_state_vector().value()[:3]
-        output.SetFromVector(self.layout.row(step, force))
+        output.SetFromVector(self.layout.row(step, force, _value(self._active, context)))
 
     def _initialize(self, context: Context, state: State) -> EventStatus:
         state.get_mutable_abstract_state(0).set_value(None)
@@ -183,3 +202,11 @@ class FixtureGuidance(LeafSystem):
         state.get_mutable_discrete_state().set_value(np.array([*force, ready]))
         if step is not None:
             state.get_mutable_abstract_state(0).set_value(step.memory)
+
+
+def _value(port: InputPort, context: Context) -> list[float] | None:
+    """Return the value of an optional port, or None if there is none."""
+    if not port.HasValue(context):
+        return None
+    values: list[float] = port.Eval(context).tolist()
+    return values

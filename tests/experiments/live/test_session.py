@@ -131,6 +131,33 @@ def test_a_take_is_repeated_to_the_last_bit(tmp_path, capsys):
     assert set(status["deviation"]) == {"xi_1", "xi_2"}
 
 
+def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
+    """Through the cylinder that is off, at a speed that the damping decides."""
+    rehearsal = Rehearsal(tmp_path / "takes", "vf_forbidden_region")
+    rehearsal.play(
+        at(0.3, **{"region cylinder_1": 0.0, "pull x [N]": 20.0}),
+        at(0.8, **{"along d [Ns/m]": 200.0}),
+        at(1.1, **{END: True}),
+    )
+    folder = rehearsal.session.kept[0].folder
+    log, _ = datasets(folder)
+    assert set(log["free_damping"][:790, 0]) == {90.0}
+    assert set(log["free_damping"][820:, 0]) == {200.0}
+    speed = log["velocity_command"][:, 0]
+    assert speed[790] == pytest.approx(20.0 / 90.0, rel=0.05)
+    assert speed[-1] == pytest.approx(20.0 / 200.0, rel=0.05)
+    assert np.hypot(log["y_t"][-1, 0] - 0.9, log["y_t"][-1, 1]) > 0.25
+    assert np.isnan(log["region_distance"][820:, 0]).all()
+    metrics = json.loads((folder / "metrics.json").read_text())
+    for name in ("deepest_violation", "audit_missed"):
+        assert metrics[name]["value"] == 0.0
+    for name in ("stationarity", "allowance", "energy", "tank"):
+        assert metrics[f"audit_{name}"]["value"] < 1e-9
+    sliders = {slider["name"] for slider in rehearsal.status.controls["sliders"]}
+    assert "along d [Ns/m]" in sliders
+    assert not any(" k [" in name for name in sliders)
+
+
 def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
     """A force sensor that fails at 0.3 s."""
     failing = "simulation.force_sensor_failure={time: 0.3, component: 0}"

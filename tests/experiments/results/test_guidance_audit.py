@@ -1,6 +1,7 @@
 """The audit of guidance: what it passes, and that it sees what is wrong."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,19 +31,23 @@ def column(log, key):
     return np.arange(MOST_NEAR) * len(SLOT) + SLOT.index(key)
 
 
-@pytest.fixture(scope="module")
-def rows():
+def happened(damping=None):
     """A second between a floor that rises, a soft ceiling and a ball."""
     guidance = program(REGIONS, [math.inf, 2e3, math.inf])
 
     def hand(t, y):
         return np.array([-12.0, 0.0, 25.0 if t < 0.5 else -25.0])
 
-    record = lead(guidance, (0.03, 0, 0.04), hand, 1.0)
+    record = lead(guidance, (0.03, 0, 0.04), hand, 1.0, damping)
     layout = GuidanceRecord(len(REGIONS))
     pairs = zip(record.steps, record.force, strict=True)
     values = np.array([layout.row(step, force) for step, force in pairs])
     return np.array(record.y), values, layout
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return happened()
 
 
 def make_log(rows):
@@ -54,6 +59,7 @@ def make_log(rows):
     log.add("rest_point", part["point"], "m")
     log.add("near_regions", part["near"], "")
     log.add("tank", part["tank"], "J")
+    log.add("free_damping", part["damping"], "N s/m")
     log.add("y_t", y_t.copy(), "m")
     clock = part["clock"][:, 0] - LAG - DELAY
     pairs = zip(y_t, clock, strict=True)
@@ -62,8 +68,8 @@ def make_log(rows):
     return log
 
 
-def worst(log):
-    return {name: metric.value for name, metric in audit(log, PROMISE).items()}
+def worst(log, promise=PROMISE):
+    return {name: metric.value for name, metric in audit(log, promise).items()}
 
 
 def test_what_is_kept_passes(rows):
@@ -133,6 +139,16 @@ def test_what_is_broken_is_seen(rows, tamper, name, least):
     log = make_log(rows)
     tamper(log)
     assert worst(log)[f"audit_{name}"] > least
+
+
+def test_what_a_person_makes_of_the_damping_is_no_secret():
+    """It keeps the promise, whatever it is, and shows where none was to change it."""
+    log = make_log(happened(lambda t: 15.0 if (t % 0.2) < 0.1 else 300.0))
+    found = worst(log, replace(PROMISE, damping=None))
+    for name in ("stationarity", "allowance", "energy", "tank"):
+        assert found[f"audit_{name}"] < 1e-9
+    assert found["audit_bound"] > 0.0
+    assert worst(log)["audit_stationarity"] > 1e-4
 
 
 def test_a_hand_that_gained_more_than_the_tank_is_seen(rows):

@@ -83,6 +83,19 @@ def test_a_force_moves_the_reference_one_tick_later(robot):
     np.testing.assert_array_equal(bench.record("force"), PULL[:3])
 
 
+def test_a_damping_is_asked_for_or_not(robot):
+    bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
+    bench.fix(damping=[-1.0])
+    bench.advance(1)
+    asked = {}
+    for damping in (-1.0, 30.0):
+        bench.fix(damping=[damping])
+        asked[damping] = bench.reference[1, 0]
+    assert asked[-1.0] == pytest.approx(PERIOD * PULL[0] / (MASS + PERIOD * DAMPING), rel=1e-12)
+    assert asked[30.0] == pytest.approx(PERIOD * PULL[0] / (MASS + PERIOD * 30.0), rel=1e-12)
+    assert bench.record("damping")[0] == 30.0
+
+
 def test_the_floor_holds_the_reference(robot):
     """A robot that stands: its rest point does not move on, so that the floor stays 1 mm away."""
     bench = Bench(robot, ServoLead(5e-3, 0.0, PERIOD))
