@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, require
 from pfsc_drake.physics.force_profile import FRAMES, smooth_step
-from pfsc_drake.physics.hand_checks import require
 from pfsc_drake.physics.hand_orientation import OrientationTarget, leg_at, rotation_vectors
 from pfsc_drake.physics.wandering import Wander
 

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.physics.hand_checks import require
+from pfsc_drake.errors import require
 
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
 _SLOWEST = 10.0  # s

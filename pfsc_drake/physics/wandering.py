@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pfsc_drake.physics.hand_checks import require
+from pfsc_drake.errors import require
 
 
 @dataclass

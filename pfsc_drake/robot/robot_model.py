@@ -97,10 +97,15 @@ def pose_function(robot: RobotModel) -> ca.Function:
     return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))], ["q"], ["pose"])
 
 
-def tool_velocity_function(robot: RobotModel) -> ca.Function:
-    """Return the tool point and its velocity, ``(q, v) -> [y_t, y_t']`` [m, m/s], shape (6,)."""
+def tool_motion_function(robot: RobotModel) -> ca.Function:
+    """Return direct kinematics (2.5) and its rates (2.11), shapes (N,), (N,) and (18,).
+
+    ``(q, v) -> [y_t, R_e by rows, y_t', w]``: tool point [m], orientation, velocity of the tool
+    point [m/s] and angular velocity [rad/s], world axes.
+    """
     q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
-    moving = [Jet([q[i], v[i]]) for i in range(robot.dimension)]
-    y, _ = robot.tool_pose(moving)
-    motion = ca.densify(ca.vertcat(*y.coefficients[:2]))
-    return ca.Function("tool_velocity", [q, v], [motion], ["q", "v"], ["motion"])
+    y, R = robot.tool_pose([Jet([q[i], v[i]]) for i in range(robot.dimension)])
+    (position, velocity), (orientation, rate) = y.coefficients[:2], R.coefficients[:2]
+    w = ca.inv_skew(rate @ orientation.T)
+    motion = ca.densify(ca.vertcat(position, ca.vec(orientation.T), velocity, w))
+    return ca.Function("tool_motion", [q, v], ca.cse([motion]), ["q", "v"], ["motion"])

@@ -132,7 +132,7 @@ def test_observed_twist_is_that_of_a_screw():
     ],
 )
 def test_parameters_out_of_range(key, value):
-    with pytest.raises(InputError, match=f"^{key} = .*: must be "):
+    with pytest.raises(InputError, match=f"^{key} = .*; allowed: "):
         HandParameters(**{"waypoints": WAY, key: value})
 
 

@@ -109,17 +109,17 @@ def test_a_hand_without_stiffness_does_not_turn():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"rotational_stiffness": 2.0}, "must be 0, or zyx_deg in the first waypoint"),
-        ({"rotational_stiffness": 2.0, "wander": Wander()}, "must be 0, or zyx_deg in the first"),
-        ({"rotational_stiffness": -1.0}, "must be zero or positive"),
+        ({"rotational_stiffness": 2.0}, "allowed: 0, or zyx_deg in the first waypoint"),
+        ({"rotational_stiffness": 2.0, "wander": Wander()}, "allowed: 0, or zyx_deg in the first"),
+        ({"rotational_stiffness": -1.0}, "allowed: zero or positive"),
         (
             {"waypoints": [HandWaypoint(0.0, np.zeros(3), np.zeros(3))]},
-            "must be positive where waypoints have zyx_deg",
+            "allowed: positive where waypoints have zyx_deg",
         ),
     ],
 )
 def test_turning_that_makes_no_sense(changes, message):
-    with pytest.raises(InputError, match=f"^rotational_stiffness = .*: {message}"):
+    with pytest.raises(InputError, match=f"^rotational_stiffness = .*; {message}"):
         HandParameters(**changes)
 
 

@@ -21,7 +21,7 @@ from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.control.fixtures.vectors import Vector
-from pfsc_drake.robot.robot_model import RobotModel, tool_velocity_function
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 _STILL = (0.0, 0.0, 0.0)
 
@@ -120,7 +120,7 @@ class FixtureGuidance(LeafSystem):
         self.DeclareVectorOutputPort("mode", 1, self._calc_mode, prerequisites_of_calc=sources)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
-        function = BoundFunction(tool_velocity_function(robot))
+        function = BoundFunction(tool_motion_function(robot))
         self._q, self._v = function.arguments["q"], function.arguments["v"]
         self._motion, self._evaluate = function.results["motion"], function.evaluate
 
@@ -145,7 +145,7 @@ class FixtureGuidance(LeafSystem):
         self._q[:], self._v[:] = state[: self._n], state[self._n : 2 * self._n]
         self._evaluate()
         motion: list[float] = self._motion.tolist()
-        return motion
+        return motion[:3] + motion[12:15]
 
     def _calc_step(self, context: Context, output: AbstractValue) -> None:
         motion, memory = self._tool(context), context.get_abstract_state(0).get_value()

@@ -1,11 +1,9 @@
 """Where the tool is and how it moves."""
 
-import casadi as ca
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.jets import Jet
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 
 class ToolMotion(LeafSystem):
@@ -30,7 +28,7 @@ class ToolMotion(LeafSystem):
             self._calc_motion,
             prerequisites_of_calc={self._joint_state.ticket()},
         )
-        function = BoundFunction(motion_function(robot))
+        function = BoundFunction(tool_motion_function(robot))
         self._q, self._v = function.arguments["q"], function.arguments["v"]
         self._motion, self._evaluate = function.results["motion"], function.evaluate
 
@@ -39,13 +37,3 @@ class ToolMotion(LeafSystem):
         self._q[:], self._v[:] = state[:n], state[n : 2 * n]
         self._evaluate()
         output.SetFromVector(self._motion)
-
-
-def motion_function(robot: RobotModel) -> ca.Function:
-    """Return ``(q, v) -> [y_t, R_e by rows, v, w]``, shapes (N,), (N,) and (18,)."""
-    q, v = ca.SX.sym("q", robot.dimension), ca.SX.sym("v", robot.dimension)
-    y, R = robot.tool_pose([Jet([q[i], v[i]]) for i in range(robot.dimension)])
-    (position, velocity), (orientation, rate) = y.coefficients[:2], R.coefficients[:2]
-    w = ca.inv_skew(rate @ orientation.T)
-    motion = ca.densify(ca.vertcat(position, ca.vec(orientation.T), velocity, w))
-    return ca.Function("tool_motion", [q, v], ca.cse([motion]), ["q", "v"], ["motion"])

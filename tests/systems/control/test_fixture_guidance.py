@@ -12,7 +12,7 @@ from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.geometry.regions.shapes import HalfSpace
-from pfsc_drake.robot.robot_model import tool_velocity_function
+from pfsc_drake.robot.robot_model import tool_motion_function
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from tests.control.conftest import BENT, Robot
 
@@ -31,7 +31,7 @@ class Bench:
 
     def __init__(self, robot, lead, order=2, below=1e-3):
         self.q, n = np.array(BENT), robot.n
-        motion = np.array(tool_velocity_function(robot.chain)(self.q, np.zeros(n))).ravel()
+        motion = np.array(tool_motion_function(robot.chain)(self.q, np.zeros(n))).ravel()
         self.y_t = motion[:3]
         regions = [HalfSpace(self.y_t - [0, 0, below], [0, 0, 1])]
         nearby = ScheduledRegions(regions, PARAMETERS, PERIOD)
@@ -58,18 +58,6 @@ class Bench:
     def record(self, name):
         row = self.system.GetOutputPort("record").Eval(self.context)
         return row[self.system.layout.fields[name]]
-
-
-def test_tool_velocity_is_drakes(robot):
-    rng, function = np.random.default_rng(4), tool_velocity_function(robot.chain)
-    q, v, step = np.array(BENT), rng.uniform(-1, 1, robot.n), 1e-7
-    motion = np.array(function(q, v)).ravel()
-    before, here, after = (
-        robot.tool_pose(np.tile([*(q + s * step * v), *np.zeros(robot.n)], 2))[0]
-        for s in (-1.0, 0.0, 1.0)
-    )
-    np.testing.assert_allclose(motion[:3], here, atol=1e-12)
-    np.testing.assert_allclose(motion[3:], (after - before) / (2 * step), atol=1e-7)
 
 
 def test_a_force_moves_the_reference_one_tick_later(robot):
