@@ -30,14 +30,15 @@ PULLS = {
     "free": ((0.3, 0.3, 0.3), (0.0, 0.0, 0.0)),
     "surface": ((0.3, 0.3, 0.0), (1.0, 0.0, -10.0)),
     "edge": ((0.0, 0.3, 0.0), (-10.0, 0.5, -10.0)),
+    "corner": ((0.0, 0.0, 0.0), (-10.0, -10.0, -10.0)),
 }
 
 
 @pytest.mark.parametrize("place", PULLS)
 def test_rules_alone(benchmark, place):
     """Time of 200 ticks; those in a table are 200 times as long."""
-    far = np.random.default_rng(0).uniform(-0.5, 0.5, (REGIONS - 2, 3)) + np.array([0, 0, 1.2])
-    regions = [HalfSpace([0, 0, 0], [0, 0, 1]), HalfSpace([0, 0, 0], [1, 0, 0])]
+    far = np.random.default_rng(0).uniform(-0.5, 0.5, (REGIONS - 3, 3)) + np.array([0, 0, 1.2])
+    regions = [HalfSpace([0, 0, 0], normal) for normal in ([0, 0, 1], [1, 0, 0], [0, 1, 0])]
     regions += [SphereRegion(centre, 0.05, inside=False) for centre in far]
     parameters = GuidanceParameters()
     guidance = ProgramGuidance(
