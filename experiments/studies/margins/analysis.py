@@ -206,12 +206,10 @@ def analyse(
         drives_are_servos=own.drives_are_servos,
         remarks=_remarks(removed, way, station.workpiece is not None),
     )
-    progress(duration, "margins of the drives")
-    analysis.margins = [
-        _drive_margins(instant, loop, own.map.period)
-        for instant, loop in zip(way.instants, loops, strict=True)
-        if loop is not None
-    ]
+    for instant, loop in zip(way.instants, loops, strict=True):
+        progress(instant.time, "margins of the drives")
+        if loop is not None:
+            analysis.margins.append(_drive_margins(instant, loop, own.map.period))
     elastic = not station.robot.is_rigid
     for key, error in single_errors(box, elastic):
         with _saying(key, analysis.remarks):
@@ -251,8 +249,10 @@ class _Study:
         self, loop: StationLoop, error: Error, instants: Sequence[Instant]
     ) -> tuple[Case, list[LinearLoop | None]]:
         """Return a loop along its way, and what it is at each instant."""
-        sections = [self.section(loop, instant) for instant in instants]
-        loops = [linearize(loop, section, self.chosen) for section in sections]
+        loops = []
+        for instant in instants:
+            self.progress(instant.time, f"linearizing, {error}")
+            loops.append(linearize(loop, self.section(loop, instant), self.chosen))
         places = [
             Place(instant, None if linear is None else modes(linear.A, loop.map.period))
             for instant, linear in zip(instants, loops, strict=True)

@@ -14,8 +14,10 @@ and the loop stays stable when L is multiplied by any complex number in the disc
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+import scipy.linalg
 
 from pfsc_drake.control.margins.modes import modes
 
@@ -67,10 +69,8 @@ def disc_margins(A: np.ndarray, holds: np.ndarray, period: float) -> list[DiscMa
     """
     if not modes(A, period).is_stable:
         return [NO_MARGIN] * len(holds)
-    return [
-        _margin(_Loop(A, holds[i : i + 1], period), lambda M: np.abs(M[:, 0, 0]))
-        for i in range(len(holds))
-    ]
+    loop = _Loop(A, holds, period)
+    return [_margin(loop, partial(_of_drive, i)) for i in range(len(holds))]
 
 
 def common_disc_margin(A: np.ndarray, holds: np.ndarray, period: float) -> DiscMargin:
@@ -93,30 +93,39 @@ def common_disc_margin(A: np.ndarray, holds: np.ndarray, period: float) -> DiscM
 
 
 class _Loop:
-    """``S - T`` of a loop broken at its holds."""
+    """``S - T`` of a loop broken at its holds.
+
+    With the Schur form ``A = Q R Q^H`` every frequency takes a triangular system only.
+
+    Attributes:
+        frequencies: A grid, and all resonances [rad/s].
+        values: ``S - T`` there, shape (frequencies, N, N).
+    """
 
     def __init__(self, A: np.ndarray, holds: np.ndarray, period: float) -> None:
-        self._A, self.period = A.astype(complex), period
-        self._into, self._holds = A[:, holds].astype(complex), holds
-        angles = np.abs(np.angle(np.linalg.eigvals(A))) / period
+        R, Q = scipy.linalg.schur(A, output="complex")
+        self._period, self._eigenvalues, self._negative = period, np.diag(R).copy(), -R
+        self._into, self._out = Q.conj().T @ A[:, holds], Q[holds]
+        angles = np.abs(np.angle(self._eigenvalues)) / period
         nyquist = np.pi / period
         grid = np.geomspace(min(_SLOWEST, 0.01 * nyquist), nyquist, _POINTS)
         resonances = angles[(angles > grid[0]) & (angles < nyquist)]
         self.frequencies = np.unique(np.concatenate([grid, resonances]))
+        self.values = self(self.frequencies)
 
     def __call__(self, frequencies: np.ndarray) -> np.ndarray:
         """Return ``S - T`` at frequencies [rad/s], shape (frequencies, N, N)."""
-        n = len(self._A)
-        z = np.exp(1j * frequencies * self.period)
-        resolvent = z[:, None, None] * np.eye(n) - self._A
-        into = np.broadcast_to(self._into, (len(z), *self._into.shape))
-        answer = np.linalg.solve(resolvent, into)[:, self._holds, :]  # -T
-        return np.eye(len(self._holds)) + 2.0 * answer
+        N, resolvent = len(self._out), self._negative.copy()
+        answers = np.empty((len(frequencies), N, N), dtype=complex)
+        for answer, z in zip(answers, np.exp(1j * frequencies * self._period), strict=True):
+            np.fill_diagonal(resolvent, z - self._eigenvalues)
+            inside = scipy.linalg.solve_triangular(resolvent, self._into, check_finite=False)
+            answer[:] = self._out @ inside  # -T
+        return np.eye(N) + 2.0 * answers
 
 
 def _margin(loop: _Loop, size: Callable[[np.ndarray], np.ndarray]) -> DiscMargin:
-    grid = loop.frequencies
-    sizes = size(loop(grid))
+    grid, sizes = loop.frequencies, size(loop.values)
     for _ in range(_REFINEMENTS):
         peak = int(np.argmax(sizes))
         low, high = grid[max(peak - 1, 0)], grid[min(peak + 1, len(grid) - 1)]
@@ -124,6 +133,11 @@ def _margin(loop: _Loop, size: Callable[[np.ndarray], np.ndarray]) -> DiscMargin
         sizes = size(loop(grid))
     peak = int(np.argmax(sizes))
     return DiscMargin(min(2.0 / float(sizes[peak]), 2.0), float(grid[peak]))
+
+
+def _of_drive(i: int, M: np.ndarray) -> np.ndarray:
+    """Return ``|S - T|`` of one drive."""
+    return np.abs(M[:, i, i])
 
 
 def _scaled_norm(M: np.ndarray) -> np.ndarray:
