@@ -25,7 +25,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     distance, soft = log["region_distance"].values, soft_regions(log)
     hard = np.setdiff1d(np.arange(distance.shape[1]), soft)
     if hard.size:
-        deepest = max(0.0, float(-np.nanmin(distance[:, hard])))
+        deepest = max(0.0, float(-np.nanmin(distance[:, hard], initial=np.inf)))
         metrics.add("deepest_violation", deepest, "m")
     if soft.size:
         metrics.add(
