@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -48,11 +48,33 @@ class Guidance(Protocol):
         """Return what to do at a tick."""
 
 
+class _Known(NamedTuple):
+    """What a tick goes by: memory of the rules (None before the first), last force, readiness."""
+
+    memory: Any = None
+    force: Vector = _STILL
+    ready: bool = False
+
+
+class _Kept(NamedTuple):
+    """What was known before the last tick, at a time [s], and what is since; never changed."""
+
+    time: float = -math.inf
+    before: _Known = _Known()
+    after: _Known = _Known()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Kept":
+        """Return itself, so that a simulation's copies of its state cost nothing."""
+        return self
+
+
 class FixtureGuidance(LeafSystem):
     """Leads the tool where a hand pulls it, and nowhere that it must not go, see `Guidance`.
 
     A force moves the reference after one period, as in :class:`ImpedanceFilter`; where the tool
-    is counts at once. So there is no algebraic loop through drives and force sensor.
+    is counts at once. So there is no algebraic loop through drives and force sensor. An abstract
+    state is updated before the discrete ones of a tick; so the outputs stay what they were until
+    time goes on, and whoever is sampled at a tick sees the same.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
@@ -71,8 +93,8 @@ class FixtureGuidance(LeafSystem):
     measures it.
 
     State:
-        Abstract: memory of the rules, None before the first tick. Discrete: the force of the last
-        tick, shape (3,), and whether ready.
+        Abstract: memory of the rules, None before the first tick, the force of the last tick [N]
+        and whether ready; with the time of the last tick, and what they were before it.
 
     Args:
         guidance: The rules.
@@ -95,16 +117,14 @@ class FixtureGuidance(LeafSystem):
         super().__init__()
         self._guidance, self._order, self.layout = guidance, order, layout
         self._num_outputs, self._n = num_outputs, robot.dimension
-        memory = self.DeclareAbstractState(Value(None))
-        force = self.DeclareDiscreteState(4)
+        kept = self.abstract_state_ticket(self.DeclareAbstractState(Value(_Kept())))
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * self._n)
         self._wrench = self.DeclareVectorInputPort("wrench", 6)
         self._ready = self.DeclareVectorInputPort("ready", 1)
         self._active = self.DeclareVectorInputPort("active", layout.num_regions)
         self._damping = self.DeclareVectorInputPort("damping", 1)
-        states = {self.abstract_state_ticket(memory), self.discrete_state_ticket(force)}
         inputs = (self._joint_state, self._active, self._damping)
-        sources = {*(port.ticket() for port in inputs), *states}
+        sources = {*(port.ticket() for port in inputs), kept, self.time_ticket()}
         self._step = self.DeclareAbstractOutputPort(
             "step", lambda: Value(None), self._calc_step, prerequisites_of_calc=sources
         )
@@ -137,7 +157,13 @@ class FixtureGuidance(LeafSystem):
             y_t: Tool point [m], shape (3,).
         """
         x, y, z = y_t.tolist()
-        context.SetAbstractState(0, self._guidance.start((x, y, z)))
+        known = self._known(context)._replace(memory=self._guidance.start((x, y, z)))
+        context.SetAbstractState(0, _Kept(after=known))
+
+    def _known(self, context: Context) -> _Known:
+        """Return what the outputs go by now."""
+        kept: _Kept = context.get_abstract_state(0).get_value()
+        return kept.before if context.get_time() <= kept.time else kept.after
 
     def _tool(self, context: Context) -> list[float]:
         """Return ``[y_t, y_t']`` as measured."""
@@ -148,21 +174,18 @@ class FixtureGuidance(LeafSystem):
         return motion[:3] + motion[12:15]
 
     def _calc_step(self, context: Context, output: AbstractValue) -> None:
-        motion, memory = self._tool(context), context.get_abstract_state(0).get_value()
-        known = math.isfinite(sum(motion))
-        if not known:  # the law stops the robot
+        motion, (memory, force, ready) = self._tool(context), self._known(context)
+        if not math.isfinite(sum(motion)):  # the law stops the robot
             output.set_value((None, motion))
             return
         if memory is None:
             memory = self._guidance.start((motion[0], motion[1], motion[2]))
-        f_x, f_y, f_z, ready = context.get_discrete_state_vector().value().tolist()
-        force = (f_x, f_y, f_z) if ready else _STILL
         (asked,) = _value(self._damping, context) or (-1.0,)
         step = self._guidance.step(
             memory,
             motion[:3],
             motion[3:],
-            force,
+            force if ready else _STILL,
             _value(self._active, context),
             asked if asked >= 0.0 else None,
         )
@@ -184,24 +207,23 @@ class FixtureGuidance(LeafSystem):
 
     def _calc_record(self, context: Context, output: BasicVector) -> None:
         step, _ = self._step.Eval(context)
-        force = context.get_discrete_state_vector().value()[:3]
+        force = self._known(context).force
         output.SetFromVector(self.layout.row(step, force, _value(self._active, context)))
 
     def _initialize(self, context: Context, state: State) -> EventStatus:
-        state.get_mutable_abstract_state(0).set_value(None)
-        state.get_mutable_discrete_state().set_value(np.zeros(4))
+        state.get_mutable_abstract_state(0).set_value(_Kept())
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: State) -> None:
-        step, _ = self._step.Eval(context)
-        force = self._wrench.Eval(context)[:3]
-        was_ready = context.get_discrete_state_vector().value()[3]
-        ready = max(was_ready, float(self._ready.Eval(context)[0] > 0.5))
-        if not np.isfinite(force).all():
-            force = np.zeros(3)
-        state.get_mutable_discrete_state().set_value(np.array([*force, ready]))
-        if step is not None:
-            state.get_mutable_abstract_state(0).set_value(step.memory)
+        (step, _), before = self._step.Eval(context), self._known(context)
+        f_x, f_y, f_z = self._wrench.Eval(context)[:3].tolist()
+        known = math.isfinite(f_x + f_y + f_z)
+        after = _Known(
+            before.memory if step is None else step.memory,
+            (f_x, f_y, f_z) if known else _STILL,
+            before.ready or bool(self._ready.Eval(context)[0] > 0.5),
+        )
+        state.get_mutable_abstract_state(0).set_value(_Kept(context.get_time(), before, after))
 
 
 def _value(port: InputPort, context: Context) -> list[float] | None:

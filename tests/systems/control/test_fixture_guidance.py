@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 from pydrake.systems.analysis import InitializeParams, Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ZeroOrderHold
 
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
@@ -135,19 +137,42 @@ def test_a_force_that_is_no_number_counts_as_none(robot):
 def test_a_state_that_is_no_number_asks_for_nothing(robot):
     bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
     bench.advance(20)
-    memory = bench.context.get_abstract_state(0).get_value()
+    memory = bench.context.get_abstract_state(0).get_value().after.memory
     bench.fix(joint_state=[np.nan] * 24)
     bench.advance(1)
     assert not bench.reference[1].any()
-    assert bench.context.get_abstract_state(0).get_value() is memory
+    assert bench.context.get_abstract_state(0).get_value().after.memory is memory
     assert np.isnan(bench.record("point")).all()
+
+
+def test_who_is_sampled_at_a_tick_sees_what_is_logged(robot):
+    """A hold of the same period, whose discrete update follows the guidance's own."""
+    bench = Bench(robot, FilterLead(2, 3e-3, PERIOD))
+    builder = DiagramBuilder()
+    builder.AddSystem(bench.system)
+    hold = builder.AddSystem(ZeroOrderHold(PERIOD, 3 * M))
+    builder.Connect(bench.system.GetOutputPort("reference"), hold.get_input_port())
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    root = simulator.get_mutable_context()
+    context = bench.system.GetMyMutableContextFromRoot(root)
+    n = robot.n
+    values = {"joint_state": [*bench.q, *np.zeros(n)] * 2, "wrench": PULL, "ready": [1.0]}
+    for name, value in values.items():
+        bench.system.GetInputPort(name).FixValue(context, np.array(value, dtype=float))
+    reference, held = bench.system.GetOutputPort("reference"), hold.get_output_port()
+    for k in range(1, 6):
+        logged = reference.Eval(context).copy()
+        simulator.AdvanceTo(k * PERIOD)
+        np.testing.assert_array_equal(held.Eval(hold.GetMyContextFromRoot(root)), logged)
+        assert (k < 2) or np.any(reference.Eval(context) != logged)
 
 
 def test_two_contexts_do_not_share_their_memory(robot):
     bench = Bench(robot, FilterLead(2, 3e-3, PERIOD))
     other = bench.context.Clone()
     bench.advance(50)
-    assert other.get_abstract_state(0).get_value() is None
+    assert other.get_abstract_state(0).get_value().after.memory is None
     twin = bench.context.Clone()
     bench.advance(1)
     fresh = Simulator(bench.system, twin)
