@@ -68,5 +68,5 @@ def test_a_hand_on_the_path(path, target):
 def test_wrong_frames():
     with pytest.raises(InputError, match="frame = tool; allowed: one of world, manifold"):
         HandParameters(frame="tool")
-    with pytest.raises(InputError, match="frame = manifold: must be world without a path"):
+    with pytest.raises(InputError, match="frame = manifold; allowed: world without a path"):
         HandModel(HandParameters(frame="manifold"))
