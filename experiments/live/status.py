@@ -6,10 +6,13 @@ import numpy as np
 
 from diagrams.station import Station
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 
 # below it, time is said to be slower than the clock
 _SLOW = 0.95
+# what there is of each region comes behind these
+_RECORD = GuidanceRecord(0).fields
 
 
 @dataclass
@@ -22,7 +25,8 @@ class LiveStatus:
         time: Simulated time [s].
         factor: Simulated over real time.
         mode: Which mode the law is in, if it has several.
-        deviation: Transversal coordinates, by name [m].
+        deviation: Transversal coordinates, by name [m]; in space the distance from the nearest
+            region, if one is near.
         progress: Tangential coordinates, by name [m].
         angles: Rotational coordinates, by name [rad].
         force: On the tool, world axes [N].
@@ -91,9 +95,21 @@ class LiveStatus:
             self.stiffness = dict(zip(names, impedance[STIFFNESS].tolist(), strict=True))
             self.damping = dict(zip(names, impedance[DAMPING].tolist(), strict=True))
             self.tank = float(signals["tank"][0])
+        if "guidance" in signals:
+            self._observe_guidance(signals["guidance"])
         self.ready = "tared" not in signals or bool(signals["tared"][0] > 0.5)
         if "mode" in signals:
             self.mode = station.mode_name(int(signals["mode"][0]))
+
+    def _observe_guidance(self, row: np.ndarray) -> None:
+        """Take over what leads a tool through space, see :class:`GuidanceRecord`."""
+        axes = list(self.progress)
+        self.measured |= zip(axes, row[_RECORD["force"]].tolist(), strict=True)
+        self.damping |= dict.fromkeys(axes, float(row[_RECORD["damping"]][0]))
+        near = row[_RECORD["near"]].reshape(-1, len(SLOT))
+        distances = near[near[:, SLOT.index("index")] >= 0.0, SLOT.index("h")]
+        if distances.size:
+            self.deviation = {"nearest region": float(distances.min())}
 
 
 def _plain(value: object) -> object:

@@ -7,7 +7,10 @@ import numpy as np
 
 from diagrams.station import Station
 from experiments.live.status import LiveStatus
+from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.space import SpaceManifold
 
 COORDINATES = PathManifold(2, oriented=False).coordinates
 STATION = SimpleNamespace(
@@ -43,6 +46,34 @@ def test_it_says_where_the_tool_is_what_acts_and_what_yields():
     assert content["ready"] is False
     assert content["slow"] is True
     assert content["mode"] == "surface"
+
+
+def test_in_space_it_tells_the_nearest_region_and_what_leads():
+    record = GuidanceRecord(2)
+    row = np.zeros(record.size)
+    row[record.fields["force"]] = 4.0, 5.0, 6.0
+    row[record.fields["damping"]] = 90.0
+    slots = np.zeros((MOST_NEAR, len(SLOT)))
+    slots[:, 0] = -1.0
+    slots[:2, :2] = [[1.0, 0.02], [0.0, -1e-4]]
+    row[record.fields["near"]] = slots.ravel()
+    axes = SpaceManifold(1).coordinates
+    manifold = SimpleNamespace(coordinates=axes)
+    law = SimpleNamespace(
+        linearization=SimpleNamespace(manifold=manifold),
+        layout=SimpleNamespace(manifold_state=slice(0, 3)),
+    )
+    station = SimpleNamespace(law=law)
+    signals = {"law": np.zeros(3), "wrench_ext": np.zeros(6), "guidance": row}
+    status = LiveStatus("mine")
+    status.observe(station, signals)
+    assert status.deviation == {"nearest region": -1e-4}
+    assert status.measured == {"eta_1": 4.0, "eta_2": 5.0, "eta_3": 6.0}
+    assert status.damping == {"eta_1": 90.0, "eta_2": 90.0, "eta_3": 90.0}
+    slots[:, 0] = -1.0
+    row[record.fields["near"]] = slots.ravel()
+    status.observe(station, signals)
+    assert status.deviation == {}
 
 
 def test_without_modes_there_is_none_and_unknown_ones_are_numbers():
