@@ -1,5 +1,7 @@
 """The one error raised for input that cannot be used."""
 
+import math
+
 MAX_MESSAGE = 1000  # characters
 
 
@@ -37,3 +39,8 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
     """
     if not condition:
         raise InputError(f"{key} = {value}; allowed: {allowed}")
+
+
+def require_positive(key: str, value: float) -> None:
+    """Refuse a value that is not a positive finite number."""
+    require(0.0 < value < math.inf, key, value, "a positive number")

@@ -6,14 +6,10 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.errors import require as require
+from pfsc_drake.errors import require_positive as require_positive
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns
 _ROUNDING = 1e-6
-
-
-def require_positive(key: str, value: float) -> None:
-    """Refuse a value that is not a positive finite number."""
-    require(bool(np.isfinite(value)) and value > 0.0, key, value, "a positive number")
 
 
 def require_not_negative(key: str, value: float) -> None:

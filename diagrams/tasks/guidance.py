@@ -7,7 +7,7 @@ from pydrake.systems.primitives import MatrixGain
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.space_guidance import SpaceTask, free_motion
-from pfsc_drake.control.compliance.tuned_impedance import KINDS, WISHES
+from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
@@ -69,7 +69,8 @@ def add_guidance(
         builder.Connect(ports["regions_on"], system.GetInputPort("active"))
     if "impedance_wish" in ports:
         picked = np.zeros((1, WISHES))
-        picked[0, 2 * KINDS.index(Kind.TANGENTIAL) + 1] = 1.0
+        _, place = wishes_of(Kind.TANGENTIAL)
+        picked[0, place] = 1.0
         damping = builder.AddNamedSystem("free_damping", MatrixGain(picked))
         builder.Connect(ports["impedance_wish"], damping.get_input_port())
         builder.Connect(damping.get_output_port(), system.GetInputPort("damping"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
-from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS
+from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, wishes_of
 from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.control.manifolds.space import SpaceManifold
 
@@ -84,19 +84,17 @@ def tuned_parameters(settings: Scenario, station: Station) -> list[TunedParamete
     parameters, given = [], settings.compliance.impedance()
     if manifold.name == SpaceManifold.name:
         # guidance leads along, without a spring
-        along = KINDS.index(Kind.TANGENTIAL)
-        return _of_kind(2 * along, Kind.TANGENTIAL, given.tangential, stiffness=False)
-    for i, kind in enumerate(KINDS):
+        return _of_kind(Kind.TANGENTIAL, given.tangential, stiffness=False)
+    for kind in KINDS:
         # a force that is to be pressed with takes the place of a stiffness
         pressed = kind is Kind.TRANSVERSAL and settings.compliance.press is not None
         if kind in kinds:
-            parameters += _of_kind(2 * i, kind, given.of(kind), stiffness=not pressed)
+            parameters += _of_kind(kind, given.of(kind), stiffness=not pressed)
     return parameters
 
 
-def _of_kind(
-    index: int, kind: Kind, given: CoordinateImpedance, *, stiffness: bool
-) -> list[TunedParameter]:
+def _of_kind(kind: Kind, given: CoordinateImpedance, *, stiffness: bool) -> list[TunedParameter]:
+    of_stiffness, of_damping = wishes_of(kind)
     per = ("Nm/rad", "Nms/rad") if kind is Kind.ROTATIONAL else ("N/m", "Ns/m")
     rigid = not given.stiffness.at and math.isinf(given.stiffness.value)
     soft_stiffness, soft_damping = _SOFT[kind]
@@ -112,13 +110,13 @@ def _of_kind(
             high / _STEPS,
             high if rigid else value,
         )
-        found.append(TunedParameter(index, slider, top_is_rigid=rigid))
+        found.append(TunedParameter(of_stiffness, slider, top_is_rigid=rigid))
     if isinstance(given.damping, Profile) and not given.damping.at:
         value = soft_damping if rigid or given.damping.value == 0.0 else given.damping.value
         high = _round_up(_RANGE * value)
         name = f"{_WORDS[kind]} d [{per[1]}]"
         slider = Slider(name, "tune", high / 20.0, high, high / _STEPS, value)
-        found.append(TunedParameter(index + 1, slider, always=rigid))
+        found.append(TunedParameter(of_damping, slider, always=rigid))
     return found
 
 

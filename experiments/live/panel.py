@@ -11,7 +11,7 @@ from pydrake.geometry import Meshcat
 
 from diagrams.surroundings.operator import PULL, REGIONS, WISH, idle_controls
 from experiments.live.controls import Slider, TunedParameter
-from pfsc_drake.control.compliance.tuned_impedance import KINDS
+from pfsc_drake.control.compliance.tuned_impedance import wishes_of
 from pfsc_drake.control.manifolds.manifold import Kind
 
 # how long a key pushes after it was pressed; it repeats while it is held, first after half a second
@@ -65,7 +65,7 @@ class Panel:
     ) -> None:
         self._requests, self._meshcat, self._tuned, self._clock = requests, meshcat, tuned, clock
         self._force_limit, self._idle = force_limit, idle_controls(regions)
-        across = 2 * KINDS.index(Kind.TRANSVERSAL)
+        across, _ = wishes_of(Kind.TRANSVERSAL)
         self._can_be_free = any(parameter.index == across for parameter in tuned)
         self._pull = [f"pull {axis} [N]" for axis in _AXES]
         self._place = [f"hold d{axis} [m]" for axis in _AXES]
@@ -208,9 +208,9 @@ class Panel:
         for parameter in self._tuned:
             wishes[parameter.index] = parameter.wish(self._value(parameter.slider.name))
         if self._can_be_free and self._value(_GUIDE) < 0.5:
-            along, across = (2 * KINDS.index(k) for k in (Kind.TANGENTIAL, Kind.TRANSVERSAL))
-            wishes[across] = 0.0
-            wishes[across + 1] = self._damping_along(along + 1)
+            _, along = wishes_of(Kind.TANGENTIAL)
+            stiffness, damping = wishes_of(Kind.TRANSVERSAL)
+            wishes[stiffness], wishes[damping] = 0.0, self._damping_along(along)
         return wishes
 
     def _damping_along(self, index: int) -> float:

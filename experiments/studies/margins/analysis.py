@@ -15,7 +15,12 @@ from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
 from experiments.studies.margins.walk import Instant, Walk, walk
 from pfsc_drake.control.margins.delay import delay_margin
-from pfsc_drake.control.margins.disc import DiscMargin, common_disc_margin, disc_margins
+from pfsc_drake.control.margins.disc import (
+    BrokenLoop,
+    DiscMargin,
+    common_disc_margin,
+    disc_margins,
+)
 from pfsc_drake.control.margins.modes import Modes, modes
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressListener
@@ -262,10 +267,11 @@ class _Study:
 
 def _drive_margins(instant: Instant, loop: LinearLoop, period: float) -> DriveMargins:
     A, holds = loop.A, loop.holds
+    broken = BrokenLoop(A, holds, period)
     return DriveMargins(
         instant,
-        disc_margins(A, holds, period),
-        common_disc_margin(A, holds, period),
+        disc_margins(broken),
+        common_disc_margin(broken),
         delay_margin(A, holds, period),
     )
 

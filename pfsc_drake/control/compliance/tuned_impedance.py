@@ -19,6 +19,12 @@ KINDS = tuple(Kind)
 WISHES = 2 * len(KINDS)
 
 
+def wishes_of(kind: Kind) -> tuple[int, int]:
+    """Return where stiffness and damping of a kind stand among the wishes."""
+    first = 2 * KINDS.index(kind)
+    return first, first + 1
+
+
 @dataclass
 class TuningParameters:
     """How parameters follow a wish.
@@ -137,8 +143,8 @@ def _tuning_function(
     last = dict(zip((MASS, DAMPING, STIFFNESS), ca.vertsplit(memory[: 3 * m], m), strict=True))
     given = dict(zip((MASS, DAMPING, STIFFNESS), ca.vertsplit(given_rows, m), strict=True))
     last_rate, tank, (e, rate) = memory[3 * m : 4 * m], memory[-1], ca.vertsplit(error, m)
-    kinds = [KINDS.index(coordinate.kind) for coordinate in coordinates]
-    asked_stiffness, asked_damping = (wish[[2 * k + i for k in kinds]] for i in (0, 1))
+    places = zip(*(wishes_of(coordinate.kind) for coordinate in coordinates), strict=True)
+    asked_stiffness, asked_damping = (wish[list(place)] for place in places)
     wished_stiffness = ca.if_else(asked_stiffness < 0.0, given[STIFFNESS], asked_stiffness)
     wished_damping = ca.if_else(asked_damping < 0.0, given[DAMPING], asked_damping)
     mass = ca.if_else(given[STIFFNESS] < ca.inf, given[MASS], masses)

@@ -14,7 +14,7 @@ and the loop stays stable when L is multiplied by any complex number in the disc
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg
@@ -56,53 +56,24 @@ class DiscMargin:
 NO_MARGIN = DiscMargin(0.0, 0.0)
 
 
-def disc_margins(A: np.ndarray, holds: np.ndarray, period: float) -> list[DiscMargin]:
-    """Return the disc margin of every drive, the others being as they are.
-
-    Args:
-        A: Map of one sampling interval, shape (n, n).
-        holds: Index of each drive's held command, shape (N,).
-        period: Sampling time [s].
-
-    Returns:
-        No margins if the loop is unstable.
-    """
-    if not modes(A, period).is_stable:
-        return [NO_MARGIN] * len(holds)
-    loop = _Loop(A, holds, period)
-    return [_margin(loop, partial(_of_drive, i)) for i in range(len(holds))]
-
-
-def common_disc_margin(A: np.ndarray, holds: np.ndarray, period: float) -> DiscMargin:
-    """Return a disc margin for all drives at once, each with an error of its own.
-
-    The structured singular value is bounded by scaling the drives, so that the loop bears at
-    least what is returned.
-
-    Args:
-        A: Map of one sampling interval, shape (n, n).
-        holds: Index of each drive's held command, shape (N,).
-        period: Sampling time [s].
-
-    Returns:
-        No margin if the loop is unstable.
-    """
-    if not modes(A, period).is_stable:
-        return NO_MARGIN
-    return _margin(_Loop(A, holds, period), _scaled_norm)
-
-
-class _Loop:
+class BrokenLoop:
     """``S - T`` of a loop broken at its holds.
 
     With the Schur form ``A = Q R Q^H`` every frequency takes a triangular system only.
 
+    Args:
+        A: Map of one sampling interval, shape (n, n).
+        holds: Index of each drive's held command, shape (N,).
+        period: Sampling time [s].
+
     Attributes:
+        num_drives: N.
+        is_stable: Whether nothing grows.
         frequencies: A grid, and all resonances [rad/s].
-        values: ``S - T`` there, shape (frequencies, N, N).
     """
 
     def __init__(self, A: np.ndarray, holds: np.ndarray, period: float) -> None:
+        self.num_drives, self.is_stable = len(holds), modes(A, period).is_stable
         R, Q = scipy.linalg.schur(A, output="complex")
         self._period, self._eigenvalues, self._negative = period, np.diag(R).copy(), -R
         self._into, self._out = Q.conj().T @ A[:, holds], Q[holds]
@@ -111,11 +82,15 @@ class _Loop:
         grid = np.geomspace(min(_SLOWEST, 0.01 * nyquist), nyquist, _POINTS)
         resonances = angles[(angles > grid[0]) & (angles < nyquist)]
         self.frequencies = np.unique(np.concatenate([grid, resonances]))
-        self.values = self(self.frequencies)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """``S - T`` at all ``frequencies``, shape (frequencies, N, N)."""
+        return self(self.frequencies)
 
     def __call__(self, frequencies: np.ndarray) -> np.ndarray:
         """Return ``S - T`` at frequencies [rad/s], shape (frequencies, N, N)."""
-        N, resolvent = len(self._out), self._negative.copy()
+        N, resolvent = self.num_drives, self._negative.copy()
         answers = np.empty((len(frequencies), N, N), dtype=complex)
         for answer, z in zip(answers, np.exp(1j * frequencies * self._period), strict=True):
             np.fill_diagonal(resolvent, z - self._eigenvalues)
@@ -124,7 +99,36 @@ class _Loop:
         return np.eye(N) + 2.0 * answers
 
 
-def _margin(loop: _Loop, size: Callable[[np.ndarray], np.ndarray]) -> DiscMargin:
+def disc_margins(loop: BrokenLoop) -> list[DiscMargin]:
+    """Return the disc margin of every drive, the others being as they are.
+
+    Args:
+        loop: The loop, N drives.
+
+    Returns:
+        No margins if the loop is unstable.
+    """
+    if not loop.is_stable:
+        return [NO_MARGIN] * loop.num_drives
+    return [_margin(loop, partial(_of_drive, i)) for i in range(loop.num_drives)]
+
+
+def common_disc_margin(loop: BrokenLoop) -> DiscMargin:
+    """Return a disc margin for all drives at once, each with an error of its own.
+
+    The structured singular value is bounded by scaling the drives, so that the loop bears at
+    least what is returned.
+
+    Args:
+        loop: The loop.
+
+    Returns:
+        No margin if the loop is unstable.
+    """
+    return _margin(loop, _scaled_norm) if loop.is_stable else NO_MARGIN
+
+
+def _margin(loop: BrokenLoop, size: Callable[[np.ndarray], np.ndarray]) -> DiscMargin:
     grid, sizes = loop.frequencies, size(loop.values)
     for _ in range(_REFINEMENTS):
         peak = int(np.argmax(sizes))

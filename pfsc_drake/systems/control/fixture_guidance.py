@@ -10,7 +10,6 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     EventStatus,
-    InputPort,
     LeafSystem,
     State,
 )
@@ -22,6 +21,7 @@ from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.control.fixtures.vectors import Vector
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
+from pfsc_drake.systems.optional_input import value_or_none
 
 _STILL = (0.0, 0.0, 0.0)
 
@@ -180,14 +180,15 @@ class FixtureGuidance(LeafSystem):
             return
         if memory is None:
             memory = self._guidance.start((motion[0], motion[1], motion[2]))
-        (asked,) = _value(self._damping, context) or (-1.0,)
+        asked = value_or_none(self._damping, context)
+        damping = asked.item() if asked is not None and asked.item() >= 0.0 else None
         step = self._guidance.step(
             memory,
             motion[:3],
             motion[3:],
             force if ready else _STILL,
-            _value(self._active, context),
-            asked if asked >= 0.0 else None,
+            self._switches(context),
+            damping,
         )
         output.set_value((step, motion))
 
@@ -208,7 +209,12 @@ class FixtureGuidance(LeafSystem):
     def _calc_record(self, context: Context, output: BasicVector) -> None:
         step, _ = self._step.Eval(context)
         force = self._known(context).force
-        output.SetFromVector(self.layout.row(step, force, _value(self._active, context)))
+        output.SetFromVector(self.layout.row(step, force, self._switches(context)))
+
+    def _switches(self, context: Context) -> list[float] | None:
+        """Return which regions are switched on, None for all of them."""
+        active = value_or_none(self._active, context)
+        return None if active is None else active.tolist()
 
     def _initialize(self, context: Context, state: State) -> EventStatus:
         state.get_mutable_abstract_state(0).set_value(_Kept())
@@ -224,11 +230,3 @@ class FixtureGuidance(LeafSystem):
             before.ready or bool(self._ready.Eval(context)[0] > 0.5),
         )
         state.get_mutable_abstract_state(0).set_value(_Kept(context.get_time(), before, after))
-
-
-def _value(port: InputPort, context: Context) -> list[float] | None:
-    """Return the value of an optional port, or None if there is none."""
-    if not port.HasValue(context):
-        return None
-    values: list[float] = port.Eval(context).tolist()
-    return values

@@ -20,6 +20,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+from pfsc_drake.systems.optional_input import value_or_none
 
 # attributes of an enumeration are looked up slowly, and numpy's numbers compared slowly with them
 _LOST, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
@@ -197,8 +198,8 @@ class FollowingController(LeafSystem):
             self._reference.Eval(context),
             memory[self._integral],
             memory[self._held] if known else None,
-            _value(self._tau_ext, context),
-            _value(self._friction, context),
+            value_or_none(self._tau_ext, context),
+            value_or_none(self._friction, context),
             memory[self._output_before],
             None if self._posture is None else self._posture.Eval(context),
         )
@@ -289,10 +290,3 @@ class FollowingController(LeafSystem):
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error
-
-
-def _value(port: InputPort | None, context: Context) -> np.ndarray | None:
-    """Return the value of an optional port, or None if there is none."""
-    if port is None or not port.HasValue(context):
-        return None
-    return port.Eval(context)

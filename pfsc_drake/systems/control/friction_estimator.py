@@ -4,6 +4,7 @@ from pydrake.systems.framework import BasicVector, Context
 
 from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter
 from pfsc_drake.systems.control.estimator_system import EstimatorSystem
+from pfsc_drake.systems.optional_input import value_or_none
 
 
 class FrictionEstimator(EstimatorSystem):
@@ -35,7 +36,7 @@ class FrictionEstimator(EstimatorSystem):
         )
 
     def _calc_estimate(self, context: Context, output: BasicVector) -> None:
-        velocity = self._velocity.Eval(context) if self._velocity.HasValue(context) else None
+        velocity = value_or_none(self._velocity, context)
         memory = context.get_discrete_state_vector().value()
         output.SetFromVector(
             self._kalman.estimate(memory, self._joint_state.Eval(context), velocity)

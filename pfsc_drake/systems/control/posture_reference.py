@@ -4,6 +4,7 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from pfsc_drake.control.compliance.yielding_posture import YieldingPosture
+from pfsc_drake.systems.optional_input import value_or_none
 
 
 class PostureReference(LeafSystem):
@@ -55,12 +56,11 @@ class PostureReference(LeafSystem):
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        torque = self._tau_ext.Eval(context) if self._tau_ext.HasValue(context) else None
         after = self._law.update(
             context.get_discrete_state(self._motion).value(),
             self._joint_state.Eval(context)[: self._n],
             self._point.Eval(context),
-            torque,
+            value_or_none(self._tau_ext, context),
             context.get_discrete_state(self._goal).value(),
         )
         state.set_value(self._motion, after)

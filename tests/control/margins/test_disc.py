@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import place_poles
 
-from pfsc_drake.control.margins.disc import NO_MARGIN, common_disc_margin, disc_margins
+from pfsc_drake.control.margins.disc import NO_MARGIN, BrokenLoop, common_disc_margin, disc_margins
 
 T = 1e-3
 
@@ -26,7 +26,7 @@ def two_drives(rng):
 def test_an_integrator_bears_what_its_nyquist_curve_says():
     gain = 0.4
     # T(z) = gain / (z - 1 + gain), |S - T| largest at z = -1: (2 + gain) / (2 - gain)
-    margin = disc_margins(first_order(gain), np.array([1]), T)[0]
+    margin = disc_margins(BrokenLoop(first_order(gain), np.array([1]), T))[0]
     np.testing.assert_allclose(margin.alpha, 2.0 * (2.0 - gain) / (2.0 + gain), rtol=1e-9)
     np.testing.assert_allclose(margin.frequency, np.pi / T)
     # the loop is stable for gains below 2
@@ -34,7 +34,7 @@ def test_an_integrator_bears_what_its_nyquist_curve_says():
 
 
 def test_phase_margin_is_that_of_the_disc():
-    margin = disc_margins(first_order(0.4), np.array([1]), T)[0]
+    margin = disc_margins(BrokenLoop(first_order(0.4), np.array([1]), T))[0]
     low, high = margin.gain
     np.testing.assert_allclose(low * high, 1.0)
     # the disc's edge leaves the unit circle at this angle
@@ -44,7 +44,7 @@ def test_phase_margin_is_that_of_the_disc():
 
 
 def test_a_loop_without_feedback_bears_any_gain():
-    margin = disc_margins(first_order(0.0, a=0.5), np.array([1]), T)[0]
+    margin = disc_margins(BrokenLoop(first_order(0.0, a=0.5), np.array([1]), T))[0]
     np.testing.assert_allclose(margin.alpha, 2.0)
     assert margin.gain == (0.0, np.inf)
 
@@ -53,7 +53,7 @@ def test_a_loop_without_feedback_bears_any_gain():
 def test_the_margin_is_the_smallest_disc_that_makes_the_loop_unstable(seed):
     A, B, K, closed = two_drives(np.random.default_rng(seed))
     assert np.max(np.abs(np.linalg.eigvals(closed))) < 1.0
-    for drive, margin in enumerate(disc_margins(closed, np.array([4, 5]), T)):
+    for drive, margin in enumerate(disc_margins(BrokenLoop(closed, np.array([4, 5]), T))):
         # the disc of factors f = (1 + d/2) / (1 - d/2), |d| <= alpha
         angles = np.linspace(0.0, 2.0 * np.pi, 721)
         worst = {}
@@ -75,8 +75,10 @@ def test_all_drives_at_once_bear_the_common_margin(seed):
     A, B, K, closed = two_drives(rng)
     holds = np.array([4, 5])
     assert np.max(np.abs(np.linalg.eigvals(closed))) < 1.0
-    common = common_disc_margin(closed, holds, T)
-    assert common.alpha <= min(m.alpha for m in disc_margins(closed, holds, T)) * (1.0 + 1e-6)
+    common = common_disc_margin(BrokenLoop(closed, holds, T))
+    assert common.alpha <= min(m.alpha for m in disc_margins(BrokenLoop(closed, holds, T))) * (
+        1.0 + 1e-6
+    )
     for _ in range(2000):
         d = 0.999 * common.alpha * np.exp(2j * np.pi * rng.random(2))
         F = np.diag((1.0 + d / 2.0) / (1.0 - d / 2.0))
@@ -88,13 +90,13 @@ def test_units_of_the_drives_do_not_matter_to_the_common_margin():
     holds, scale = np.array([4, 5]), np.array([1.0, 1.0, 1.0, 1.0, 1e3, 1e-2])
     scaled = scale[:, None] * closed / scale
     np.testing.assert_allclose(
-        common_disc_margin(scaled, holds, T).alpha,
-        common_disc_margin(closed, holds, T).alpha,
+        common_disc_margin(BrokenLoop(scaled, holds, T)).alpha,
+        common_disc_margin(BrokenLoop(closed, holds, T)).alpha,
         rtol=1e-3,
     )
 
 
 def test_an_unstable_loop_has_no_margin():
     unstable = first_order(-0.4)
-    assert disc_margins(unstable, np.array([1]), T) == [NO_MARGIN]
-    assert common_disc_margin(unstable, np.array([1]), T) == NO_MARGIN
+    assert disc_margins(BrokenLoop(unstable, np.array([1]), T)) == [NO_MARGIN]
+    assert common_disc_margin(BrokenLoop(unstable, np.array([1]), T)) == NO_MARGIN

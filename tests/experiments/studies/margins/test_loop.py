@@ -13,7 +13,7 @@ from experiments.studies.margins.loop import StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.margins.delay import delay_margin, delayed
-from pfsc_drake.control.margins.disc import disc_margins
+from pfsc_drake.control.margins.disc import BrokenLoop, disc_margins
 from pfsc_drake.control.margins.modes import modes
 from pfsc_drake.yaml.typed import load_typed
 
@@ -160,7 +160,7 @@ def test_the_delay_margin_is_what_the_station_bears(three):
 
 def test_gains_within_the_disc_margin_are_borne_and_others_need_not_be(three):
     loop, _, linear = three
-    margins = disc_margins(linear.A, linear.holds, loop.map.period)
+    margins = disc_margins(BrokenLoop(linear.A, linear.holds, loop.map.period))
     drive = int(np.argmin([margin.alpha for margin in margins]))
     for factor in (0.98 * margins[drive].gain[1], 1.02 * margins[drive].gain[0]):
         scale = np.ones(3)
