@@ -26,6 +26,7 @@ from experiments.results.mounting_metrics import mounting_metrics
 from experiments.results.path_metrics import path_following_metrics
 from experiments.results.posture_metrics import posture_metrics
 from experiments.results.press_metrics import press_metrics
+from experiments.results.promises import broken_promises, set_promises
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
@@ -55,6 +56,7 @@ class RunOutcome:
         interrupted: Whether the user stopped it.
         problem: Which results could not be written, why, and where they are instead; or None.
         margins: What the loop bears at the start, in one line; None if nobody asked.
+        broken: What was promised and not kept, one phrase each.
     """
 
     fault: str | None
@@ -64,6 +66,7 @@ class RunOutcome:
     interrupted: bool = False
     problem: str | None = None
     margins: str | None = None
+    broken: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class _Measured:
         metrics: Metrics with their targets.
         warnings: What may not have gone as well as hoped, one sentence each.
         fault: Why the run was stopped, or None.
+        broken: What was promised and not kept, one phrase each.
         end: When it ended [s].
     """
 
@@ -103,6 +107,7 @@ class _Measured:
     metrics: Metrics
     warnings: list[str]
     fault: str | None
+    broken: list[str]
     end: float
 
 
@@ -143,6 +148,7 @@ def write_outcome(
         interrupted(),
         report.problem,
         None if run.analysis is None else one_line(run.analysis),
+        measured.broken,
     )
 
 
@@ -204,13 +210,12 @@ def _measure(
     metrics.add("controller_tick_us_p99", float(p99), "us")
     if analysis is not None:
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
-    for metric, target in settings.targets.get(settings.controller.law, {}).items():
-        # what another choice of the controller would tell has been checked, and is no metric here
-        if metric in metrics:
-            metrics.set_target(metric, target.bound, target.source)
+    set_promises(metrics, settings)
+    whole = end > prepared.length - 1.5 * settings.controller.sampling_time
     results.write("metrics.json", metrics.to_json())
     warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
-    return _Measured(log, motion, metrics, warnings, result.fault, end)
+    broken = broken_promises(metrics, whole=whole)
+    return _Measured(log, motion, metrics, warnings, result.fault, broken, end)
 
 
 def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
@@ -255,6 +260,7 @@ def _report(
         log_attributes=measured.log.attributes,
         recording=_link(recording, results.path),
         fault=measured.fault,
+        broken=measured.broken,
         interrupted=interrupted,
         diagram_svg=block_diagram_svg(prepared.station.diagram) if pictures else None,
     )

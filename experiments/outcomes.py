@@ -1,6 +1,6 @@
 """What a command says when it has ended, and the exit status that belongs to it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,13 +36,20 @@ def judge_run(outcome: "RunOutcome", out: Path, time: float) -> int:
         status, ends = INTERRUPTED, [f"interrupted at t = {time:.3f} s"]
     if outcome.fault is not None:
         status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {time:.3f} s"]
+    if outcome.broken:
+        status, ends = status or FAULT, [*ends, _missed(outcome.broken)]
     if outcome.problem is not None:
         status, ends = NOT_WRITTEN, [*ends, f"error: {outcome.problem}"]
     elif ends:
-        ends = [f"{ends[0]}, everything logged so far is kept in {out}"]
+        ends[-1] += f", everything logged so far is kept in {out}"
     if ends:
         print_error("; ".join(ends), after_echo=outcome.interrupted)
     return status
+
+
+def _missed(broken: Sequence[str]) -> str:
+    """What was promised and not kept, as part of a line."""
+    return f"missed: {'; '.join(broken)}"
 
 
 def print_live(console: Console, outcome: "LiveOutcome") -> None:
@@ -64,11 +71,15 @@ def judge_live(outcome: "LiveOutcome") -> int:
         status, ends = INTERRUPTED, [f"interrupted at t = {outcome.time:.3f} s"]
     if outcome.fault is not None:
         status, ends = FAULT, [f"fault: {outcome.fault}; stopped at t = {outcome.time:.3f} s"]
+    for kept in outcome.kept:
+        if kept.outcome.broken:
+            status = status or FAULT
+            ends = [*ends, f"{kept.folder.name} {_missed(kept.outcome.broken)}"]
     problems = [kept.outcome.problem for kept in outcome.kept if kept.outcome.problem is not None]
     if problems:
         status, ends = NOT_WRITTEN, [*ends, *(f"error: {problem}" for problem in problems)]
     elif ends and outcome.kept:
-        ends = [f"{ends[0]}, everything logged so far is kept in {outcome.kept[-1].folder}"]
+        ends[-1] += f", everything logged so far is kept in {outcome.kept[-1].folder}"
     if ends:
         print_error("; ".join(ends), after_echo=outcome.interrupted)
     return status

@@ -35,6 +35,7 @@ class PreparedRun:
         integration: How its plant is integrated.
         drawing: What its robot looks like, if that had to be read.
         warnings: What may not go as well as hoped, one sentence each.
+        length: How long the scenario itself is [s]; a run may be shorter.
     """
 
     settings: Scenario
@@ -43,6 +44,7 @@ class PreparedRun:
     integration: Integration
     drawing: RobotDrawing | None
     warnings: list[str]
+    length: float
 
 
 def prepare(
@@ -73,7 +75,8 @@ def prepare(
         station = _build(settings, folder, progress)
         check_targets(settings, station)
         settings.name = settings.name or scenario.name
-        settings.duration = duration or settings.duration or station.reference_duration
+        length = settings.duration or station.reference_duration
+        settings.duration = duration or length
         check_length(settings, station)
         if recording:
             check_frames(settings.duration, settings.simulation.frame_period)
@@ -83,7 +86,7 @@ def prepare(
     _resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
     text = yaml_dump_typed(settings)
-    return PreparedRun(settings, text, station, integration, drawing, warnings)
+    return PreparedRun(settings, text, station, integration, drawing, warnings, length)
 
 
 def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:

@@ -73,6 +73,7 @@ def report_page(
     log_attributes: Mapping[str, str],
     recording: str | None = None,
     fault: str | None = None,
+    broken: Sequence[str] = (),
     interrupted: bool = False,
     warnings: Sequence[str] = (),
     diagram_svg: str | None = None,
@@ -93,6 +94,7 @@ def report_page(
         log_attributes: What identifies the run, see :mod:`reporting.provenance`.
         recording: Path of the Meshcat page, relative to this one.
         fault: Why the run was stopped; None if it completed.
+        broken: What was promised and not kept, one phrase each.
         interrupted: Whether the user stopped it.
         warnings: What may not have gone as well as hoped, one sentence each.
         diagram_svg: The block diagram as SVG text.
@@ -106,8 +108,11 @@ def report_page(
         kind=escape(kind),
         title=escape(title),
         description=escape(description.strip()),
-        badges=_badges(metrics, fault, interrupted),
-        fault=f'<div class="fault">{escape(fault)}</div>' if fault else "",
+        badges=_badges(metrics, fault, interrupted, broken),
+        fault="".join(
+            f'<div class="fault">{escape(end)}</div>'
+            for end in ([fault] if fault else []) + [f"Missed: {phrase}" for phrase in broken]
+        ),
         warnings="".join(f'<div class="warning">{escape(warning)}</div>' for warning in warnings),
         cards=_cards(metrics, cards),
         recording=_recording(recording),
@@ -128,9 +133,11 @@ def _section(heading: str, content: str) -> str:
     return f"<section>\n<h2>{heading}</h2>\n{content}\n</section>" if content else ""
 
 
-def _badges(metrics: Metrics, fault: str | None, interrupted: bool) -> str:
+def _badges(metrics: Metrics, fault: str | None, interrupted: bool, broken: Sequence[str]) -> str:
     """How the run ended, and how many targets were met."""
     kind, end = ("bad", "✗ interrupted") if interrupted else ("good", "✓ completed")
+    if broken and not interrupted:
+        kind, end = "bad", "✗ ended, with promises broken"
     if fault:
         kind, end = "bad", "✗ stopped by fault"
     status = f'<span class="badge {kind}">{end}</span>'

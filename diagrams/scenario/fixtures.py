@@ -25,6 +25,8 @@ class FixtureParameters:
             of ``servo.bandwidth``.
         smoothing: Time constant [s] of each of the r - 1 lags that make the reference smooth
             enough for laws that give torques.
+        bound: How deep the tool may be in a hard region [m]; a run in which it was deeper says so
+            and ends with status 3.
         looks: Most distances that are computed at a tick beside those of regions that are near;
             0 for as many as are due.
     """
@@ -37,6 +39,7 @@ class FixtureParameters:
     start_inside: str = "refuse"
     servo_lag: float = -1.0
     smoothing: float = 0.003
+    bound: float = 0.5e-3
     looks: int = 0
 
     @property
@@ -52,4 +55,5 @@ class FixtureParameters:
         require(kind != "normal", "orientation.kind", kind, "none, given")
         require(self.servo_lag < 0.1, "servo_lag", self.servo_lag, "below 0.1 s")
         require_between("smoothing", self.smoothing, 1e-3, 0.1, "s")
+        require_between("bound", self.bound, 1e-6, 0.1, "m")
         require_not_negative("looks", self.looks)

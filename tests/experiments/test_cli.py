@@ -27,6 +27,7 @@ class Outcome:
     interrupted: bool = False
     problem: str | None = None
     margins: str | None = None
+    broken: list[str] = field(default_factory=list)
 
 
 class FakeRun:
@@ -127,6 +128,15 @@ def test_interrupt(fake_run, scenario, capsys):
     fake_run.raises = KeyboardInterrupt()
     assert main(["run", str(scenario)]) == 130
     assert error_line(capsys) == "interrupted\n"
+
+
+def test_a_broken_promise_is_the_last_word(fake_run, scenario, capsys):
+    fake_run.outcome.broken = ["deepest_violation = 65 mm, target <= 500 µm"]
+    assert main(["run", str(scenario)]) == 3
+    assert error_line(capsys).startswith("missed: deepest_violation = 65 mm, target <= 500 µm, ")
+    fake_run.outcome.fault = "singular"
+    assert main(["run", str(scenario)]) == 3
+    assert "; missed: deepest_violation = 65 mm" in error_line(capsys)
 
 
 def test_interrupted_run_that_is_kept(fake_run, scenario, tmp_path, capsys):

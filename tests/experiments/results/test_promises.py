@@ -1,0 +1,69 @@
+"""What was promised and not kept: in the page's words, the last line and the status."""
+
+import math
+
+import pytest
+
+from diagrams.scenario import Scenario, Target
+from diagrams.scenario.fixtures import FixtureParameters
+from experiments.cli import main
+from experiments.results.promises import broken_promises, set_promises
+from reporting.metrics import Metrics
+
+
+def metrics(**values):
+    made = Metrics()
+    for name, value in values.items():
+        made.add(name, value, "m")
+    return made
+
+
+def test_a_scenario_may_promise_more_than_every_run_does():
+    scenario = Scenario(fixtures=FixtureParameters(bound=1e-3))
+    found = metrics(deepest_violation=0.3e-3)
+    set_promises(found, scenario)
+    assert found["deepest_violation"].passed
+    law = scenario.controller.law
+    scenario.targets = {law: {"deepest_violation": Target("< 0.2e-3", "stricter")}}
+    set_promises(found, scenario)
+    assert found["deepest_violation"].passed is False
+
+
+def test_a_run_cut_short_is_judged_by_what_holds_at_every_instant():
+    found = metrics(deepest_violation=1.3e-3, max_path_deviation=2e-3, settling_time=math.nan)
+    found.set_target("deepest_violation", "<= 0.5e-3")
+    found.set_target("max_path_deviation", "< 1e-3")
+    found.set_target("settling_time", "< 1")
+    assert [phrase.split()[0] for phrase in broken_promises(found, whole=False)] == [
+        "deepest_violation"
+    ]
+    whole = broken_promises(found, whole=True)
+    assert len(whole) == 3
+    assert "settling_time has no value, target < 1" in whole[2]
+
+
+@pytest.mark.parametrize(
+    ("bound", "duration", "status"),
+    [("< 1e-3", [], 0), ("< 1e-12", [], 3), ("< 1e-12", ["--duration", "0.2"], 0)],
+)
+def test_the_last_line_and_the_status_tell(tmp_path, capfd, bound, duration, status):
+    changes = [
+        f"targets.elastic.max_path_deviation={{bound: '{bound}'}}",
+        "reference={points: [0.96, 0.97], dwell: 0.1}",
+        "start.offset=[0, 0]",
+        "settling_tolerance=1e-2",
+    ]
+    overrides = [word for change in changes for word in ("--set", change)]
+    out = tmp_path / "out"
+    bare = ["--no-figures", "--no-recording", *duration]
+    assert main(["run", "pfc_elastic_3r", "--out", str(out), *bare, *overrides]) == status
+    last = capfd.readouterr().err
+    page = (out / "report.html").read_text(encoding="utf-8")
+    if status == 0:
+        assert last == ""
+        assert "promises broken" not in page
+    else:
+        assert last.startswith("missed: max_path_deviation = ")
+        assert f"everything logged so far is kept in {out}" in last
+        assert last.count("\n") == 1
+        assert "promises broken" in page
