@@ -5,14 +5,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from diagrams.builder import build_station, draw_station
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.integration import Integration
-from diagrams.scenario import Intersection, OnSurface, Scenario, Waypoints
+from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
@@ -20,6 +17,8 @@ from experiments.length import check_frames, check_length
 from experiments.results.targets import check_targets
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.dumping import dump_typed
+from pfsc_drake.yaml.files import resolve_files
 from pfsc_drake.yaml.typed import load_typed
 from reporting.progress import ProgressListener
 
@@ -83,9 +82,9 @@ def prepare(
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
         drawing = draw_station(settings, folder, station) if recording else None
-    _resolve_files(settings, folder)
+    resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
-    text = yaml_dump_typed(settings)
+    text = dump_typed(settings)
     return PreparedRun(settings, text, station, integration, drawing, warnings, length)
 
 
@@ -121,29 +120,3 @@ def naming(path: Path) -> Iterator[None]:
     except OSError as error:  # of a file that the scenario names
         name = shortened(str(error.filename), 100)
         raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
-
-
-def _resolve_files(settings: Scenario, folder: Path) -> None:
-    """Make file names independent of the scenario's folder, so that the copy runs too."""
-    if settings.friction.file and Path(settings.friction.file).suffix:
-        settings.friction.file = str((folder / settings.friction.file).resolve())
-    if Path(settings.robot.rotor_coupling).suffix:
-        settings.robot.rotor_coupling = str((folder / settings.robot.rotor_coupling).resolve())
-    for name, package in settings.robot.packages.items():
-        settings.robot.packages[name] = str((folder / package).resolve())
-    shape = settings.path.shape
-    if isinstance(shape, Waypoints) or (isinstance(shape, OnSurface) and shape.file):
-        shape.file = str((folder / shape.file).resolve())
-    if settings.operator and settings.operator.inputs:
-        settings.operator.inputs = str((folder / settings.operator.inputs).resolve())
-    described: list[object] = [settings.surface.shape] if settings.surface else []
-    if settings.fixtures:
-        described += [region.shape for region in settings.fixtures.regions]
-    if isinstance(shape, Intersection):
-        described += shape.surfaces
-    for surface in described:
-        if isinstance(surface, Fitted | Revolved | Extruded):
-            surface.file = str((folder / surface.file).resolve())
-    for block in (settings.robot, settings.controller):
-        if Path(block.model).suffix and not block.model.startswith("package://"):
-            block.model = str((folder / block.model).resolve())

@@ -8,6 +8,7 @@ from diagrams.scenario.checks import require, require_not_negative, require_posi
 from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from diagrams.scenario.posture import PostureParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.yaml.files import NAME_OR_FILE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 MANIFOLDS = ("path", "trajectory", "surface", "space")
@@ -165,7 +166,7 @@ class ControllerParameters:
     effort_scale: float = 1.0
     manifold: str = "path"
     external_torque: ExternalTorqueParameters = dc.field(default_factory=ExternalTorqueParameters)
-    model: str = ""
+    model: str = dc.field(default="", metadata=NAME_OR_FILE)
     friction: FrictionCompensationParameters = dc.field(
         default_factory=FrictionCompensationParameters
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative, require_positive
 from pfsc_drake.physics.friction import FrictionDrift
+from pfsc_drake.yaml.files import NAME_OR_FILE
 
 _SHORTEST_PERIOD = 1e-6  # s
 _LARGEST = 1e9  # of friction; what it multiplies stays within a float
@@ -83,7 +84,7 @@ class JointFrictionParameters:
 
     f_c: list[float] = dc.field(default_factory=list)
     f_v: list[float] = dc.field(default_factory=list)
-    file: str = ""
+    file: str = dc.field(default="", metadata=NAME_OR_FILE)
     drift: FrictionDrift | None = None
 
     def __post_init__(self) -> None:

@@ -4,6 +4,7 @@ import dataclasses as dc
 
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.yaml.files import FILE
 
 
 @dc.dataclass
@@ -17,6 +18,6 @@ class OperatorParameters:
         tuning: How the impedance follows what the person sets.
     """
 
-    inputs: str = ""
+    inputs: str = dc.field(default="", metadata=FILE)
     hand: LiveHandParameters = dc.field(default_factory=LiveHandParameters)
     tuning: TuningParameters = dc.field(default_factory=TuningParameters)

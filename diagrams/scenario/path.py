@@ -10,6 +10,7 @@ from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
 from diagrams.scenario.surface import SurfaceShape
 from pfsc_drake.geometry.rotation import rotation_to_axis
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
+from pfsc_drake.yaml.files import FILE
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 TASKS = ("full", "tool_axis", "none")
@@ -97,7 +98,7 @@ class Waypoints:
             zero for none.
     """
 
-    file: str = ""
+    file: str = dc.field(default="", metadata=FILE)
     closed: bool = False
     parametrization: str = "chord"
     smoothness: int = 0
@@ -142,7 +143,7 @@ class OnSurface:
     """
 
     thetas: list[list[float]] = dc.field(default_factory=list)
-    file: str = ""
+    file: str = dc.field(default="", metadata=FILE)
     max_distance: float = 1e-3
     closed: bool = False
 

@@ -204,7 +204,7 @@ def encloses(shape: RegionShape) -> bool:
         return shape.closed
     if isinstance(shape, Fitted):
         return all(shape.closed)
-    return type(shape) is not Plane
+    return not isinstance(shape, Plane)
 
 
 def _require_direction(key: str, values: list[float]) -> None:

@@ -14,6 +14,7 @@ from diagrams.scenario.checks import (
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
+from pfsc_drake.yaml.files import FILE, NAME_OR_FILE
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 _FARTHEST = 1e6  # m
@@ -99,16 +100,16 @@ class RobotParameters:
             laws neglect; empty for the simplified model (2.65).
     """
 
-    model: str = "comau_racer_1_4"
+    model: str = dc.field(default="comau_racer_1_4", metadata=NAME_OR_FILE)
     tool_frame: str = "tool_point"
     base: str = ""
     base_pose: PoseParameters = dc.field(default_factory=PoseParameters)
     gravity: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, -9.81])
     fixed_joints: dict[str, float] = dc.field(default_factory=dict)
-    packages: dict[str, str] = dc.field(default_factory=dict)
+    packages: dict[str, str] = dc.field(default_factory=dict, metadata=FILE)
     elastic: ElasticParameters = dc.field(default_factory=ElasticParameters)
     joint_damping: list[float] = dc.field(default_factory=list)
-    rotor_coupling: str = ""
+    rotor_coupling: str = dc.field(default="", metadata=NAME_OR_FILE)
 
     def __post_init__(self) -> None:
         require_numbers("gravity", self.gravity, 3)

@@ -7,6 +7,7 @@ import numpy as np
 from diagrams.scenario.checks import require, require_numbers, require_positive
 from diagrams.scenario.surface_shapes import Placed, Turned
 from pfsc_drake.geometry.size import FARTHEST
+from pfsc_drake.yaml.files import FILE
 
 _UNITS = ("m", "cm", "mm", "inch")
 _BASES = ("auto", "plane", "cylinder")
@@ -49,7 +50,7 @@ class Fitted(Placed):
         trim: Whether to take the largest part that has no larger hole, instead of refusing.
     """
 
-    file: str = ""
+    file: str = dc.field(default="", metadata=FILE)
     unit: str = "m"
     grid: list[int] = dc.field(default_factory=list)
     closed: list[bool] = dc.field(default_factory=lambda: [False, False])
@@ -114,7 +115,7 @@ class Revolved(Turned):
         smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
     """
 
-    file: str = ""
+    file: str = dc.field(default="", metadata=FILE)
     closed: bool = False
     smoothness: int = 0
 
@@ -136,7 +137,7 @@ class Extruded(Placed):
         smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
     """
 
-    file: str = ""
+    file: str = dc.field(default="", metadata=FILE)
     direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
     length: float = 0.2
     closed: bool = False

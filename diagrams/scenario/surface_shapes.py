@@ -48,8 +48,8 @@ class Turned(Placed):
 
 
 @dc.dataclass
-class Plane(Placed):
-    """A rectangle; theta_1 and theta_2 are its coordinates [m], its third axis the normal.
+class OverRectangle(Placed):
+    """A surface over a rectangle; theta_1 and theta_2 are its coordinates [m].
 
     Attributes:
         first: First and last theta_1 [m].
@@ -66,7 +66,12 @@ class Plane(Placed):
 
 
 @dc.dataclass
-class Paraboloid(Plane):
+class Plane(OverRectangle):
+    """A rectangle; its third axis is the normal."""
+
+
+@dc.dataclass
+class Paraboloid(OverRectangle):
     """A paraboloid of revolution (4.53), (4.54) about its third axis, as a graph.
 
     Attributes:

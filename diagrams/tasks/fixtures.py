@@ -25,8 +25,8 @@ from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.shapes import plane
 from pfsc_drake.geometry.surfaces.surface import Surface
 
-# class C^k that a surface needs to be drawn
-_DRAWN = 1
+# class C^k of a surface that is drawn, the least there is
+_DRAWN = 2
 # m, around the start, within which the speed of what turns counts
 _WORKSPACE = 2.0
 

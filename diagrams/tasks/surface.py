@@ -84,11 +84,11 @@ def surface_from_shape(
 
 def _from_numbers(shape: NumberShape) -> Surface:
     rotation = rotation_from_axes(shape.axis, shape.start)
-    if isinstance(shape, Plane):
+    if isinstance(shape, Plane | Paraboloid):
         size = (_pair(shape.first), _pair(shape.second))
-        if isinstance(shape, Paraboloid):
-            return paraboloid(size, shape.coefficient, shape.origin, rotation)
-        return plane(size, shape.origin, rotation)
+        if isinstance(shape, Plane):
+            return plane(size, shape.origin, rotation)
+        return paraboloid(size, shape.coefficient, shape.origin, rotation)
     angles = _pair(np.deg2rad(shape.angles_deg)) if shape.angles_deg else None
     turned = Turned(shape.origin, rotation, angles, shape.inward)
     if isinstance(shape, Cylinder):

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.surroundings.operator import Operator
 from diagrams.surroundings.operator_file import controls_text
@@ -14,6 +13,7 @@ from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
 from pfsc_drake.errors import InputError
+from pfsc_drake.yaml.dumping import dump_typed
 from reporting.folder import check_folder, open_results
 from reporting.progress import ProgressListener
 
@@ -111,7 +111,7 @@ class TakeFolders:
         settings = dataclasses.replace(prepared.settings, duration=float(result.root.get_time()))
         assert settings.operator is not None
         settings.operator = dataclasses.replace(settings.operator, inputs=INPUTS)
-        taken = dataclasses.replace(prepared, settings=settings, text=yaml_dump_typed(settings))
+        taken = dataclasses.replace(prepared, settings=settings, text=dump_typed(settings))
         run = FinishedRun(taken, name, result, attributes=attributes)
         with open_results(folder, "run", self._inputs) as results:
             results.write("scenario.yaml", taken.text)

@@ -4,13 +4,13 @@ import copy
 from typing import Any
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.controller import LawGains
 from experiments.teaching.options import TeachingOptions
 from experiments.teaching.taught import Taught, keeps_orientation
-from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml, parse_yaml
+from pfsc_drake.yaml.dumping import typed_data
+from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml
 
 CSV_NAME, YAML_NAME = "taught.csv", "follow.yaml"
 TRANSITION, DWELL = 0.3, 0.5  # s
@@ -40,7 +40,7 @@ def follow_scenario(taught: Taught, options: TeachingOptions) -> dict[str, Any]:
         options: How it fits, and how fast it is followed.
     """
     settings = taught.settings
-    given, default = _data(settings), _data(Scenario())
+    given, default = typed_data(settings), typed_data(Scenario())
     blocks = {key: _pruned(given[key], default[key]) for key in _KEPT if key in given}
     blocks["robot"] |= {key: given["robot"][key] for key in ("model", "tool_frame")}
     controller = blocks["controller"] | {"gains": _gains(settings), "manifold": "path"}
@@ -76,11 +76,6 @@ def follow_text(taught: Taught, options: TeachingOptions) -> str:
     return dump_yaml(follow_scenario(taught, options))
 
 
-def _data(settings: Scenario) -> dict[str, Any]:
-    data: dict[str, Any] = parse_yaml(yaml_dump_typed(settings), "scenario")
-    return data
-
-
 def _pruned(given: Any, default: Any) -> Any:
     """Return what is not as it is anyway."""
     if not (isinstance(given, dict) and isinstance(default, dict)):
@@ -96,9 +91,7 @@ def _pruned(given: Any, default: Any) -> Any:
 
 def _gains(settings: Scenario) -> dict[str, Any]:
     law = settings.controller.law
-    default = parse_yaml(yaml_dump_typed(LawGains()), "gains")
-    given = _data(settings)["controller"]["gains"][law]
-    gains = _pruned(given, default)
+    gains = _pruned(typed_data(settings.controller.gains[law]), typed_data(LawGains()))
     if "xi" not in gains:
         gains["xi"] = copy.deepcopy(gains["eta"])
     return {law: gains}

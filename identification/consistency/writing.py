@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.robots.model import locate_model
 from identification.consistency.check import require_consistent
@@ -17,6 +16,7 @@ from identification.output import make_folder, write_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.robot.models.writer import write_sdf
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.typed import load_file
 
 PARAMETERS_FILE = "parameters.yaml"
@@ -69,13 +69,13 @@ def write_model(subject: Subject, parameters: np.ndarray, folder: str | Path) ->
     make_folder(folder)
     file = folder / PARAMETERS_FILE
     if subject.delta is not None:
-        write_text(file, _commented(yaml_dump_typed(identified_delta(subject, parameters))))
+        write_text(file, _commented(dump_typed(identified_delta(subject, parameters))))
         return WrittenModel(file, [], None)
     if subject.parameters is None:
         return _write_own(subject, parameters, folder)
     robot = identified_robot(subject, parameters)
     urdf = folder / f"{robot.name}.urdf"
-    write_text(file, _commented(yaml_dump_typed(robot)))
+    write_text(file, _commented(dump_typed(robot)))
     appearance, models = _appearance(subject), []
     for variant in robot.variants:
         models.append(folder / f"{variant.name}.sdf")

@@ -39,8 +39,15 @@ def _represent_mapping(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.No
     return dumper.represent_mapping(tag, content)
 
 
+def _represent_list(dumper: yaml.SafeDumper, data: list[Any]) -> yaml.Node:
+    """Puts scalars into one line."""
+    flow = not any(isinstance(item, (dict, list)) for item in data)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flow)
+
+
 _Loader.add_multi_constructor("", _construct_tagged)
 _Dumper.add_representer(dict, _represent_mapping)
+_Dumper.add_representer(list, _represent_list)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

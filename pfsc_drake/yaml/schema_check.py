@@ -111,6 +111,7 @@ class _Checker:
     def _check_union(self, members: tuple[Any, ...], value: Any, key: str) -> None:
         """Checks an optional value, a choice of scalars, or of dataclasses by tag."""
         choices = [member for member in members if member is not type(None)]
+        _require_no_subclasses(choices)
         if value is None:
             if len(choices) == len(members):
                 self._refuse(value, key, " or ".join(_alternatives(members)))
@@ -195,6 +196,18 @@ def _range(schema: Any, value: Any) -> str:
     if schema is float and beyond:
         return f" of magnitude up to {_MAX_NUMBER:.2g}"
     return f" of magnitude up to {_MAX_INTEGER}" if schema is int and beyond else ""
+
+
+def _require_no_subclasses(choices: list[Any]) -> None:
+    """Raises NotImplementedError at a member of a union that is a subclass of another one.
+
+    Drake takes an instance of a subclass for one of its base: where the default is of the subclass
+    a value with the tag of the base becomes one of the subclass.
+    """
+    kinds = [choice for choice in choices if dataclasses.is_dataclass(choice)]
+    for kind in kinds:
+        if any(base in kind.__mro__[1:] for base in kinds):
+            raise NotImplementedError(f"{kind.__name__} is a subclass of what it stands beside")
 
 
 def _is_required(field: "dataclasses.Field[Any]") -> bool:

@@ -37,7 +37,8 @@ def load_typed(schema_class: type[Schema], data: dict[str, Any], source: str) ->
     """Loads data into a schema of mutable dataclasses.
 
     Fields may be bool, int, float, str, Path, numpy array, list, ``dict[str, T]``, Optional, nested
-    dataclasses and unions of dataclasses (chosen by a YAML tag, the first member without one).
+    dataclasses and unions of dataclasses (chosen by a YAML tag, the first member without one; none
+    a subclass of another).
     ``__post_init__`` runs once on the defaults and again on the loaded values, innermost first;
     there it checks what types cannot express by raising InputError.
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from hypothesis import strategies as st
-from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import read_scenario
-from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
+from pfsc_drake.yaml.dumping import typed_data
+from pfsc_drake.yaml.reading import TAG_KEY
 from pfsc_drake.yaml.typed import load_typed
 
 Place = tuple[str | int, ...]
@@ -36,7 +36,7 @@ def full_scenario(name: str, *overrides: str) -> dict[str, Any]:
     """Return a shipped scenario with all keys of its schema, defaults included."""
     file = read_scenario(name, list(overrides))
     settings = load_typed(Scenario, file.data, name)
-    return parse_yaml(yaml_dump_typed(settings), name)
+    return typed_data(settings)
 
 
 def places(data: Any, here: Place = ()) -> Iterator[Place]:

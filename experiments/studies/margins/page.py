@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.preparation import naming
@@ -12,6 +10,7 @@ from experiments.studies.margins.analysis import MarginAnalysis, analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.picture import draw_margins
 from experiments.studies.margins.words import margins_json, metrics_of, sentences
+from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import check_folder, open_results
 from reporting.page import Report, report_page, write_report
@@ -58,7 +57,7 @@ def write_margins(
             kind="Sampled loop",
             title=f"Margins of {scenario.name}",
             description=" ".join(sentences(analysis)),
-            scenario_yaml_text=yaml_dump_typed(settings),
+            scenario_yaml_text=dump_typed(settings),
             metrics=metrics_of(analysis),
             figures=figures,
             log_attributes=standard_attributes(scenario.name),
