@@ -204,9 +204,9 @@ def _require_no_subclasses(choices: list[Any]) -> None:
     Drake takes an instance of a subclass for one of its base: where the default is of the subclass
     a value with the tag of the base becomes one of the subclass.
     """
-    kinds = [choice for choice in choices if dataclasses.is_dataclass(choice)]
+    kinds = [kind for kind in choices if isinstance(kind, type) and dataclasses.is_dataclass(kind)]
     for kind in kinds:
-        if any(base in kind.__mro__[1:] for base in kinds):
+        if any(base is not kind and issubclass(kind, base) for base in kinds):
             raise NotImplementedError(f"{kind.__name__} is a subclass of what it stands beside")
 
 

@@ -156,6 +156,9 @@ def test_in_space_a_person_changes_the_damping_and_switches_regions(tmp_path):
     sliders = {slider["name"] for slider in rehearsal.status.controls["sliders"]}
     assert "along d [Ns/m]" in sliders
     assert not any(" k [" in name for name in sliders)
+    again = tmp_path / "again"
+    assert main(["run", str(folder / "scenario.yaml"), "--out", str(again), *BARE]) == 0
+    assert_same(log, datasets(again)[0])
 
 
 def test_a_fault_stops_time_and_a_reset_goes_on(tmp_path):
