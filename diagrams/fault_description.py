@@ -10,7 +10,7 @@ from diagrams.wording import coordinate_text, listed, posture_text
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.manifold import Kind, PlaceManifold, indices
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.singularity_name import singularity_name
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture
@@ -101,6 +101,7 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.SINGULAR: _singular,
         Fault.MEASUREMENT_IMPLAUSIBLE: _implausible,
         Fault.JOINT_LIMIT: _joint_limit,
+        Fault.JOINT_SPEED: _joint_speed,
         Fault.DRIVE_SATURATED: _saturated,
         Fault.ORIENTATION_ERROR: _turned_away,
     }
@@ -149,6 +150,16 @@ def _joint_limit(scene: FaultScene) -> str:
     limit = limits[i, int(q[i] > limits[i].mean())]
     text = coordinate_text(float(limit), revolute=bool(robot.gather("is_revolute")[i]))
     return f"joint {i + 1} '{robot.names[i]}' is at its limit of {text} {_place(scene)}"
+
+
+def _joint_speed(scene: FaultScene) -> str:
+    robot, n = scene.robot, scene.robot.dimension
+    v_J, v_M = (scene.now.measured_state[k * n : (k + 1) * n] for k in (1, 3))
+    speed, limits = np.fmax(np.abs(v_J), np.abs(v_M)), largest_speeds(robot)
+    i = int(np.nanargmax(speed / limits))
+    revolute = bool(robot.gather("is_revolute")[i])
+    found, limit = (coordinate_text(float(x[i]), revolute=revolute) for x in (speed, limits))
+    return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}"
 
 
 def _saturated(scene: FaultScene) -> str:

@@ -42,4 +42,5 @@ def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
         filter_time=encoders.filter_time + late,
         joint_limits=faults.joint_limits,
         saturation_time=faults.saturation_time,
+        overspeed=faults.overspeed,
     )

@@ -19,7 +19,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.can_fail import FailingSystem
+from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 

@@ -36,6 +36,8 @@ class FaultParameters:
             they are not believed [rad or m], see
             :class:`~pfsc_drake.control.law.supervision.Supervision`; 0 to believe everything.
         joint_limits: Whether a joint at its limit is a fault.
+        overspeed: Share of its largest speed by which a joint may be faster until it is a fault;
+            ``.inf`` if no speed is.
         saturation_time: How long a drive may be at its limit [s]; 0 for ever.
         hold_bandwidth: Of the position hold after a fault [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
@@ -44,6 +46,7 @@ class FaultParameters:
 
     plausibility: float = 2e-3
     joint_limits: bool = True
+    overspeed: float = 0.1
     saturation_time: float = 0.0
     hold_bandwidth: float = 60.0
     effort_share: float = 0.7
@@ -51,6 +54,7 @@ class FaultParameters:
 
     def __post_init__(self) -> None:
         require_not_negative("plausibility", self.plausibility)
+        require(self.overspeed >= 0.0, "overspeed", self.overspeed, "zero or a positive number")
         require_not_negative("saturation_time", self.saturation_time)
         require_positive("hold_bandwidth", self.hold_bandwidth)
         good = 0.0 < self.effort_share <= 1.0

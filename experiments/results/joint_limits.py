@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagrams.wording import coordinate_text
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from reporting.metrics import Metrics
 
 # relative; a limit that is missed by rounding is not passed
@@ -44,13 +44,11 @@ class JointLimits:
         Args:
             robot: The robot.
         """
-        speed = robot.gather("velocity_limit")
         return cls(
             list(robot.names),
             robot.gather("is_revolute"),
             robot.gather("position_limits"),
-            # zero is what models say that know none
-            np.where(speed > 0.0, speed, np.inf),
+            largest_speeds(robot),
         )
 
     def metric_names(self) -> list[str]:

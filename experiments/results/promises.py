@@ -36,8 +36,8 @@ def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
 
     Args:
         metrics: With their targets. One without a value has missed its target.
-        whole: Whether the run lasted as long as its scenario. Of others only those promises count
-            that hold at every instant.
+        whole: Whether the run lasted as long as its scenario, without a fault. Of others only
+            those promises count that hold at every instant.
     """
     return [
         _phrase(name, metric)

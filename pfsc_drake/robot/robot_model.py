@@ -69,6 +69,20 @@ class RobotModel(Protocol):
         """Return ``D_E(q)`` without rotors, shape (N, N)."""
 
 
+def largest_speeds(robot: RobotModel) -> np.ndarray:
+    """Return the largest speeds of joints [rad/s or m/s], infinite where none is known.
+
+    Args:
+        robot: The robot, N joints.
+
+    Returns:
+        Shape (N,).
+    """
+    speed = robot.gather("velocity_limit")
+    # zero is what models say that know none
+    return np.where(speed > 0.0, speed, np.inf)
+
+
 def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
     """Return the torques that hold the links against gravity, ``g_L(q)`` of (2.65a).
 

@@ -124,3 +124,18 @@ def test_motion_ends_where_the_state_is_unknown(settings, run, time, frames):
     assert motion.positions.shape == (frames, 6)
     assert motion.tool_pose.shape == (frames, 12)
     assert np.isfinite(motion.positions).all()
+
+
+@pytest.mark.parametrize("duration", [0.401, 0.4005])
+def test_between_two_ticks_a_controller_finds_nothing_new(settings, run, duration):
+    """There the last tick is less than a period ago: positions moved by less than they should."""
+    settings.controller.sampling_time = 2e-3
+    settings.reference.dwell, settings.start.offset = 0.05, [0.0, 0.0]
+    settings.faults.plausibility = 5e-4
+    station, result, log, _ = run(duration, integrator="runge_kutta3")
+    assert np.abs(log["v_J"].values[-1]).max() > 0.5
+    assert result.fault is None
+    assert not log["fault"].values.any()
+    assert not station.controller.suspects(
+        station.controller.GetMyContextFromRoot(result.root)
+    ).any()

@@ -17,7 +17,7 @@ from experiments.simulation import configure
 from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.margins.modes import in_loop
-from pfsc_drake.systems.control.can_fail import FailingSystem
+from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.physics.bus_delay import BusDelay
 
 # accurate enough for eigenvalues while no mode turns by more than 1 rad per step; RK3 would damp

@@ -19,6 +19,7 @@ class Fault(enum.IntEnum):
     FORCE_SENSOR_SATURATED = 10
     COMPLIANCE_INVALID = 11
     BUS_LOST = 12
+    JOINT_SPEED = 13
 
     @property
     def explanation(self) -> str:
@@ -40,4 +41,5 @@ _EXPLANATIONS = {
     Fault.FORCE_SENSOR_SATURATED: "the force/torque sensor is at the end of its range",
     Fault.COMPLIANCE_INVALID: "force, impedance or reference of the compliance is not valid",
     Fault.BUS_LOST: "no reference has come over the bus for too long",
+    Fault.JOINT_SPEED: "a joint is faster than its limit",
 }

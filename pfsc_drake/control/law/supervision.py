@@ -1,4 +1,4 @@
-"""What contradicts itself in a measurement of joints, and joints at their limits."""
+"""What contradicts itself in a measurement of joints, and joints at or beyond their limits."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ import numpy as np
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 
 # 1/s, by which differences of what is compared are forgotten
 _FORGETTING = 20.0
@@ -31,6 +31,8 @@ class SupervisionParameters:
             joint makes in that time at its fastest.
         joint_limits: Whether a joint at its limit is a fault.
         saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+        overspeed: Share of its largest speed by which a joint may be faster; infinite if no speed
+            is a fault.
     """
 
     tolerance: float = 2e-3
@@ -38,16 +40,19 @@ class SupervisionParameters:
     filter_time: float = 0.0
     joint_limits: bool = True
     saturation_time: float = 0.0
+    overspeed: float = 0.1
 
     def __post_init__(self) -> None:
         for key in ("tolerance", "filter_time", "saturation_time"):
             value = getattr(self, key)
             if not 0.0 <= value < np.inf:
                 raise InputError(f"{key} = {value}; must be zero or a positive number")
+        if not self.overspeed >= 0.0:
+            raise InputError(f"overspeed = {self.overspeed}; must be zero or a positive number")
 
 
 class Supervision:
-    """Finds measured values of joints that contradict each other, and joints at their limits.
+    """Finds measured values of joints that contradict each other, and joints beyond their limits.
 
     Of every joint four signals tell the same motion: positions and integrated velocities of
     link and motor. From tick to tick each adds to a leaky sum (by 20 1/s), so that offsets
@@ -64,6 +69,9 @@ class Supervision:
     as position and integrated velocity part by the tolerance: a jump of a position in the same
     tick, of a velocity by ``dv`` after ``tolerance / dv``. What cannot be found: a value that
     is frozen at rest, as long as the joint rests; drifts slower than tolerance times 20 1/s.
+
+    A joint is too fast if link or motor is, by its velocity as by the way since the last tick: one
+    of the two alone may be a sensor's error, which the comparison above finds.
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -114,8 +122,8 @@ class Supervision:
     ) -> np.ndarray:
         """Return ``[fault, suspects, next memory]``, shape (1 + 12N,), an array that is reused.
 
-        The fault is MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT or NONE; suspects, shape (4N,), are 1
-        where a component of the state is not to be believed.
+        The fault is MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT, JOINT_SPEED or NONE; suspects, shape
+        (4N,), are 1 where a component of the state is not to be believed.
 
         Args:
             state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -203,11 +211,14 @@ def _supervision_function(
     suspect *= ca.vertcat(*used)
     lower, upper = robot.gather("position_limits").T
     at_limit = ca.sum1((now[0] <= lower) + (now[0] >= upper)) if parameters.joint_limits else 0
-    fault = ca.if_else(
-        ca.sum1(suspect) > 0,
-        Fault.MEASUREMENT_IMPLAUSIBLE,
-        ca.if_else(at_limit > 0, Fault.JOINT_LIMIT, Fault.NONE),
+    # a difference of positions is as coarse as they are
+    fastest = largest_speeds(robot) * (1.0 + parameters.overspeed) + 2.0 * resolution / period
+    speeds = [ca.fmin(ca.fabs(steps[side]) / period, ca.fabs(now[side + 1])) for side in (0, 2)]
+    too_fast = ca.sum1((speeds[0] > fastest) + (speeds[1] > fastest))
+    beyond = ca.if_else(
+        at_limit > 0, Fault.JOINT_LIMIT, ca.if_else(too_fast > 0, Fault.JOINT_SPEED, Fault.NONE)
     )
+    fault = ca.if_else(ca.sum1(suspect) > 0, Fault.MEASUREMENT_IMPLAUSIBLE, beyond)
     decay = np.exp(-_FORGETTING * period)
     result = ca.vertcat(fault, suspect, *[decay * way for way in ways], unchanged)
     return ca.Function(

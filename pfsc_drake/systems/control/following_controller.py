@@ -20,6 +20,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+from pfsc_drake.systems.can_fail import is_tick
 from pfsc_drake.systems.optional_input import value_or_none
 
 # attributes of an enumeration are looked up slowly, and numpy's numbers compared slowly with them
@@ -168,8 +169,10 @@ class FollowingController(LeafSystem):
         )
 
     def fault(self, context: Context) -> Fault:
-        """Return the fault that holds at the present instant."""
-        return Fault(int(self._output.Eval(context)[self.layout.status][0]))
+        """See :class:`FailingSystem`."""
+        if is_tick(context, self.period):
+            return Fault(int(self._output.Eval(context)[self._status]))
+        return Fault(int(context.get_discrete_state_vector().value()[self._fault]))
 
     def set_last_state(self, context: Context, joint_state: np.ndarray) -> None:
         """Let a state be that of the last tick, before which nothing has been compared.
@@ -186,6 +189,8 @@ class FollowingController(LeafSystem):
         """Return which measured values are not believed, nonzero if so, shape (4N,)."""
         memory = context.get_discrete_state_vector().value()
         latched = self._safe_stop.suspects(memory[self._stop])
+        if not is_tick(context, self.period):
+            return latched
         return np.maximum(latched, self._suspects(self._output.Eval(context)))
 
     def _calc_evaluation(self, context: Context, output: BasicVector) -> None:

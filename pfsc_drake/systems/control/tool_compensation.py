@@ -18,6 +18,7 @@ from pfsc_drake.control.estimation.low_pass import LowPass
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.can_fail import is_tick
 
 # parts of the output
 _WRENCH, _TARED, _FAULT, _RESIDUAL, _NEXT = slice(0, 6), 6, 7, slice(8, 14), slice(14, None)
@@ -90,7 +91,7 @@ class ToolCompensation(LeafSystem):
         period: float,
     ) -> None:
         super().__init__()
-        n = robot.dimension
+        n, self._period = robot.dimension, period
         samples = max(1, round(parameters.taring_time / period))
         self._taring = Taring(samples, parameters.taring_spread, parameters.taring_bias)
         function = compensation_function(
@@ -136,11 +137,14 @@ class ToolCompensation(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
     def fault(self, context: Context) -> Fault:
-        """Return the fault that holds at the present instant.
+        """See :class:`FailingSystem`.
 
         A sensor at the end of its range is none until it is tared, since nobody uses it.
         """
-        tared, fault = self._output.Eval(context)[_TARED : _FAULT + 1]
+        if is_tick(context, self._period):
+            tared, fault = self._output.Eval(context)[_TARED : _FAULT + 1]
+        else:
+            tared, fault = context.get_discrete_state_vector().value()[[_TARED, _FAULT]]
         if fault == SensorFault.SATURATED:
             return Fault.FORCE_SENSOR_SATURATED if tared else Fault.NONE
         return Fault.FORCE_SENSOR_LOST if fault else Fault.NONE

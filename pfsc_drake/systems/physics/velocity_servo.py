@@ -13,6 +13,7 @@ from pfsc_drake.control.law.supervision import Supervision, SupervisionParameter
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.systems.can_fail import is_tick
 
 
 class VelocityServo(LeafSystem):
@@ -112,12 +113,18 @@ class VelocityServo(LeafSystem):
         return self._law.limits
 
     def fault(self, context: Context) -> Fault:
-        """Return the fault that holds at the present instant."""
-        return Fault(int(self._step.Eval(context)[self._size :][self._fault][0]))
+        """See :class:`FailingSystem`."""
+        return Fault(int(self._latched(context)[self._fault][0]))
 
     def suspects(self, context: Context) -> np.ndarray:
         """Return which measured values are not believed, nonzero if so, shape (4N,)."""
-        return self._safe_stop.suspects(self._step.Eval(context)[self._size :][self._stop])
+        return self._safe_stop.suspects(self._latched(context)[self._stop])
+
+    def _latched(self, context: Context) -> np.ndarray:
+        """Return the memory with what is found at the present instant, if it is a tick."""
+        if is_tick(context, self._law.gains.period):
+            return self._step.Eval(context)[self._size :]
+        return context.get_discrete_state_vector().value()
 
     def _calc_step(self, context: Context, output: BasicVector) -> None:
         n = self._size

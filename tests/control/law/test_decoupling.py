@@ -165,6 +165,19 @@ def test_damping_bounds_the_solution_and_tells_what_is_missed(spare):
             assert not np.linalg.norm(undamped.x) < 1e6
 
 
+@pytest.mark.parametrize("size", [0.2, 1.0, 30.0])
+def test_damping_is_least_squares_with_a_weight_that_follows_the_matrix(size):
+    """``min |A x - rhs|^2 + lambda^2 |x|^2`` as one system, whatever the matrix's units."""
+    A = size * np.array([[1.0, 0.4, 0.0], [0.9, 0.41, 0.01], [0.0, 0.3, 1.0]])
+    rhs, c_0 = size * np.array([0.3, -0.2, 0.5]), 0.2
+    solution = DecouplingInverse(1e-6, c_0).solve(A, rhs)
+    assert 0.0 < solution.rcond < c_0
+    weight = np.sqrt((c_0**2 - solution.rcond**2) * np.sum(A**2))
+    stacked = np.vstack([A, weight * np.eye(3)])
+    expected = np.linalg.lstsq(stacked, np.concatenate([rhs, np.zeros(3)]), rcond=None)[0]
+    np.testing.assert_allclose(solution.x, expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("spare", [True, False])
 def test_damping_sets_in_continuously(spare):
     n, wish = (7, Spare(np.zeros(7))) if spare else (6, None)

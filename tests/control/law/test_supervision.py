@@ -36,13 +36,13 @@ def motion(chain):
     return np.hstack([q, v, q_M, v_M])
 
 
-def watch(chain, states, **options):
+def watch(chain, states, ignored=None, **options):
     """Return the first tick with a fault, the fault, and the suspects by name."""
     limits = chain.gather("effort_limit")
     supervision = Supervision(chain, limits, SupervisionParameters(**options), PERIOD)
     memory, last = np.zeros(supervision.size), states[0]
     for k, state in enumerate(states):
-        result = supervision.evaluate(state, last, memory, float(k > 0))
+        result = supervision.evaluate(state, last, memory, float(k > 0), ignored)
         if result[0]:
             found = np.flatnonzero(supervision.suspects(result))
             return k, Fault(int(result[0])), [f"{NAMES[i // N]}_{i % N + 1}" for i in found]
@@ -100,6 +100,47 @@ def test_coarse_and_late_measurements_are_believed(chain):
     assert watch(chain, late, resolution=np.array([step]), filter_time=time) is None
 
 
+def test_coarse_encoders_are_believed(chain):
+    """Positions in steps of 4 mrad beside exact velocities part by more than the tolerance."""
+    coarse, step = motion(chain), 4e-3
+    for side in (slice(0, N), slice(2 * N, 3 * N)):
+        coarse[:, side] = step * np.round(coarse[:, side] / step)
+    assert watch(chain, coarse) is not None
+    assert watch(chain, coarse, resolution=np.array([step])) is None
+
+
+def test_what_is_ignored_is_not_suspected_again(chain):
+    """The link side of joint 3 is frozen; its position is not listened to any more."""
+    if np.isinf(chain.K_s).all():
+        pytest.skip("of rigid joints one side is the other")
+    states = motion(chain)
+    states[BEGIN:, [2, N + 2]] = states[BEGIN, 2], 0.0
+    assert watch(chain, states)[2] == ["q_J_3", "v_J_3"]
+    ignored = np.eye(4 * N)[2]
+    assert watch(chain, states, ignored=ignored)[2] == ["v_J_3"]
+
+
+@pytest.mark.parametrize("too_fast", [1.09, 1.11])
+def test_a_joint_beyond_its_largest_speed(chain, too_fast):
+    """Joint 2 turns steadily, faster than it may by 9 or by 11 percent."""
+    speed = too_fast * chain.gather("velocity_limit")[1]
+    states = np.zeros((100, 4 * N))
+    for side in (0, 2 * N):
+        states[:, side + 1], states[:, side + N + 1] = speed * PERIOD * np.arange(100), speed
+    found = watch(chain, states, joint_limits=False)
+    assert found == (None if too_fast < 1.1 else (1, Fault.JOINT_SPEED, []))
+    assert watch(chain, states, joint_limits=False, overspeed=np.inf) is None
+    assert watch(chain, states, joint_limits=False, overspeed=0.0)[1] is Fault.JOINT_SPEED
+
+
+def test_a_velocity_that_jumps_beyond_the_limit_is_a_sensor_to_blame(chain):
+    """Only the sensor says so; the positions tell that the joint is slower."""
+    states = motion(chain)
+    states[BEGIN:, N + 1] += 1.2 * chain.gather("velocity_limit")[1]
+    _, fault, suspects = watch(chain, states)
+    assert (fault, suspects) == (Fault.MEASUREMENT_IMPLAUSIBLE, ["v_J_2"])
+
+
 def test_values_that_are_no_numbers_are_for_others_to_find(chain):
     states = motion(chain)
     states[BEGIN:, 7] = np.nan
@@ -122,5 +163,7 @@ def test_joint_limits(chain, side):
 def test_wrong_parameters_are_refused(chain):
     with pytest.raises(InputError, match="tolerance = -1"):
         SupervisionParameters(tolerance=-1.0)
+    with pytest.raises(InputError, match="overspeed = nan"):
+        SupervisionParameters(overspeed=np.nan)
     with pytest.raises(InputError, match=r"resolution.*3 joints"):
         watch(chain, motion(chain), resolution=np.ones(2))

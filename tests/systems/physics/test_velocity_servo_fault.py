@@ -12,7 +12,7 @@ from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.can_fail import FailingSystem
+from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
 
 POSTURE = np.deg2rad([0.0, 96.0, -32.3, 0.0, 71.4, -5.7])
