@@ -116,6 +116,7 @@ def test_singularity_on_the_way(fault, tmp_path):
         "controller.min_rcond=0.02",
         "start.offset=[0, 0]",
         "faults.joint_limits=false",
+        "faults.overspeed=.inf",
         duration="1.5",
     )
     last_good = np.flatnonzero(log["fault"] == "none")[-1]
@@ -209,6 +210,7 @@ def test_a_tool_that_is_turned_away(fault):
         "friction={}",
         "controller.friction={}",
         "faults.joint_limits=false",
+        "faults.overspeed=.inf",
         "forces=[{begin: 0.1, end: 3.0, ramp: 0.05, torque: [400, 0, 0]}]",
         name="pfc_compliant_6r",
     )
