@@ -6,6 +6,7 @@ import numpy as np
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.gains import sampled_robot
 from diagrams.tasks.posture import warn_unused
+from diagrams.tasks.untold_forces import untold_forces
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.compliance.observed_inertia import (
     bearable_inertia_error,
@@ -59,7 +60,7 @@ def law_warnings(
         # where the law does not suit the robot, gains are not to blame
         *(causes or _fragile_gains(parameters, robot, law, rest)),
         *_fast_servo(scenario, robot, link_state),
-        *_unknown_forces(scenario, robot),
+        *untold_forces(scenario, robot, law, rest),
         *_observed_forces(scenario, robot, law, rest),
         *_friction_behind_servos(parameters),
         *warn_unused(parameters, law),
@@ -234,22 +235,3 @@ def _least(profile: Profile | SlowEnds) -> float:
 
 def _most(profile: Profile) -> float:
     return max(profile.values, default=profile.value)
-
-
-def _unknown_forces(scenario: Scenario, robot: RobotModel) -> list[str]:
-    parameters = scenario.controller
-    on_links = bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces)
-    scripted = any(not pulse.link for pulse in scenario.forces) or scenario.hold_back.force != 0.0
-    on_tool = scripted or scenario.hand is not None
-    exact = parameters.law in ("elastic", "visco_elastic") and robot.is_elastic
-    source = parameters.external_torque.source
-    unknown = {"none": on_tool or on_links, "measured": on_links}.get(source, False)
-    if not (exact and unknown):
-        return []
-    # the sensor in the flange does not see what acts on links
-    where, better = ("links", "observed") if on_links else ("the tool", "measured")
-    return [
-        f"forces act on {where} that the law '{parameters.law}' does not know of; it takes them "
-        "for deflections of the joints and may leave the path: choose "
-        f"controller.external_torque.source '{better}' or 'known'"
-    ]

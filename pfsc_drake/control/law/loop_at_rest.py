@@ -46,7 +46,7 @@ class RestPosture:
 class LoopAtRest:
     """A law on a robot at rest, with any gains and any factor on masses and stiffnesses.
 
-    For laws that command torques. External torques are left out.
+    For laws that command torques, and are told of no external ones.
 
     Args:
         robot: The robot, as the law believes it.
@@ -156,11 +156,34 @@ class LoopAtRest:
         Returns:
             Shape (k, k); the last N variables are the held drive inputs.
         """
+        interval, answer, _ = self._parts(gains, mass, stiffness)
+        return np.asarray(answer @ interval)
+
+    def pushed(self, gains: LoopGains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what external torques do that the law is not told of.
+
+        Args:
+            gains: Of all coordinates, and of the posture if there is one.
+
+        Returns:
+            ``A``, ``B``, ``C`` of ``x_{k+1} = A x_k + B tau_ext``, ``q_J = C x_k``, the torques
+            [Nm or N] being held over an interval, and ``q_J`` the links' way from rest [rad or m].
+        """
+        interval, answer, pushed = self._parts(gains, 1.0, 1.0)
+        links = np.zeros((self._n, len(interval)))
+        links[:, : self._n] = np.eye(self._n)  # _plant counts the links first
+        return answer @ interval, answer @ pushed, links
+
+    def _parts(
+        self, gains: LoopGains, mass: float, stiffness: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what an interval does, how the law answers then, and what torques do meanwhile."""
         n, period = self._n, self._period
-        F, B, C = self._plant(mass, stiffness)
+        F, B, B_ext, C = self._plant(mass, stiffness)
         size = len(F)
-        exponential = expm(np.block([[F, B], [np.zeros((n, size + n))]]) * period)
-        Phi, Gamma = exponential[:size, :size], exponential[:size, size:]
+        inputs = np.hstack([B, B_ext])
+        exponential = expm(np.block([[F, inputs], [np.zeros((2 * n, size + 2 * n))]]) * period)
+        Phi, Gamma, Gamma_ext = np.split(exponential[:size], [size, size + n], axis=1)
         error = self._Y[:, 0].T @ C
         v = -np.einsum("km,ikm->mi", gains.outputs.proportional, self._Y) @ C
         held = self._per_output @ v + self._drift @ C
@@ -170,16 +193,23 @@ class LoopAtRest:
         summed = -self._per_output * gains.outputs.integral
         # variables: motion, held part of the last tick, summed error, drive input
         m = len(error)
-        motion, last, sums = np.split(np.eye(size + n + m + n)[:-n], [size, size + n])
-        motion[:, -n:] = 0.0
-        motion = Phi @ motion
-        motion[:, -n:] = Gamma
+        count = size + n + m + n
+        interval, pushed = np.eye(count), np.zeros((count, n))
+        interval[:size, :size], interval[:size, -n:], pushed[:size] = Phi, Gamma, Gamma_ext
+        motion, last, sums, _ = np.split(np.eye(count), [size, size + n, size + n + m])
         now_held = held @ motion + summed @ sums
         told = drive @ motion + summed @ sums + self._lead * (now_held - last)
-        return np.vstack([motion, now_held, sums + period * error @ motion, told])
+        return interval, np.vstack([motion, now_held, sums + period * error @ motion, told]), pushed
 
-    def _plant(self, mass: float, stiffness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return ``x' = F x + B tau_d``, ``[q_J, v_J, q_M, v_M] = C x`` of the moving robot."""
+    def _plant(
+        self, mass: float, stiffness: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return what the moving robot does.
+
+        Returns:
+            ``F``, ``B``, ``B_ext``, ``C`` of ``x' = F x + B tau_d + B_ext tau_ext`` and
+            ``[q_J, v_J, q_M, v_M] = C x``; the first N of x are the links' coordinates.
+        """
         n, elastic, robot = self._n, self._elastic, self._robot
         soft = np.flatnonzero(elastic)
         # coordinates z: all links, and the motors that are not one with theirs
@@ -196,7 +226,10 @@ class LoopAtRest:
         size = len(M)
         zero, one = np.zeros((size, size)), np.eye(size)
         F = np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
-        B = np.vstack([np.zeros((size, n)), np.linalg.solve(M, motors.T)])
+        B, B_ext = (
+            np.vstack([np.zeros((size, n)), np.linalg.solve(M, driven.T)])
+            for driven in (motors, links)
+        )
         nothing = np.zeros((n, size))
         C = np.vstack(
             [
@@ -209,4 +242,4 @@ class LoopAtRest:
                 )
             ]
         )
-        return F, B, C
+        return F, B, B_ext, C

@@ -1,0 +1,103 @@
+"""Forces that a law is not told of, and how far they will move the tool."""
+
+import numpy as np
+
+from diagrams.scenario import Scenario
+from diagrams.tasks.gains import sampled_robot
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.robust_gains import RobotError
+from pfsc_drake.control.law.untold_force import largest_yield
+from pfsc_drake.robot.robot_model import RobotModel
+
+_DEFLECTIONS = "it takes them for deflections of the joints and may leave the path"
+# m, beside a path or a surface that does not yield
+_LARGEST_WAY = 1e-3
+
+
+def untold_forces(
+    scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+) -> list[str]:
+    """Return what forces will do that a law is not told of, one sentence each.
+
+    Servos of velocities bear them, and an observer of disturbances takes them for friction.
+
+    Args:
+        scenario: The scenario.
+        robot: The robot, as it is believed.
+        law: Its law.
+        rest: The start, and the manifold's point there.
+    """
+    parameters, force = scenario.controller, largest_force(scenario)
+    on_links = bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces)
+    source, exact = parameters.external_torque.source, _is_exact(parameters.law, robot)
+    if exact and on_links and source in ("none", "measured"):
+        # the sensor in the flange does not see what acts on links
+        return [_sentence("links", parameters.law, _DEFLECTIONS, _tell("'observed'"))]
+    friction = parameters.friction
+    observed = friction.source == "observer" and friction.observer == "disturbance"
+    if source != "none" or (observed and not exact) or law.linearization.relative_degree == 1:
+        return []
+    way, bearable = force * _yield(scenario, robot, law, rest), _bearable(scenario)
+    if not way > bearable and not (exact and (force or scenario.hold_back.force)):
+        return []
+    effect = _DEFLECTIONS if exact else "it gives way to them like a spring"
+    if way > 0.0:
+        effect += f", {force:g} N that come at once by up to {1e3 * way:.2g} mm"
+    if scenario.controller.manifold == "space" and way > bearable:
+        effect += f", also into hard regions (fixtures.bound = {1e3 * bearable:g} mm)"
+    advice = _tell("'measured', 'observed'")
+    if law.stabilization.is_free.any():  # a hand leads what it is not told of
+        advice = "choose faster poles or an integral part across"
+    return [_sentence("the tool", parameters.law, effect, advice)]
+
+
+def _sentence(where: str, law: str, effect: str, advice: str) -> str:
+    return f"forces act on {where} that the law '{law}' does not know of; {effect}: {advice}"
+
+
+def _tell(sources: str) -> str:
+    return f"choose controller.external_torque.source {sources} or 'known'"
+
+
+def largest_force(scenario: Scenario) -> float:
+    """Return the largest force that may act on a scenario's tool from outside [N].
+
+    Without what only slows it down.
+
+    Args:
+        scenario: The scenario.
+    """
+    pulses = [pulse for pulse in scenario.forces if not pulse.link]
+    together = [
+        sum(np.linalg.norm(other.force) for other in pulses if other.begin <= t < other.end)
+        for t in (pulse.begin for pulse in pulses)
+    ]
+    force = float(max(together, default=0.0))
+    for person in (scenario.hand, scenario.operator and scenario.operator.hand):
+        force += person.force_limit if person else 0.0
+    return force
+
+
+def _is_exact(law: str, robot: RobotModel) -> bool:
+    """Return whether a law makes of bending joints what accelerates the links."""
+    return law in ("elastic", "visco_elastic") and robot.is_elastic
+
+
+def _yield(scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture) -> float:
+    """Return how far the tool gives way [m/N]; NaN where the loop is unstable."""
+    sampled = sampled_robot(scenario.controller, robot, law.linearization, rest, law.posture)
+    if sampled.rate(law.gains, RobotError()) > 0.0:
+        return np.nan
+    loop, period = sampled.loop, sampled.period
+    return largest_yield(robot, law.linearization, law.gains, loop, rest, period)
+
+
+def _bearable(scenario: Scenario) -> float:
+    """Return how far a tool may give way without a word [m]."""
+    fixtures, across = scenario.fixtures, scenario.compliance.transversal.stiffness
+    if scenario.controller.manifold == "space":
+        hard = fixtures and any(region.stiffness is None for region in fixtures.regions)
+        return fixtures.bound if fixtures and hard else np.inf
+    yields = bool(across.at) or np.isfinite(across.value)
+    return np.inf if yields else _LARGEST_WAY

@@ -1,0 +1,55 @@
+"""What a station says of forces that its law is not told of."""
+
+from pathlib import Path
+
+import pytest
+
+from diagrams.builder import build_station
+from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
+from diagrams.scenario.model_error import ModelErrorParameters
+from diagrams.tasks.untold_forces import largest_force
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.yaml.typed import load_file
+
+SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
+
+
+@pytest.fixture(name="scenario")
+def fixture_scenario():
+    """A hand leads six axes without friction, under a law for torques."""
+    scenario = load_file(Scenario, SCENARIOS / "vf_forbidden_region.yaml")
+    poles = GainParameters(poles=[-60.0, -60.0])
+    scenario.controller.law = "rigid"
+    scenario.controller.gains["rigid"] = LawGains(eta=poles, phi=poles)
+    scenario.friction.file, scenario.model_error = "", ModelErrorParameters()
+    return scenario
+
+
+def said(scenario):
+    return [line for line in build_station(scenario, SCENARIOS).warnings if "forces act" in line]
+
+
+def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
+    (line,) = said(scenario)
+    assert "45 N" in line and "fixtures.bound = 0.5 mm" in line and "'measured'" in line
+    for law, source in (("velocity_servo", "none"), ("rigid", "measured")):
+        scenario.controller.law, scenario.controller.external_torque.source = law, source
+        assert said(scenario) == []
+    scenario.controller.external_torque.source = "none"
+    for region in scenario.fixtures.regions:
+        region.stiffness = 1e4
+    assert said(scenario) == []
+
+
+def test_pulses_that_overlap_add_up_and_those_on_links_do_not_count():
+    scenario = Scenario(
+        forces=[
+            ForcePulse(0.0, 1.0, [3.0, 4.0, 0.0]),
+            ForcePulse(0.5, 2.0, [0.0, 0.0, 7.0]),
+            ForcePulse(1.0, 2.0, [0.0, 2.0, 0.0]),
+            ForcePulse(0.5, 2.0, [0.0, 99.0, 0.0], link="link_2"),
+        ]
+    )
+    assert largest_force(scenario) == pytest.approx(12.0)
+    scenario.hand = HandParameters(force_limit=20.0)
+    assert largest_force(scenario) == pytest.approx(32.0)
