@@ -25,8 +25,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     distance, soft = log["region_distance"].values, soft_regions(log)
     hard = np.setdiff1d(np.arange(distance.shape[1]), soft)
     if hard.size:
-        deepest = max(0.0, float(-np.nanmin(distance[:, hard], initial=np.inf)))
-        metrics.add("deepest_violation", deepest, "m")
+        metrics.add("deepest_violation", deepest_violation(distance[:, hard]), "m")
     if soft.size:
         metrics.add(
             "deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft], initial=np.inf))), "m"
@@ -49,6 +48,25 @@ def guidance_metrics(log: RunLog) -> Metrics:
     metrics.add("distances_per_tick", float(evaluated.mean()), "1", source="mean")
     metrics.add("distances_per_tick_max", float(evaluated.max()), "1")
     return metrics
+
+
+def deepest_violation(distance: FloatArray) -> float:
+    """Return how deep a tool came into regions [m]; 0 for one that stayed out.
+
+    What it was in when it began, or when a region was switched on, is no violation as far as it
+    only gets less from then on.
+
+    Args:
+        distance: From each region, NaN while that is switched off, shape (samples, M) [m].
+    """
+    deepest = 0.0
+    for depth in np.maximum(-distance, 0.0).T:
+        gone = np.isnan(depth)
+        begins = np.flatnonzero(np.diff(gone, prepend=True) & ~gone)
+        for part in np.split(depth, begins)[1:]:
+            part = part[~np.isnan(part)]
+            deepest = max(deepest, float(np.max(part - np.minimum.accumulate(part))))
+    return deepest
 
 
 def guidance_metric_names(station: Station) -> list[str]:

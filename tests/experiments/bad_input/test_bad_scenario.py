@@ -81,6 +81,11 @@ def test_unreadable_scenario(refused, tmp_path, content, parts):
         ("reference.velocity=0", ("velocity", "0", "positive")),
         ("reference.acceleration=-1", ("acceleration", "-1", "positive")),
         ("reference.dwell=-1", ("dwell", "-1", "zero or a positive")),
+        # regions that nothing would keep the tool out of
+        (
+            "fixtures={regions: [{shape: !Plane {}}]}",
+            ("fixtures.regions = 1 given", "none with controller.manifold = path"),
+        ),
         # times
         ("duration=-1", ("duration", "-1", "positive")),
         ("controller.sampling_time=0", ("sampling_time", "0", "positive")),

@@ -1,0 +1,54 @@
+"""Metrics of a tool led within regions, from what a log says of a motion made up here."""
+
+import numpy as np
+import pytest
+
+from experiments.results.guidance_metrics import deepest_violation, guidance_metrics
+from experiments.results.run_log import RunLog
+from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.record import SLOT
+
+NAN = np.nan
+
+
+@pytest.mark.parametrize(
+    ("distances", "deepest"),
+    [
+        ([3, 1, 2], 0),
+        ([3, -1, 2, -2, 1], 2),
+        # it begins in the region and is moved out
+        ([-5, -3, -3, 1], 0),
+        # and comes in again, or goes deeper
+        ([-5, -3, -4, 1, -2], 2),
+        ([-5, -7, -3], 2),
+        # switched on over the tool, off, and on again
+        ([NAN, -4, -3, NAN, -6, -5], 0),
+        ([1, NAN, NAN, -6, -6.5, NAN], 0.5),
+        ([NAN, NAN], 0),
+    ],
+)
+def test_what_a_tool_was_in_before_is_no_violation_as_long_as_it_leaves(distances, deepest):
+    clear = np.full(len(distances), 9.0)
+    both = np.stack([clear, np.array(distances, dtype=float)], axis=1)
+    assert deepest_violation(both) == pytest.approx(deepest)
+
+
+def test_a_soft_region_that_yields_is_not_violated():
+    """The first region is soft, the second its hard core."""
+    ticks = 4
+    log = RunLog(1e-3 * np.arange(ticks))
+    soft, core = [2e-3, -3e-3, -8e-3, -8.5e-3], [12e-3, 7e-3, 2e-3, -0.3e-3]
+    log.add("region_distance", np.array([soft, core]).T, "m")
+    slots = np.zeros((ticks, MOST_NEAR, len(SLOT)))
+    slots[..., SLOT.index("index")] = -1.0
+    slots[1:, 0, SLOT.index("index")] = 0.0
+    slots[1:, 0, SLOT.index("stiffness")] = 3e3
+    slots[2:, 1, SLOT.index("index")] = 1.0
+    log.add("near_regions", slots.reshape(ticks, -1), "")
+    for name, width in (("velocity_command", 3), ("guiding_force", 3), ("tank", 1)):
+        log.add(name, np.zeros((ticks, width)), "")
+    log.add("mode", np.zeros((ticks, 1), dtype=int), "1", ["free"])
+    log.add("region_evaluated", np.ones((ticks, 2), dtype=int), "1")
+    metrics = guidance_metrics(log)
+    assert metrics["deepest_violation"].value == pytest.approx(0.3e-3)
+    assert metrics["deepest_in_soft"].value == pytest.approx(8.5e-3)
