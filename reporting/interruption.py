@@ -36,10 +36,13 @@ def raised_interruption() -> Iterator[None]:
 
 
 @contextmanager
-def noticed_interruption() -> Iterator[Callable[[], bool]]:
+def noticed_interruption(*also: signal.Signals) -> Iterator[Callable[[], bool]]:
     """Gives a function that tells whether Ctrl-C was pressed since the context began.
 
     The first Ctrl-C is only noticed; the next one raises KeyboardInterrupt.
+
+    Args:
+        also: Signals that count as one, such as that of a terminal that closes.
 
     Raises:
         KeyboardInterrupt: If Ctrl-C was pressed before, and a library swallowed the exception.
@@ -58,11 +61,13 @@ def noticed_interruption() -> Iterator[Callable[[], bool]]:
     before = signal.getsignal(signal.SIGINT)
     if isinstance(before, _Raise) and before.has_raised:
         raise KeyboardInterrupt
+    others = {number: signal.signal(number, notice) for number in also}
     signal.signal(signal.SIGINT, notice)
     try:
         yield lambda: noticed
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in ({signal.SIGINT: before} | others).items():
+            signal.signal(number, handler)
 
 
 class _Raise:

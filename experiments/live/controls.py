@@ -29,7 +29,7 @@ class Slider:
 
     Attributes:
         name: Its label.
-        group: What it belongs to: ``pull``, ``keys``, ``hold``, ``switch`` or ``tune``.
+        group: What it belongs to: ``keys``, ``hold``, ``switch`` or ``tune``.
         low: Lowest value.
         high: Highest value.
         step: Between two values.
@@ -44,6 +44,11 @@ class Slider:
     step: float
     value: float
     keys: tuple[str, str] = ("", "")
+
+    def nearest(self, value: float) -> float:
+        """Return the value that it can have next to one that is asked for."""
+        inside = min(max(value, self.low), self.high)
+        return min(self.low + round((inside - self.low) / self.step) * self.step, self.high)
 
 
 @dataclass(frozen=True)

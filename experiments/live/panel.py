@@ -1,32 +1,22 @@
-"""The controls of a live session: in Meshcat's own panel, on the page, on keys and a gamepad."""
+"""The controls of a live session: handles, sliders and buttons, keys and a gamepad."""
 
 import enum
-import math
-import time
-from collections.abc import Callable, Sequence
-from queue import Empty, SimpleQueue
+from collections.abc import Sequence
 
 import numpy as np
-from pydrake.geometry import Meshcat
 
 from diagrams.surroundings.operator import PULL, REGIONS, WISH, idle_controls
 from experiments.live.controls import Slider, TunedParameter
+from experiments.live.pages import Pages
 from pfsc_drake.control.compliance.tuned_impedance import wishes_of
 from pfsc_drake.control.manifolds.manifold import Kind
 
-# how long a key pushes after it was pressed; it repeats while it is held, first after half a second
-_PRESS = 0.6  # s
 _DEAD_ZONE = 0.12  # of a stick
 _FARTHEST = 0.3  # m, of the place to hold at from where the hand took hold
 _FREE_DAMPING = 90.0  # N s/m, where it varies along the manifold: Tab. 4.3
 _AXES = "xyz"
 _KEYS = (("KeyW", "KeyS"), ("KeyA", "KeyD"), ("KeyR", "KeyF"))
-# axes of a gamepad that push along x, y, z: forward, to the left and up; sticks read down and right
-_STICKS = (1, 0, 3)
 _STRENGTH, _GUIDE, _HOLD = "key force [N]", "guide (K, J)", "hold (T, G)"
-
-# from other threads
-Requests = SimpleQueue[tuple[str, float]]
 
 
 class Command(enum.Enum):
@@ -39,60 +29,49 @@ class Command(enum.Enum):
 
 
 class Panel:
-    """Sliders and buttons in Meshcat, read as the controls of an operator.
+    """What the page that leads sets, read as the controls of an operator.
 
-    What is set on the page comes here by a queue, from other threads, and is set in Meshcat: there
-    is one truth, wherever it is looked at.
+    Sliders and switches keep what they were set to. The hand itself is nothing but what the page
+    says at this moment, see :class:`Pages`; whenever that has to let go, a hold opens, too.
 
     Args:
-        meshcat: Where they are shown.
-        requests: What the page asks for: name of a slider and its value, or name of a button and
-            1 while it is pressed, 0 when it is released.
+        pages: Who sets it.
         force_limit: Of the hand [N].
         tuned: What of the impedance can be changed.
         regions: Names of what can be switched on and off.
-        clock: Tells the time [s].
     """
 
     def __init__(
         self,
-        meshcat: Meshcat,
-        requests: Requests,
+        pages: Pages,
         force_limit: float,
         tuned: Sequence[TunedParameter],
         regions: Sequence[str],
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._requests, self._meshcat, self._tuned, self._clock = requests, meshcat, tuned, clock
-        self._force_limit, self._idle = force_limit, idle_controls(regions)
+        self._pages, self._tuned, self._force_limit = pages, tuned, force_limit
+        self._idle = idle_controls(regions)
         across, _ = wishes_of(Kind.TRANSVERSAL)
         self._can_be_free = any(parameter.index == across for parameter in tuned)
         self._pull = [f"pull {axis} [N]" for axis in _AXES]
+        self._stick = [f"stick {axis}" for axis in _AXES]
         self._place = [f"hold d{axis} [m]" for axis in _AXES]
         self._regions = [f"region {name}" for name in regions]
         self._sliders = {slider.name: slider for slider in self._all_sliders()}
+        self._values = {slider.name: slider.value for slider in self._sliders.values()}
         self._pushes = {
             f"push {sign}{axis} ({key[-1]})": (i, 1.0 if sign == "+" else -1.0, key)
             for i, axis in enumerate(_AXES)
             for sign, key in zip("+-", _KEYS[i], strict=True)
         }
-        buttons = {name: key for name, (_, _, key) in self._pushes.items()}
-        self._buttons = buttons | dict(command.value for command in Command)
-        self._clicks = dict.fromkeys(self._buttons, 0)
-        # when a button was pressed last; commands wait here until they are asked for
-        self._pressed, self._commands = dict[str, float](), list[Command]()
+        # commands wait here until they are asked for
+        self._buttons, self._commands = dict(c.value for c in Command), list[Command]()
+        self._hand = dict[str, float]()
         self._held_from: np.ndarray | None = None
-        for slider in self._sliders.values():
-            meshcat.AddSlider(
-                slider.name, slider.low, slider.high, slider.step, slider.value, *slider.keys
-            )
-        for name, key in self._buttons.items():
-            meshcat.AddButton(name, key)
+        pages.expect([*self._pull, *self._stick, *self._pushes], [*self._sliders, *self._buttons])
 
     def _all_sliders(self) -> list[Slider]:
         limit = self._force_limit
-        found = [Slider(name, "pull", -limit, limit, limit / 45.0, 0.0) for name in self._pull]
-        found.append(Slider(_STRENGTH, "keys", 0.0, limit, limit / 45.0, 20.0 * limit / 45.0))
+        found = [Slider(_STRENGTH, "keys", 0.0, limit, limit / 45.0, 20.0 * limit / 45.0)]
         found.append(Slider(_HOLD, "switch", 0.0, 1.0, 1.0, 0.0, ("KeyG", "KeyT")))
         found += [Slider(name, "hold", -_FARTHEST, _FARTHEST, 0.005, 0.0) for name in self._place]
         if self._can_be_free:
@@ -102,27 +81,16 @@ class Panel:
         return found
 
     def look(self) -> None:
-        """Take over what was set and pressed since the last look."""
-        for name in self._buttons:
-            clicks = self._meshcat.GetButtonClicks(name)
-            if clicks > self._clicks[name]:
-                self._press(name)
-            self._clicks[name] = clicks
-        while True:
-            try:
-                name, value = self._requests.get_nowait()
-            except Empty:
-                return
+        """Take over what was set and pressed since the last look, and what the hand does."""
+        heard = self._pages.heard()
+        if heard.let_go:
+            self._open()
+        for name, value in heard.settings:
             if name in self._sliders:
-                self._meshcat.SetSliderValue(name, value)
-            elif name in self._buttons and value > 0.5:
-                self._press(name)
-            else:
-                self._pressed.pop(name, None)
-
-    def _press(self, name: str) -> None:
-        self._pressed[name] = self._clock()
-        self._commands += [command for command in Command if command.value[0] == name]
+                self._values[name] = self._sliders[name].nearest(value)
+            elif value > 0.5:
+                self._commands += [command for command in Command if command.value[0] == name]
+        self._hand = heard.hand
 
     def commands(self) -> list[Command]:
         """Return what was asked for and not yet told."""
@@ -132,14 +100,20 @@ class Panel:
         return asked
 
     def let_go(self) -> None:
-        """Take the hand off the tool."""
-        for name in (*self._pull, _HOLD):
-            self._meshcat.SetSliderValue(name, 0.0)
-        self._pressed.clear()
-        self._held_from = None
+        """Take the hand off the tool, until it is heard again."""
+        self._pages.open_hand()
+        self._hand = {}
+        self._open()
+
+    def _open(self) -> None:
+        self._values[_HOLD], self._held_from = 0.0, None
 
     def content(self) -> dict[str, object]:
-        """Return what there is to set, for JSON: sliders with their values, buttons with keys."""
+        """Return what there is to set, for JSON.
+
+        Sliders with their values, and buttons and pushes with their keys; what the hand does now,
+        by name of what pulls or pushes, and with how much a handle can pull [N].
+        """
         rigid = {p.slider.name for p in self._tuned if p.top_is_rigid}
         sliders = [
             {
@@ -154,7 +128,14 @@ class Panel:
             }
             for slider in self._sliders.values()
         ]
-        return {"sliders": sliders, "buttons": self._buttons}
+        pushes = {name: key for name, (_, _, key) in self._pushes.items()}
+        return {
+            "sliders": sliders,
+            "buttons": self._buttons,
+            "pushes": pushes,
+            "hand": self._hand,
+            "force_limit": self._force_limit,
+        }
 
     def read(self, y_t: np.ndarray) -> np.ndarray:
         """Return the controls as they are set now, see :class:`Operator`.
@@ -170,17 +151,17 @@ class Panel:
         return controls
 
     def _value(self, name: str) -> float:
-        return float(self._meshcat.GetSliderValue(name))
+        return self._values[name]
 
     def _asked(self, y_t: np.ndarray) -> np.ndarray:
         """Return push, hold and target, shape (7,)."""
-        push = np.array([self._value(name) for name in self._pull])
-        push += self._key_push() + self._stick_push()
+        limit = self._force_limit
+        pull = [self._hand.get(name, 0.0) for name in self._pull]
+        push = np.clip(pull, -limit, limit) + self._key_push() + self._stick_push()
         holds = self._value(_HOLD) > 0.5
         if holds and self._held_from is None and np.isfinite(y_t).all():
             self._held_from = y_t.copy()
-            for name in self._place:
-                self._meshcat.SetSliderValue(name, 0.0)
+            self._values |= dict.fromkeys(self._place, 0.0)
         if not holds or self._held_from is None:
             self._held_from = None
             return np.concatenate([push, np.zeros(4)])
@@ -188,18 +169,14 @@ class Panel:
         return np.concatenate([push, [1.0], moved])
 
     def _key_push(self) -> np.ndarray:
-        now, push = self._clock(), np.zeros(3)
-        strength = self._value(_STRENGTH)
+        push, strength = np.zeros(3), self._value(_STRENGTH)
         for name, (axis, sign, _) in self._pushes.items():
-            if now - self._pressed.get(name, -math.inf) < _PRESS:
+            if self._hand.get(name, 0.0) > 0.5:
                 push[axis] += sign * strength
         return push
 
     def _stick_push(self) -> np.ndarray:
-        axes = self._meshcat.GetGamepad().axes
-        if len(axes) <= max(_STICKS):
-            return np.zeros(3)
-        sticks = -np.array([axes[i] for i in _STICKS])
+        sticks = np.clip([self._hand.get(name, 0.0) for name in self._stick], -1.0, 1.0)
         beyond = np.maximum(np.abs(sticks) - _DEAD_ZONE, 0.0) / (1.0 - _DEAD_ZONE)
         return np.sign(sticks) * beyond * self._force_limit
 

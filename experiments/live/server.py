@@ -1,7 +1,8 @@
-"""The page of a live session, served on this machine alone, and what it asks for."""
+"""The page of a live session, served on this machine to whom its token was given."""
 
+import hmac
 import json
-import math
+import secrets
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
@@ -12,28 +13,37 @@ from urllib.parse import urlsplit
 from pfsc_drake.errors import InputError
 
 HOST = "127.0.0.1"
-_LONGEST = 1000  # bytes of a request
+_LONGEST = 8192  # bytes of a message
+_PATIENCE = 10.0  # s, until a connection on which nothing comes is closed
 _POLL = 0.05  # s, in which it notices that it is to stop
 _PAGE = Path(__file__).with_name("page.html")
-# no other page may read the status or show this one; Meshcat is in a frame of it
+# no other page may read the answers, show this page in a frame, or learn its address from it; it
+# loads nothing from anywhere but the scene
 _HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data:; connect-src 'self'; frame-src http:; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
 }
 
 
 class PageServer:
     """Serves the page of a session to browsers on this machine.
 
-    ``/`` is the page, ``/status`` what it shows, in JSON. What it asks for is posted to ``/set``, a
-    JSON list of a name and a number; nobody but the page itself can do so.
+    Behind ``/TOKEN/``, which nobody can guess, is the page; ``status`` there is what it shows, in
+    JSON, and what it wants is posted to ``hear``. Every request has to name this machine as its
+    host, which keeps out names of other sites that were made to point here, and must not come from
+    a page of another origin; what is posted has to come from the page itself.
 
     Args:
         port: Of the page; 0 for any that is free.
-        meshcat_url: What the page shows in its frame.
-        status: Returns what the page shows beside it; called in other threads.
-        request: Told what the page asks for; called in other threads.
+        status: Returns what the page shows; called in other threads.
+        hear: Told what the page posts, in other threads; returns whether the page leads, and
+            raises InputError if it is nonsense.
 
     Raises:
         InputError: If the port is taken or not allowed.
@@ -42,17 +52,17 @@ class PageServer:
     def __init__(
         self,
         port: int,
-        meshcat_url: str,
         status: Callable[[], dict[str, object]],
-        request: Callable[[tuple[str, float]], None],
+        hear: Callable[[bytes], bool],
     ) -> None:
-        page = _PAGE.read_text(encoding="utf-8").replace("MESHCAT_URL", meshcat_url)
+        self._token = secrets.token_urlsafe(16)
+        page = _PAGE.read_text(encoding="utf-8")
         documents = {
-            "/": lambda: ("text/html; charset=utf-8", page),
-            "/status": lambda: ("application/json", json.dumps(status(), allow_nan=False)),
+            "": lambda: ("text/html; charset=utf-8", page),
+            "status": lambda: ("application/json", json.dumps(status(), allow_nan=False)),
         }
         try:
-            self._server = _Server((HOST, port), _handler(documents, request))
+            self._server = _Server((HOST, port), _handler(self._token, documents, hear))
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or "no port"
             raise InputError(
@@ -65,8 +75,8 @@ class PageServer:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
-        return f"http://{HOST}:{self._server.server_address[1]}/"
+        """Where the page is; whoever knows it may lead."""
+        return f"http://{HOST}:{self._server.server_address[1]}/{self._token}/"
 
     def close(self) -> None:
         """Stop serving."""
@@ -84,43 +94,84 @@ class _Server(ThreadingHTTPServer):
 
 
 def _handler(
+    token: str,
     documents: dict[str, Callable[[], tuple[str, str]]],
-    request: Callable[[tuple[str, float]], None],
+    hear: Callable[[bytes], bool],
 ) -> type[BaseHTTPRequestHandler]:
-    """Return what answers for documents, each with its type, by path, and takes requests."""
+    """Return what answers for documents, each with its type, by name, and takes messages."""
 
     class Handler(BaseHTTPRequestHandler):
         """Answers GET and POST."""
 
         protocol_version = "HTTP/1.1"
+        timeout = _PATIENCE
 
         def do_GET(self) -> None:
-            document = documents.get(self.path.partition("?")[0])
+            if self._is_a_stranger(self.headers.get("Origin", self._own)):
+                return
+            document = documents.get(self._document)
             if document is None:
-                self._answer(HTTPStatus.NOT_FOUND, "text/plain", "")
+                self._answer(HTTPStatus.NOT_FOUND)
             else:
                 self._answer(HTTPStatus.OK, *document())
 
         def do_POST(self) -> None:
+            # what is not read must not be taken for the next request
             self.close_connection = True
-            own = f"http://{self.headers.get('Host')}"
-            if self.path != "/set" or self.headers.get("Origin") != own or not _is_here(own):
-                self._answer(HTTPStatus.FORBIDDEN, "text/plain", "")
+            if self._is_a_stranger(self.headers.get("Origin", "")):
                 return
             size = self.headers.get("Content-Length", "")
-            asked = _asked(self.rfile.read(min(int(size), _LONGEST)) if size.isdecimal() else b"")
-            if asked is not None:
-                request(asked)
-            fine = HTTPStatus.BAD_REQUEST if asked is None else HTTPStatus.NO_CONTENT
-            self._answer(fine, "text/plain", "")
+            if self._document != "hear":
+                self._answer(HTTPStatus.NOT_FOUND)
+            elif not (size.isascii() and size.isdecimal()):
+                self._answer(
+                    HTTPStatus.LENGTH_REQUIRED, text="Content-Length is no number of bytes"
+                )
+            elif len(size) > len(str(_LONGEST)) or int(size) > _LONGEST:
+                self._answer(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, text=f"allowed: {_LONGEST} bytes")
+            else:
+                content = self.rfile.read(int(size))
+                self.close_connection = False
+                self._hear(content)
 
-        def _answer(self, status: HTTPStatus, kind: str, text: str) -> None:
+        def _hear(self, content: bytes) -> None:
+            try:
+                leads = hear(content)
+            except InputError as error:
+                self._answer(HTTPStatus.BAD_REQUEST, text=str(error))
+                return
+            self._answer(HTTPStatus.NO_CONTENT if leads else HTTPStatus.CONFLICT)
+
+        @property
+        def _own(self) -> str:
+            return f"http://{self.headers.get('Host')}"
+
+        @property
+        def _document(self) -> str:
+            return self.path.partition("?")[0].removeprefix(f"/{token}/")
+
+        def _is_a_stranger(self, origin: str) -> bool:
+            """Refuse who is not this session's page, and return whether it did."""
+            given = self.path.partition("?")[0].split("/")[1:2]
+            knows = hmac.compare_digest("".join(given).encode("utf-8"), token.encode("utf-8"))
+            if knows and origin == self._own and _is_here(self._own):
+                return False
+            self.close_connection = True
+            self._answer(HTTPStatus.FORBIDDEN, text="open the address that the session has printed")
+            return True
+
+        def _answer(
+            self, status: HTTPStatus, kind: str = "text/plain; charset=utf-8", text: str = ""
+        ) -> None:
             content = text.encode("utf-8")
             self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(content)))
+            if status is not HTTPStatus.NO_CONTENT:
+                self.send_header("Content-Type", kind)
+                self.send_header("Content-Length", str(len(content)))
             for name, value in _HEADERS.items():
                 self.send_header(name, value)
+            if self.close_connection:
+                self.send_header("Connection", "close")
             self.end_headers()
             self.wfile.write(content)
 
@@ -132,14 +183,7 @@ def _handler(
 
 def _is_here(origin: str) -> bool:
     """Whether an address names this machine as no other site can."""
-    return urlsplit(origin).hostname in (HOST, "localhost")
-
-
-def _asked(content: bytes) -> tuple[str, float] | None:
-    """Return a name and a finite number from JSON, or None if it is anything else."""
     try:
-        name, value = json.loads(content)
-        asked = str(name), float(value)
-    except (ValueError, TypeError, RecursionError):
-        return None
-    return asked if math.isfinite(asked[1]) else None
+        return urlsplit(origin).hostname in (HOST, "localhost")
+    except ValueError:
+        return False

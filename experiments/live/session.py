@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from pydrake.geometry import Meshcat
-
 from diagrams.drawing.live_view import LiveView
 from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
 from experiments.live.pacing import RealTimePace
-from experiments.live.panel import Command, Panel, Requests
+from experiments.live.pages import Pages
+from experiments.live.panel import Command, Panel
+from experiments.live.scene import Scene
 from experiments.live.simulation import LiveSimulation
 from experiments.live.status import LiveStatus
 from experiments.live.take import ControlRecord, TakeFolders
@@ -70,8 +70,7 @@ class LiveSession:
     Args:
         prepared: A station with an operator.
         name: Of its scenario.
-        meshcat: Where it is drawn, and where the controls are.
-        requests: What the page asks for.
+        pages: Who leads.
         status: What is told at every moment, kept up to date.
         output: What is left of it.
         tell: Told in words what happens.
@@ -82,8 +81,7 @@ class LiveSession:
         self,
         prepared: PreparedRun,
         name: str,
-        meshcat: Meshcat,
-        requests: Requests,
+        pages: Pages,
         status: LiveStatus,
         output: Output,
         tell: Teller,
@@ -96,13 +94,17 @@ class LiveSession:
         self._station, self._operator = station, station.operator
         self.status, self.kept = status, list[Kept]()
         self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
-        self._record, self._meshcat = ControlRecord(station.operator), meshcat
+        self._record = ControlRecord(station.operator)
         limit = settings.operator.hand.force_limit
         self._panel = Panel(
-            meshcat, requests, limit, tuned_parameters(settings, station), self._operator.regions
+            pages, limit, tuned_parameters(settings, station), self._operator.regions
         )
         self._frame = self._simulation.frame(self._simulation.signals())
-        self._view = LiveView(station, prepared.drawing, self._frame, meshcat, limit)
+        self._scene = Scene(
+            lambda first, meshcat: LiveView(station, prepared.drawing, first, meshcat, limit),
+            self._frame,
+            tell,
+        )
         self._steps, self._slow = 0, False
 
     @property
@@ -127,10 +129,13 @@ class LiveSession:
         gc.freeze()
         try:
             self._loop(interrupted, progress)
-            self._keep(interrupted, progress)
         finally:
-            gc.unfreeze()
-            self.status.phase = "ended"
+            # whatever ended it: what was done is worth more than why
+            try:
+                self._keep(interrupted, progress)
+            finally:
+                gc.unfreeze()
+                self.status.phase = "ended"
 
     def _loop(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
         self._restart()
@@ -178,13 +183,16 @@ class LiveSession:
         """Draw, and bring the status up to date, all of it or what follows from the frame."""
         signals = self._simulation.signals()
         self._frame = self._simulation.frame(signals)
-        self._view.draw(self._frame)
         self.status.time, self.status.factor = self._simulation.time, self._pace.factor
+        self._draw()
         self.status.observe(self._station, signals)
         self.status.controls = self._panel.content()
         if whole:
-            self._meshcat.SetRealtimeRate(self.status.factor)
             self._tell_speed()
+
+    def _draw(self, *, interrupted: bool = False) -> None:
+        self._scene.draw(self._frame, self.status.factor, interrupted=interrupted)
+        self.status.scene = self._scene.url
 
     def _tell_speed(self) -> None:
         """Say when time becomes slower than the clock, and when it does no more."""
@@ -207,6 +215,7 @@ class LiveSession:
     def _rest(self) -> None:
         """Wait a moment, while time stands still."""
         self._pace.wait()
+        self.status.controls = self._panel.content()
 
     def _reset(self, interrupted: Callable[[], bool], progress: ProgressListener) -> None:
         """Begin anew; what was not recorded is gone."""
@@ -217,7 +226,7 @@ class LiveSession:
         self._record = ControlRecord(self._operator)
         self.status.recording = None
         self._frame = self._simulation.frame(self._simulation.signals())
-        self._view.draw(self._frame, interrupted=True)
+        self._draw(interrupted=True)
         self._tell("reset")
         self._restart()
 

@@ -1,17 +1,15 @@
 """From a scenario to a live session, and how it ended."""
 
-from contextlib import closing
+import signal
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import SimpleQueue
-
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator import region_names
 from experiments.catalog.scenario_file import ScenarioFile
-from experiments.live.panel import Requests
-from experiments.live.server import HOST, PageServer
+from experiments.live.pages import Pages
+from experiments.live.server import PageServer
 from experiments.live.session import Kept, LiveSession, Output, Teller
 from experiments.live.status import LiveStatus
 from experiments.live.take import TakeFolders
@@ -69,26 +67,36 @@ def run_live(
         InputError: If the scenario is wrong or has nothing to guide, the folder cannot be used, or
             the port is taken.
     """
+    tell = _audible(tell)
     progress = _ToldProgress(tell)
     progress(0.0, "preparing")
     guided = with_operator(scenario)
     folders = TakeFolders(out, scenario.inputs())
-    status = LiveStatus(scenario.name)
-    meshcat = Meshcat(MeshcatParams(host=HOST, port=0))
-    requests: Requests = SimpleQueue()
-    server = PageServer(port, meshcat.web_url(), status.content, requests.put)
+    status, pages = LiveStatus(scenario.name), Pages()
+    server = PageServer(port, lambda: status.content() | {"lead": pages.leader}, pages.hear)
     with closing(server):
         prepared = prepare(
             guided, duration or DURATION, recording=True, progress=progress, live=True
         )
         output = Output(folders, figures=figures, recording=recording)
-        session = LiveSession(prepared, scenario.name, meshcat, requests, status, output, tell)
+        session = LiveSession(prepared, scenario.name, pages, status, output, tell)
         for warning in prepared.warnings:
             tell(f"warning: {warning}")
         tell(f"open {server.url}")
-        with noticed_interruption() as interrupted:
+        # a terminal that closes, too, leaves time to keep what was done
+        with noticed_interruption(signal.SIGTERM, signal.SIGHUP) as interrupted:
             session.run(interrupted, progress)
             return LiveOutcome(session.kept, session.fault, interrupted(), session.end)
+
+
+def _audible(tell: Teller) -> Teller:
+    """Return a teller whom it does not disturb that the terminal has gone."""
+
+    def told(line: str) -> None:
+        with suppress(OSError):
+            tell(line)
+
+    return told
 
 
 class _ToldProgress:

@@ -21,6 +21,7 @@ class LiveStatus:
 
     Attributes:
         scenario: Its name.
+        scene: Where it is drawn.
         phase: ``running``, ``fault``, ``saving``, ``ended``.
         time: Simulated time [s].
         factor: Simulated over real time.
@@ -42,6 +43,7 @@ class LiveStatus:
     """
 
     scenario: str
+    scene: str = ""
     phase: str = "preparing"
     time: float = 0.0
     factor: float = 1.0
@@ -104,8 +106,10 @@ class LiveStatus:
     def _observe_guidance(self, row: np.ndarray) -> None:
         """Take over what leads a tool through space, see :class:`GuidanceRecord`."""
         axes = list(self.progress)
-        self.measured |= zip(axes, row[_RECORD["force"]].tolist(), strict=True)
-        self.damping |= dict.fromkeys(axes, float(row[_RECORD["damping"]][0]))
+        # new ones: pages read the old ones in their threads
+        forces = zip(axes, row[_RECORD["force"]].tolist(), strict=True)
+        self.measured = self.measured | dict(forces)
+        self.damping = self.damping | dict.fromkeys(axes, float(row[_RECORD["damping"]][0]))
         near = row[_RECORD["near"]].reshape(-1, len(SLOT))
         distances = near[near[:, SLOT.index("index")] >= 0.0, SLOT.index("h")]
         if distances.size:

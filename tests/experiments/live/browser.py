@@ -77,16 +77,25 @@ class Browser:
         message, _, self._left = self._left.partition(b"\0")
         return json.loads(message)
 
-    def open(self, url: str) -> None:
-        """Open a page in a tab of its own."""
-        target = self.call("Target.createTarget", url=url)["targetId"]
+    def open(self, url: str, width: int = 900, height: int = 700) -> str:
+        """Open a page in a window of its own, which is spoken to from now on; return its name."""
+        self._session = None
+        size = {"newWindow": True, "width": width, "height": height}
+        target = self.call("Target.createTarget", url=url, **size)["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]
         self.call("Runtime.enable")
+        return self._session
+
+    def speak_to(self, window: str) -> None:
+        """Speak to a window that is open."""
+        self._session = window
 
     def evaluate(self, expression: str) -> object:
-        """Return what an expression of the page is."""
-        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        """Return what an expression of the page is, or is promised to be."""
+        result = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         return result["result"].get("value")
 
     def mouse(self, kind: str, place: tuple[float, float]) -> None:

@@ -5,9 +5,13 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
+import urllib.error
 import urllib.request
-from contextlib import closing
+from contextlib import closing, contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
 
 import h5py
 import pytest
@@ -17,6 +21,15 @@ from reporting.provenance import PROJECT_ROOT
 from tests.experiments.live.browser import NAMES, Browser, find_browser
 
 PATIENCE = 60.0  # s, on a machine that does much else
+SMALL = (320, 240)  # pixels, which take long without a graphics card
+
+
+def until(condition):
+    """Wait until a condition is met."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.1)
 
 
 class Session:
@@ -46,10 +59,36 @@ class Session:
         with urllib.request.urlopen(self.url + "status", timeout=5) as answer:
             return json.loads(answer.read())
 
+    def say(self, body):
+        """Post to the session as its page does, and return the status of the answer."""
+        headers = {"Origin": f"http://{urlsplit(self.url).netloc}"}
+        request = urllib.request.Request(self.url + "hear", body, headers, method="POST")
+        try:
+            with urllib.request.urlopen(request, timeout=5) as answer:
+                return answer.status
+        except urllib.error.HTTPError as error:
+            return error.code
+
     def set(self, name, value):
-        body, headers = json.dumps([name, value]).encode(), {"Origin": self.url[:-1]}
-        request = urllib.request.Request(self.url + "set", body, headers, method="POST")
-        urllib.request.urlopen(request, timeout=5).close()
+        assert self.say(json.dumps({"client": "test", "set": {name: value}}).encode()) == 204
+
+    @contextmanager
+    def hand(self, **pull):
+        """Pull along axes with forces in N, for as long as the context lasts."""
+        hand = {f"pull {axis} [N]": force for axis, force in pull.items()}
+        message, over = json.dumps({"client": "test", "hand": hand}).encode(), threading.Event()
+
+        def beat():
+            while not over.wait(0.05):
+                self.say(message)
+
+        thread = threading.Thread(target=beat)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
     def until(self, condition):
         """Wait until a condition on the status is met, and return the status."""
@@ -85,14 +124,37 @@ def start(tmp_path):
         session.close()
 
 
+@pytest.fixture
+def foreign_page():
+    """The address of a page that is not the session's."""
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+
+        def log_message(self, *arguments):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Page) as server:
+        threading.Thread(target=server.serve_forever, args=[0.05], daemon=True).start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+
+
 def test_a_person_pushes_the_tool_along_and_ctrl_c_keeps_what_was_done(start):
     session = start("vf_hard_spline")
     session.until(lambda status: status["phase"] == "running" and status["time"] > 0.5)
-    session.set("pull y [N]", 20.0)
-    session.set("pull z [N]", -20.0)
-    moved = session.until(lambda status: abs(status["progress"]["eta"] - 0.05) > 0.05)
+    with session.hand(y=20.0, z=-20.0):
+        moved = session.until(lambda status: abs(status["progress"]["eta"] - 0.05) > 0.05)
     assert abs(moved["deviation"]["xi_1"]) < 0.4e-3  # Sec. 5.2.2
     assert moved["factor"] <= 1.2
+    # nobody is heard any more: the hand lets go, which takes its muscles some tenths of a second
+    since = moved["time"]
+    session.until(lambda status: max(map(abs, status["force"])) < 0.1)
+    assert session.status()["time"] < since + PATIENCE / 4
+    assert session.say(b'{"client": "test", "hand": {"pull y [N]": ' + b"9" * 400 + b"}}") == 400
     session.process.send_signal(signal.SIGINT)
     status, errors = session.end()
     assert status == 130
@@ -111,10 +173,11 @@ def test_a_person_guides_the_tool_in_a_browser(start, tmp_path):
     with closing(Browser(find_browser(), tmp_path / "profile")) as browser:
         browser.open(session.url)
         session.until(lambda status: status["time"] > 0.5 and status["ready"])
-        end = time.monotonic() + PATIENCE
-        while browser.evaluate("document.querySelectorAll('#tune input').length") != 7:
-            assert time.monotonic() < end
-            time.sleep(0.1)
+        until(
+            lambda: (
+                browser.evaluate("leads && document.querySelectorAll('#tune input').length") == 7
+            )
+        )
         assert browser.evaluate("document.getElementById('phase').textContent") == "running"
         # the handle, drawn to the left, pulls along y, which is along the circle here
         x, y = browser.middle("#pad")
@@ -135,13 +198,70 @@ def test_a_person_guides_the_tool_in_a_browser(start, tmp_path):
         shown = browser.evaluate("document.getElementById('coordinates').textContent")
         assert "xi_2" in shown
         scene = browser.evaluate("document.getElementById('scene').src")
-        assert scene.startswith("http://127.0.0.1:")
+        assert scene == session.status()["scene"] + "/"
+        # after a click into the scene keys count as before
+        browser.mouse("mousePressed", (700.0, 300.0))
+        browser.mouse("mouseReleased", (700.0, 300.0))
+        until(lambda: browser.evaluate("document.activeElement.tagName") == "BODY")
         assert browser.errors == []
-    # the tab is closed, and the robot does not mind
+        # a page that cannot be seen lets go
+        browser.mouse("mousePressed", (x, y))
+        browser.mouse("mouseMoved", (x + 50.0, y))
+        session.until(lambda status: status["force"][1] < -15.0)
+        browser.evaluate(
+            "Object.defineProperty(document, 'hidden', {value: true});"
+            "document.dispatchEvent(new Event('visibilitychange'))"
+        )
+        session.until(lambda status: status["lead"] is None)
+        session.until(lambda status: abs(status["force"][1]) < 0.1)
+    # it is closed, and the robot does not mind
     time_then = session.status()["time"]
     session.until(lambda status: status["time"] > time_then + 0.2)
     session.set("end (Q)", 1.0)
     assert session.end() == (0, "")
+    assert (session.out / "take_1" / "log.h5").exists()
+
+
+@pytest.mark.skipif(find_browser() is None, reason=f"none of {', '.join(NAMES)} is installed")
+def test_strangers_pull_nothing_and_of_two_pages_one_leads(start, tmp_path, foreign_page):
+    session = start("vf_soft_circle")
+    with closing(Browser(find_browser(), tmp_path / "profile")) as browser:
+        first = browser.open(session.url, *SMALL)
+        until(lambda: browser.evaluate("leads"))
+        second = browser.open(session.url, *SMALL)
+        until(lambda: browser.evaluate("!at('lead').hidden"))
+        assert browser.evaluate("at('commands').inert && !leads")
+        browser.evaluate("at('take').click()")
+        until(lambda: browser.evaluate("leads && at('lead').hidden"))
+        browser.speak_to(first)
+        until(lambda: browser.evaluate("!leads && !at('lead').hidden"))
+        browser.speak_to(second)
+        browser.call("Page.close")
+        browser.speak_to(first)
+        until(lambda: browser.evaluate("leads"))
+
+        # a page of another origin, which has even learnt the token and where the scene is
+        browser.open(foreign_page)
+        url, scene = session.url, session.status()["scene"]
+        message = json.dumps({"client": "evil", "hand": {"pull x [N]": 30.0}, "lead": "take"})
+        post = f"fetch({url + 'hear'!r}, {{method: 'POST', mode: 'no-cors', body: {message!r}}})"
+        assert browser.evaluate(f"{post}.then(() => 'read', () => 'refused')") == "refused"
+        read = f"fetch({url + 'status'!r}).then(() => 'read', () => 'refused')"
+        assert browser.evaluate(read) == "refused"
+        for payload in ("'nonsense'", "new Uint8Array(0)"):
+            browser.evaluate(
+                f"new Promise(done => {{ const s = new WebSocket({'ws' + scene[4:]!r});"
+                f"s.onopen = () => {{ s.send({payload}); setTimeout(done, 300); }}; }})"
+            )
+        # only the scene is gone, and comes back elsewhere
+        renewed = session.until(lambda status: status["scene"] != scene)
+        assert renewed["phase"] == "running"
+        assert renewed["lead"] != "evil"
+        assert max(map(abs, renewed["force"])) < 0.1
+        browser.speak_to(first)
+        until(lambda: browser.evaluate("scene.src") == renewed["scene"] + "/")
+    session.process.send_signal(signal.SIGTERM)
+    assert session.end()[0] == 130
     assert (session.out / "take_1" / "log.h5").exists()
 
 

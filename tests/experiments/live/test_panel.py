@@ -1,6 +1,6 @@
 """Sliders, keys, a gamepad and the page, and what they mean."""
 
-from queue import SimpleQueue
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +8,7 @@ import pytest
 
 from diagrams.surroundings.operator_file import columns
 from experiments.live.controls import Slider, TunedParameter
+from experiments.live.pages import Pages
 from experiments.live.panel import Command, Panel
 
 REGIONS = ["wall"]
@@ -20,49 +21,24 @@ TUNED = [
 ]
 
 
-class Scene:
-    """Stands in for Meshcat's panel, which needs a browser to be set."""
-
-    def __init__(self):
-        self.values, self.clicks, self.axes = {}, {}, []
-
-    def AddSlider(self, name, low, high, step, value, down="", up=""):
-        self.values[name] = value
-
-    def AddButton(self, name, key):
-        self.clicks[name] = 0
-
-    def GetSliderValue(self, name):
-        return self.values[name]
-
-    def SetSliderValue(self, name, value):
-        self.values[name] = value
-
-    def GetButtonClicks(self, name):
-        return self.clicks[name]
-
-    def GetGamepad(self):
-        return SimpleNamespace(axes=self.axes)
-
-
-@pytest.fixture
-def scene():
-    return Scene()
-
-
 @pytest.fixture
 def clock():
     return SimpleNamespace(now=50.0)
 
 
 @pytest.fixture
-def requests():
-    return SimpleQueue()
+def pages(clock):
+    return Pages(lambda: clock.now)
 
 
 @pytest.fixture
-def panel(scene, clock, requests):
-    return Panel(scene, requests, 45.0, TUNED, REGIONS, lambda: clock.now)
+def panel(pages):
+    return Panel(pages, 45.0, TUNED, REGIONS)
+
+
+def say(pages, hand=None, **settings):
+    message = {"client": "a", "hand": hand or {}, "set": settings}
+    assert pages.hear(json.dumps(message).encode())
 
 
 def read(panel, place=TOOL):
@@ -80,88 +56,96 @@ def test_who_sets_nothing_asks_for_nothing(panel):
     assert not any(value for name, value in controls.items() if value != -1.0)
 
 
-def test_pull_sliders_are_forces(panel, scene):
-    scene.values["pull y [N]"] = -12.0
-    assert read(panel)["push_y"] == -12.0
+def test_handles_are_forces_that_end_where_the_hand_does(panel, pages):
+    say(pages, {"pull y [N]": -12.0, "pull x [N]": 1e300})
+    controls = read(panel)
+    assert controls["push_y"] == -12.0
+    assert controls["push_x"] == 45.0
+    assert panel.content()["hand"]["pull y [N]"] == -12.0
 
 
-def test_a_key_pushes_for_a_while_and_again_while_it_repeats(panel, scene, clock):
-    scene.values["key force [N]"] = 15.0
-    scene.clicks["push -z (F)"] = 1
-    assert read(panel)["push_z"] == -15.0
-    clock.now += 0.5
-    scene.clicks["push -z (F)"] = 2
-    assert read(panel)["push_z"] == -15.0
-    clock.now += 0.5
+def test_a_key_pushes_as_long_as_it_is_held(panel, pages, clock):
+    say(pages, {"push -z (F)": 1.0}, **{"key force [N]": 15.0})
     assert read(panel)["push_z"] == -15.0
     clock.now += 0.2
+    assert read(panel)["push_z"] == -15.0
+    say(pages)
     assert read(panel)["push_z"] == 0.0
 
 
-def test_a_key_that_is_released_on_the_page_pushes_no_more(panel, requests):
-    requests.put(("push +x (W)", 1.0))
-    assert read(panel)["push_x"] == 20.0
-    requests.put(("push +x (W)", 0.0))
-    assert read(panel)["push_x"] == 0.0
-
-
-def test_the_page_sets_the_scene(panel, scene, requests):
-    requests.put(("pull x [N]", 7.0))
-    requests.put(("no such slider", 1.0))
-    assert read(panel)["push_x"] == 7.0
-    assert scene.values["pull x [N]"] == 7.0
-    values = {slider["name"]: slider["value"] for slider in panel.content()["sliders"]}
-    assert values["pull x [N]"] == 7.0
-
-
-def test_sticks_push_forward_left_and_up(panel, scene):
-    scene.axes = [-1.0, 0.05, 0.0, -0.56]
+def test_sticks_push_forward_left_and_up(panel, pages):
+    say(pages, {"stick x": -0.05, "stick y": 7.0, "stick z": 0.56})
     controls = read(panel)
     assert [controls[f"push_{axis}"] for axis in "xyz"] == pytest.approx([0.0, 45.0, 22.5])
 
 
-def test_a_hand_takes_hold_where_the_tool_is(panel, scene):
-    scene.values |= {"hold (T, G)": 1.0, "hold dx [m]": 0.1}
+def test_a_hand_that_is_silent_has_let_go_of_everything(panel, pages, clock):
+    say(pages, {"pull x [N]": 22.0}, **{"hold (T, G)": 1.0, "across k": 500.0})
+    controls = read(panel)
+    assert controls["push_x"] == 22.0
+    assert controls["hold"] == 1.0
+    clock.now += 0.31
+    controls = read(panel)
+    assert controls["push_x"] == 0.0
+    assert controls["hold"] == 0.0
+    assert controls["transversal_stiffness"] == 500.0
+    say(pages, {"pull x [N]": 22.0})
+    controls = read(panel)
+    assert controls["push_x"] == 22.0
+    assert controls["hold"] == 0.0
+
+
+def test_a_hand_takes_hold_where_the_tool_is(panel, pages):
+    say(pages, **{"hold dx [m]": 0.1, "hold (T, G)": 1.0})
     controls = read(panel)
     assert controls["hold"] == 1.0
     assert [controls[f"target_{axis}"] for axis in "xyz"] == TOOL.tolist()
-    scene.values["hold dx [m]"] = 0.1
+    say(pages, **{"hold dx [m]": 0.1})
     controls = read(panel, TOOL + 0.05)
     assert controls["target_x"] == pytest.approx(0.9)
     assert controls["target_y"] == pytest.approx(0.1)
-    scene.clicks[Command.LET_GO.value[0]] = 1
+    say(pages, {"pull x [N]": 7.0}, **{Command.LET_GO.value[0]: 1})
     panel.look()
     assert panel.commands() == [Command.LET_GO]
-    assert read(panel)["hold"] == 0.0
+    controls = read(panel)
+    assert controls["hold"] == 0.0
+    assert controls["push_x"] == 0.0  # until it is heard again
     assert panel.commands() == []
 
 
-def test_a_slider_counts_when_it_is_moved_and_its_top_is_rigid(panel, scene):
-    scene.values |= {"across k": 500.0, "along d": 80.0}
+def test_a_slider_counts_when_it_is_moved_and_its_top_is_rigid(panel, pages):
+    say(pages, **{"across k": 500.0, "along d": 80.0})
     controls = read(panel)
     assert controls["transversal_stiffness"] == 500.0
     assert controls["tangential_damping"] == 80.0
-    scene.values |= {"across k": 2000.0, "along d": 60.0}
+    say(pages, **{"across k": 2000.0, "along d": 60.0})
     controls = read(panel)
     assert controls["transversal_stiffness"] == -1.0
     assert controls["tangential_damping"] == -1.0
 
 
-def test_without_guidance_it_moves_across_as_it_does_along(panel, scene):
-    scene.values["guide (K, J)"] = 0.0
+def test_a_slider_stays_on_its_scale(panel, pages):
+    values = {"across k": 1e300, "along d": -3.0, "across d": 152.4}
+    say(pages, **values)
+    panel.look()
+    shown = {slider["name"]: slider["value"] for slider in panel.content()["sliders"]}
+    assert [shown[name] for name in values] == [2000.0, 4.5, 150.0]
+
+
+def test_without_guidance_it_moves_across_as_it_does_along(panel, pages):
+    say(pages, **{"guide (K, J)": 0.0})
     controls = read(panel)
     assert controls["transversal_stiffness"] == 0.0
     assert controls["transversal_damping"] == 60.0
 
 
-def test_regions_are_switched(panel, scene):
-    scene.values["region wall"] = 0.0
+def test_regions_are_switched(panel, pages):
+    say(pages, **{"region wall": 0.0})
     assert read(panel)["region_wall"] == 0.0
 
 
-def test_commands_are_told_once(panel, scene, requests):
-    scene.clicks[Command.RESET.value[0]] = 1
-    requests.put((Command.RECORD.value[0], 1.0))
+def test_commands_are_told_once(panel, pages):
+    say(pages, **{Command.RESET.value[0]: 1, Command.RECORD.value[0]: 1, Command.END.value[0]: 0})
     panel.look()
     assert set(panel.commands()) == {Command.RESET, Command.RECORD}
     panel.look()

@@ -1,86 +1,158 @@
-"""The page over HTTP: what it is told, what it may ask for, and who may not."""
+"""The page over HTTP: what it is told, what it may say, and who may not."""
 
+import http.client
 import json
-import urllib.error
-import urllib.request
+import socket
 from contextlib import closing
+from urllib.parse import urlsplit
 
 import pytest
 
+from experiments.live.pages import Pages
 from experiments.live.server import PageServer
 from pfsc_drake.errors import InputError
 
-
-@pytest.fixture
-def asked():
-    return []
+PULL = "pull x [N]"
+GOOD = json.dumps({"client": "a", "hand": {PULL: 3.5}}).encode()
 
 
 @pytest.fixture
-def server(asked):
-    with closing(PageServer(0, "http://scene", lambda: {"time": 1.5}, asked.append)) as server:
+def pages():
+    pages = Pages()
+    pages.expect([PULL], [])
+    return pages
+
+
+@pytest.fixture
+def server(pages):
+    with closing(PageServer(0, lambda: {"time": 1.5}, pages.hear)) as server:
         yield server
 
 
-def get(url):
-    with urllib.request.urlopen(url, timeout=5) as answer:
-        return answer.read().decode()
+def ask(server, method, document, body=None, **headers):
+    """Return status, headers and text of an answer; a document that begins with / is absolute."""
+    place = urlsplit(server.url)
+    path = document if document.startswith("/") else place.path + document
+    with closing(http.client.HTTPConnection(place.hostname, place.port, timeout=5)) as connection:
+        connection.request(method, path, body, headers)
+        answer = connection.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read().decode()
+
+
+def origin(server):
+    return f"http://{urlsplit(server.url).netloc}"
 
 
 def post(server, body, **headers):
-    request = urllib.request.Request(
-        server.url + "set", body, {"Origin": server.url[:-1], **headers}, method="POST"
-    )
-    try:
-        with urllib.request.urlopen(request, timeout=5) as answer:
-            return answer.status
-    except urllib.error.HTTPError as error:
-        return error.code
+    status, _, text = ask(server, "POST", "hear", body, **{"Origin": origin(server), **headers})
+    return status, text
 
 
 def test_it_serves_the_page_and_what_it_shows_on_this_machine_alone(server):
     assert server.url.startswith("http://127.0.0.1:")
-    page = get(server.url)
-    assert 'src="http://scene"' in page
+    status, headers, page = ask(server, "GET", "")
+    assert status == 200
     assert "https://" not in page  # nothing is fetched from elsewhere
-    assert json.loads(get(server.url + "status")) == {"time": 1.5}
-    with pytest.raises(urllib.error.HTTPError, match="404"):
-        get(server.url + "../etc/passwd")
+    assert headers["X-Frame-Options"] == "DENY"
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert json.loads(ask(server, "GET", "status")[2]) == {"time": 1.5}
+    assert ask(server, "GET", "../etc/passwd")[0] == 404
+    assert ask(server, "GET", "hear")[0] == 404
 
 
-def test_the_page_asks(server, asked):
-    assert post(server, b'["pull x [N]", 3.5]') == 204
-    assert asked == [("pull x [N]", 3.5)]
+def test_every_session_has_a_token_of_its_own(server, pages):
+    with closing(PageServer(0, dict, pages.hear)) as other:
+        assert len(urlsplit(other.url).path) > 20
+        assert urlsplit(other.url).path != urlsplit(server.url).path
+        assert ask(server, "GET", urlsplit(other.url).path + "status")[0] == 403
+
+
+@pytest.mark.parametrize("path", ["/", "/status", "/hear", "//", "/x/status", "/%FF/", "/\xe9/"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_without_the_token_there_is_nothing(server, pages, method, path):
+    with closing(socket.create_connection(server._server.server_address[:2], 5)) as connection:
+        host = urlsplit(server.url).netloc
+        request = f"{method} {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+        length = f"Content-Length: {len(GOOD)}\r\n\r\n"
+        connection.sendall((request + length).encode("latin-1") + GOOD)
+        assert connection.recv(100).split()[1] == b"403"
+    assert pages.leader is None
+
+
+@pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "[", ""])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_other_names_for_this_machine_are_refused(server, pages, method, host):
+    document = "status" if method == "GET" else "hear"
+    headers = {"Host": host, "Origin": f"http://{host}"}
+    status, _, text = ask(server, method, document, GOOD, **headers)
+    assert status == 403
+    assert "1.5" not in text
+    assert pages.leader is None
+
+
+@pytest.mark.parametrize("other", ["http://elsewhere.example", "null", "", "http://127.0.0.1:1"])
+def test_pages_of_other_origins_may_not_ask(server, pages, other):
+    assert post(server, GOOD, Origin=other)[0] == 403
+    assert ask(server, "GET", "status", Origin=other)[0] == 403
+    assert pages.leader is None
+
+
+def test_a_post_must_say_where_it_comes_from(server, pages):
+    assert ask(server, "POST", "hear", GOOD)[0] == 403
+    assert pages.leader is None
+
+
+def test_who_leads_is_told_so_and_who_does_not_is_told_that(server, pages):
+    assert post(server, GOOD)[0] == 204
+    assert post(server, b'{"client": "b"}')[0] == 409
+    assert pages.heard().hand == {PULL: 3.5}
+
+
+def test_a_connection_is_good_for_many_messages(server, pages):
+    place = urlsplit(server.url)
+    with closing(http.client.HTTPConnection(place.hostname, place.port, timeout=5)) as connection:
+        for body, expected in [(GOOD, 204), (b"nonsense", 400), (GOOD, 204)]:
+            connection.request("POST", place.path + "hear", body, {"Origin": origin(server)})
+            used, answer = connection.sock, connection.getresponse()
+            answer.read()
+            assert answer.status == expected
+            assert used is not None
+            assert connection.sock is used
 
 
 @pytest.mark.parametrize(
-    "body", [b"", b"[1, 2, 3]", b'["a", "b"]', b'["a", NaN]', b"[[", b"[" * 100_000, b'["a", null]']
-)
-def test_nonsense_is_refused(server, asked, body):
-    assert post(server, body) == 400
-    assert asked == []
-
-
-@pytest.mark.parametrize(
-    "headers",
+    ("body", "said"),
     [
-        {"Origin": "http://example.org"},
-        {"Origin": "null"},
-        {"Origin": "http://example.org", "Host": "example.org"},
+        (b"", "not JSON"),
+        (b'{"client": "a", "hand": {"pull x [N]": ' + b"9" * 400 + b"}}", "a finite number"),
+        (b'{"client": "a", "hand": {"pull x [N]": NaN}}', "a finite number"),
+        (b"[" * 8000, "not JSON"),
     ],
 )
-def test_other_pages_may_not_ask(server, asked, headers):
-    assert post(server, b'["pull x [N]", 3.5]', **headers) == 403
-    assert asked == []
+def test_nonsense_gets_an_answer(server, pages, body, said):
+    status, text = post(server, body)
+    assert status == 400
+    assert said in text
+    assert post(server, GOOD)[0] == 204
+
+
+@pytest.mark.parametrize(
+    ("length", "expected"),
+    [("9" * 400, 413), ("9" * 5000, 413), ("8193", 413), ("-1", 411), ("x", 411), ("", 411)],
+)
+def test_sizes_that_are_none_get_an_answer(server, length, expected):
+    assert post(server, GOOD, **{"Content-Length": length})[0] == expected
+    assert post(server, GOOD)[0] == 204
 
 
 @pytest.mark.parametrize("port", [-1, 70000])
 def test_a_port_that_is_none_is_refused(port):
     with pytest.raises(InputError, match=f"--port {port}: "):
-        PageServer(port, "", dict, print)
+        PageServer(port, dict, print)
 
 
 def test_a_port_that_is_taken_is_refused(server):
-    port = int(server.url.rsplit(":", 1)[1][:-1])
+    port = urlsplit(server.url).port
     with pytest.raises(InputError, match=f"--port {port}: Address already in use"):
-        PageServer(port, "", dict, print)
+        PageServer(port, dict, print)

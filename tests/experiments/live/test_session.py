@@ -1,17 +1,16 @@
 """A whole session without a browser and faster than the clock: what is done is repeated exactly."""
 
 import json
-from queue import SimpleQueue
 
 import h5py
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat, MeshcatParams
 
 from diagrams.surroundings.operator_file import read_controls
 from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
 from experiments.live.pacing import RealTimePace
+from experiments.live.pages import Pages
 from experiments.live.session import LiveSession, Output
 from experiments.live.start import with_operator
 from experiments.live.status import LiveStatus
@@ -38,17 +37,27 @@ class Rehearsal:
     def __init__(self, folder, name, *changes):
         scenario = with_operator(read_scenario(name, list(changes)))
         prepared = prepare(scenario, 60.0, recording=True, progress=Silent(), live=True)
-        self.status, self.said, self._requests = LiveStatus(name), [], SimpleQueue()
+        # a clock that stands still: nobody is silent
+        self.status, self.said, self._pages = LiveStatus(name), [], Pages(lambda: 0.0)
+        self._hand = {}
         self.session = LiveSession(
             prepared,
             name,
-            Meshcat(MeshcatParams(host="127.0.0.1", port=0)),
-            self._requests,
+            self._pages,
             self.status,
             Output(TakeFolders(folder, []), figures=False, recording=False),
             self.said.append,
             RealTimePace(lambda: 0.0, lambda _: None),
         )
+
+    def _say(self, changes):
+        """A hand keeps pulling, until it pulls otherwise or a reset takes it off."""
+        settings = {name: changes[name] for name in changes if not name.startswith("pull")}
+        self._hand |= {name: changes[name] for name in changes.keys() - settings.keys()}
+        if RESET in settings:
+            self._hand = {}
+        message = {"client": "a", "hand": self._hand, "set": settings}
+        assert self._pages.hear(json.dumps(message).encode())
 
     def play(self, *script):
         left, seen = list(script), []
@@ -57,8 +66,7 @@ class Rehearsal:
             """Called once per round; a reset puts the time back."""
             seen.append((self.session.end, self.status.phase, self.status.content()))
             while left and left[0][0](self):
-                for request in left.pop(0)[1]:
-                    self._requests.put(request)
+                self._say(dict(left.pop(0)[1]))
             return False
 
         self.session.run(follow, Silent())
@@ -197,3 +205,17 @@ def test_who_does_nothing_leaves_nothing(tmp_path):
     rehearsal.play(((lambda _: True), [(END, 1.0)]))
     assert rehearsal.session.kept == []
     assert not (tmp_path / "takes").exists()
+
+
+def test_what_was_done_is_kept_even_if_the_session_breaks(tmp_path):
+    rehearsal = Rehearsal(tmp_path / "takes", "vf_soft_circle")
+
+    def draw(*_, **__):
+        if rehearsal.session.end > 0.1:
+            raise ValueError("something else")
+
+    rehearsal.session._scene.draw = draw
+    with pytest.raises(ValueError, match="something else"):
+        rehearsal.play(at(0.05, **{"pull z [N]": 30.0}))
+    (kept,) = rehearsal.session.kept
+    assert (kept.folder / "log.h5").exists()
