@@ -27,7 +27,7 @@ class Promise:
     Attributes:
         mass: m [kg].
         damping: d [N s/m]; None where a person may change it, so that the log's counts.
-        largest_speed: Of the free motion [m/s].
+        largest_speed: Of the free motion [m/s]; the log tells where it was lower.
         capacity: Of the tank [J].
     """
 
@@ -85,7 +85,10 @@ def audit(log: RunLog, promise: Promise) -> Metrics:
     d = log["free_damping"].values[:count, 0]
     if promise.damping is not None:
         d = np.full(count, promise.damping)
-    metrics.add("audit_stationarity", _stationarity(v, before, f, slots, promise, d, T), "m/s")
+    limit = np.minimum(log["speed_limit"].values[:count, 0], promise.largest_speed)
+    inertia = (promise.mass + T * d)[:, None]
+    free = (promise.mass * before + T * f) / inertia
+    metrics.add("audit_stationarity", _stationarity(v, free, limit, slots, T / inertia), "m/s")
     metrics.add("audit_allowance", _allowance(v, slots), "m/s")
     work = T * np.sum(f * v, axis=1)
     lost = T * d * np.sum(v * v, axis=1)
@@ -120,19 +123,11 @@ def _read(values: FloatArray) -> _Slots:
 
 
 def _stationarity(
-    v: FloatArray,
-    before: FloatArray,
-    f: FloatArray,
-    slots: _Slots,
-    promise: Promise,
-    d: FloatArray,
-    T: float,
+    v: FloatArray, free: FloatArray, limit: FloatArray, slots: _Slots, mobility: FloatArray
 ) -> float:
-    inertia = (promise.mass + T * d)[:, None]
-    wanted = (promise.mass * before + T * f) / inertia
-    size = np.linalg.norm(wanted, axis=1, keepdims=True)
-    wanted *= np.minimum(1.0, promise.largest_speed / np.maximum(size, 1e-12))
-    held = T / inertia * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
+    size = np.linalg.norm(free, axis=1)
+    wanted = free * np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
+    held = mobility * np.sum((slots.used * slots.phi)[..., None] * slots.n, axis=1)
     return float(np.max(np.linalg.norm(v - wanted - held, axis=1)))
 
 

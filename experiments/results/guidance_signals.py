@@ -19,6 +19,7 @@ _SINGLE = {
     "rate": ("region_rate", "1", ["rho"]),
     "spring": ("spring_energy", "J", ["V"]),
     "damping": ("free_damping", "N s/m", ["d"]),
+    "limit": ("speed_limit", "m/s", ["v"]),
     "squeezed": ("squeezed", "1", ["squeezed"]),
 }
 _SLOT_UNITS = "1, m, 1, 1, 1, m/s, m/s, N, N/m, m"

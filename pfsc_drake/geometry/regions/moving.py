@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.geometry.regions.course import Course
-from pfsc_drake.geometry.regions.placement import axes_along, checked_point
+from pfsc_drake.geometry.regions.placement import Triple, axes_along, checked_point
 from pfsc_drake.geometry.regions.region import Distance, Region
 
 
@@ -30,6 +30,18 @@ class MovingRegion(ABC):
 
         Returns:
             See :meth:`Region.distance`.
+        """
+
+    @abstractmethod
+    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
+        """Way from one time of the clock to another of what moves with the region, m.
+
+        Args:
+            x: Where it is at first, world axes, m.
+            y: See x.
+            z: See x.
+            clock: s.
+            clock_next: s.
         """
 
     @abstractmethod
@@ -79,6 +91,12 @@ class ShiftedRegion(MovingRegion):
         a, b, c = self._direction
         return self._distance(x - way * a, y - way * b, z - way * c)
 
+    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
+        """See the base class."""
+        way = self._course.at(clock_next) - self._course.at(clock)
+        a, b, c = self._direction
+        return way * a, way * b, way * c
+
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
         """See the base class."""
         return self._course.largest_rate
@@ -115,6 +133,14 @@ class TurningRegion(MovingRegion):
         x, y, z = self._turned(x - a, y - b, z - c, cosine, -sine)
         h, x, y, z = self._distance(x + a, y + b, z + c)
         return h, *self._turned(x, y, z, cosine, sine)
+
+    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
+        """See the base class."""
+        angle = self._course.at(clock_next) - self._course.at(clock)
+        a, b, c = self._point
+        x, y, z = x - a, y - b, z - c
+        a, b, c = self._turned(x, y, z, math.cos(angle), math.sin(angle))
+        return a - x, b - y, c - z
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
         """See the base class."""

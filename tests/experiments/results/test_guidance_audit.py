@@ -8,8 +8,13 @@ import pytest
 
 from experiments.results.guidance_audit import AUDITED, Promise, audit
 from experiments.results.run_log import RunLog
+from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.lead import ServoLead
+from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.geometry.regions.shapes import SphereRegion
 from tests.control.fixtures.point_robot import (
     DAMPING,
     DELAY,
@@ -20,6 +25,7 @@ from tests.control.fixtures.point_robot import (
     half_space,
     lead,
     program,
+    random_hand,
 )
 
 PROMISE = Promise(MASS, DAMPING, 2.0, 1.0)
@@ -50,7 +56,7 @@ def rows():
     return happened()
 
 
-def make_log(rows):
+def make_log(rows, regions=REGIONS):
     y_t, values, layout = rows
     log = RunLog(PERIOD * np.arange(len(values)))
     part = {name: values[:, rows].copy() for name, rows in layout.fields.items()}
@@ -60,10 +66,11 @@ def make_log(rows):
     log.add("near_regions", part["near"], "")
     log.add("tank", part["tank"], "J")
     log.add("free_damping", part["damping"], "N s/m")
+    log.add("speed_limit", part["limit"], "m/s")
     log.add("y_t", y_t.copy(), "m")
     clock = part["clock"][:, 0] - LAG - DELAY
     pairs = zip(y_t, clock, strict=True)
-    distances = [[region(y, time)[0] for region in REGIONS] for y, time in pairs]
+    distances = [[region(y, time)[0] for region in regions] for y, time in pairs]
     log.add("region_distance", np.array(distances), "m")
     return log
 
@@ -155,6 +162,44 @@ def test_a_hand_that_gained_more_than_the_tank_is_seen(rows):
     log = make_log(rows)
     tamper_bound(log)
     assert worst(log)["audit_bound"] < 0.0
+
+
+def test_what_a_budget_has_not_looked_at_limits_the_speed_and_is_no_alarm():
+    """Six balls around the tool, two distances a tick: brute force tells how near the unseen are.
+
+    What has not been looked at is so far away that the tool, braking, cannot reach it.
+    """
+    angles = np.arange(6) * math.pi / 3.0
+    balls = [
+        SphereRegion((0.045 * math.cos(a), 0.045 * math.sin(a), 0.0), 0.02, inside=False)
+        for a in angles
+    ]
+    around = [lambda y, clock, ball=ball: ball.distance(*y) for ball in balls]
+    parameters = GuidanceParameters(largest_speed=2.0, braking=2.0)
+    nearby = ScheduledRegions(balls, parameters, PERIOD, looks=2)
+    admittance, hard = Admittance(MASS, DAMPING, PERIOD), [math.inf] * len(balls)
+    guidance = ProgramGuidance(parameters, admittance, ServoLead(LAG, DELAY, PERIOD), nearby, hard)
+    record = lead(guidance, (0, 0, 0), random_hand(3), 1.0)
+    layout = GuidanceRecord(len(balls))
+    pairs = zip(record.steps, record.force, strict=True)
+    log = make_log((np.array(record.y), np.array([layout.row(*p) for p in pairs]), layout), around)
+    limit = log["speed_limit"].values[:, 0]
+    assert limit.min() < 0.4 * limit.max()
+    assert worst(log)["audit_stationarity"] < 1e-9
+    for step in record.steps:
+        unseen = [
+            ball.distance(*step.point)[0] for i, ball in enumerate(balls) if i not in step.evaluated
+        ]
+        braking = parameters.braking * parameters.approach_time**2
+        way = min(unseen) - step.limit * PERIOD
+        free = (
+            way / parameters.approach_time
+            if way < braking
+            else math.sqrt(2 * parameters.braking * (way - braking / 2))
+        )
+        assert np.linalg.norm(step.velocity) < 1e-9 or step.limit <= free + 1e-9
+    log["speed_limit"].values[:] = 2.0
+    assert worst(log)["audit_stationarity"] > 1e-3
 
 
 def test_a_run_without_ticks_has_no_audit(rows):
