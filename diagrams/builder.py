@@ -113,6 +113,7 @@ def build_station(
         start.place,
         on_motors,
         task.warnings
+        + scenario.model_error.warnings
         + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),

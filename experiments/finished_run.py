@@ -211,7 +211,7 @@ def _measure(
     if analysis is not None:
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     set_promises(metrics, settings)
-    lasted = end > prepared.length - 1.5 * settings.controller.sampling_time
+    lasted = end > settings.judged_after - 1.5 * settings.controller.sampling_time
     results.write("metrics.json", metrics.to_json())
     warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)

@@ -34,7 +34,6 @@ class PreparedRun:
         integration: How its plant is integrated.
         drawing: What its robot looks like, if that had to be read.
         warnings: What may not go as well as hoped, one sentence each.
-        length: How long the scenario itself is [s]; a run may be shorter.
     """
 
     settings: Scenario
@@ -43,7 +42,6 @@ class PreparedRun:
     integration: Integration
     drawing: RobotDrawing | None
     warnings: list[str]
-    length: float
 
 
 def prepare(
@@ -76,6 +74,7 @@ def prepare(
         settings.name = settings.name or scenario.name
         length = settings.duration or station.reference_duration
         settings.duration = duration or length
+        settings.judged_after = settings.judged_after or length
         check_length(settings, station)
         if recording:
             check_frames(settings.duration, settings.simulation.frame_period)
@@ -85,7 +84,7 @@ def prepare(
     resolve_files(settings, folder)
     warnings = station.warnings + (drawing.warnings if drawing else [])
     text = dump_typed(settings)
-    return PreparedRun(settings, text, station, integration, drawing, warnings, length)
+    return PreparedRun(settings, text, station, integration, drawing, warnings)
 
 
 def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:

@@ -5,6 +5,7 @@ import dataclasses as dc
 from diagrams.scenario.checks import require, require_between
 
 SMALLEST, LARGEST = 1e-4, 10.0  # m, of workpiece and ball
+_MODULUS = 1e3, 1e12  # Pa: softer than any foam, harder than any stone
 STEPS = (1e-5, 1e-3)  # s, of a plant with contact
 
 
@@ -29,7 +30,7 @@ class SoftBall:
     def __post_init__(self) -> None:
         for key in ("radius", "resolution"):
             require_between(key, getattr(self, key), SMALLEST, LARGEST, "m, a positive number")
-        require_between("modulus", self.modulus, 1.0, 1e12, "Pa, a positive number")
+        require_between("modulus", self.modulus, *_MODULUS, "Pa; 4 MPa are 4e+06")
         for key, most in {"dissipation": 1e6, "friction": 1e3}.items():
             require_up_to(key, getattr(self, key), most)
 

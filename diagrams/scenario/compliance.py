@@ -4,13 +4,23 @@ import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_not_negative, require_positive
+from diagrams.scenario.checks import (
+    require,
+    require_between,
+    require_not_negative,
+    require_positive,
+)
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
 from pfsc_drake.control.compliance.press import PressParameters
+from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
 
 SOURCES = ("sensor", "observed")
+# of what a hand feels: least and most mass, most damping, most stiffness, and their units
+_OF_PLACES = (1e-3, 1e4, 1e7, 1e9, "kg", "N s/m", "N/m")
+_OF_ANGLES = (1e-6, 1e4, 1e6, 1e8, "kg m^2", "Nm s/rad", "Nm/rad")
+_BOUNDS = {"tangential": _OF_PLACES, "transversal": _OF_PLACES, "rotational": _OF_ANGLES}
 
 
 @dc.dataclass
@@ -61,6 +71,8 @@ class ComplianceParameters:
 
     def __post_init__(self) -> None:
         require(self.source in SOURCES, "source", self.source, ", ".join(SOURCES))
+        for kind, bounds in _BOUNDS.items():
+            _require_bearable(kind, getattr(self, kind), *bounds)
         stiffness = self.transversal.stiffness
         free = not stiffness.at and stiffness.value == 0.0
         allowed = "null unless transversal.stiffness.value is 0, which lets the force decide"
@@ -80,6 +92,31 @@ class ComplianceParameters:
     def impedance(self) -> ImpedanceParameters:
         """Return the impedance of all coordinates."""
         return ImpedanceParameters(self.tangential, self.transversal, self.rotational)
+
+
+def _require_bearable(
+    kind: str,
+    said: CoordinateImpedance,
+    lightest: float,
+    heaviest: float,
+    most_damped: float,
+    stiffest: float,
+    *units: str,
+) -> None:
+    """Refuse numbers that are far from all that a hand feels; infinite stiffness is allowed."""
+    for number in said.mass.values or [said.mass.value]:
+        require_between(f"{kind}.mass", number, lightest, heaviest, units[0])
+    damping = said.damping
+    if isinstance(damping, SlowEnds):
+        dampings = [damping.most]
+    else:
+        dampings = damping.values or [damping.value]
+    for number in dampings:
+        require_between(f"{kind}.damping", number, 0.0, most_damped, units[1])
+    for number in said.stiffness.values or [said.stiffness.value]:
+        good = number <= stiffest or number == np.inf
+        allowed = f"0 to {stiffest:g} {units[2]}, or .inf for position control"
+        require(good, f"{kind}.stiffness", number, allowed)
 
 
 @dc.dataclass

@@ -12,6 +12,7 @@ from pfsc_drake.yaml.files import NAME_OR_FILE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 MANIFOLDS = ("path", "trajectory", "surface", "space")
+_SLOWEST, _FASTEST = 1e-2, 1e5  # rad/s, of an estimate
 _TORQUE_SOURCES = ("none", "known", "measured", "observed")
 
 
@@ -123,7 +124,9 @@ class ExternalTorqueParameters:
     def __post_init__(self) -> None:
         known = self.source in _TORQUE_SOURCES
         require(known, "source", self.source, ", ".join(_TORQUE_SOURCES))
-        require_not_negative("bandwidth", self.bandwidth)
+        good = self.bandwidth == 0.0 or _SLOWEST <= self.bandwidth <= _FASTEST
+        allowed = f"0, or {_SLOWEST:g} to {_FASTEST:g} rad/s"
+        require(good, "bandwidth", self.bandwidth, allowed)
         possible = self.source != "observed" or self.bandwidth > 0.0
         require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 

@@ -5,14 +5,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_not_negative, require_numbers
+from diagrams.scenario.checks import require, require_between, require_numbers
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 _FACTORS = ("mass", "inertia", "rotor_inertia", "stiffness", "friction", "link_length")
 _LEAST, _MOST = 1e-3, 1e3
-_LARGEST_OFFSET_DEG, _FARTHEST = 90.0, 10.0  # deg, m
+_LARGEST_OFFSET_DEG, _FARTHEST, _HEAVIEST = 90.0, 10.0, 1e3  # deg, m, kg
+_DOUBTED = 0.5, 2.0
+_MOST_RANDOM = {"center": (1.0, "m"), "joint_offset_deg": (30.0, "deg"), "tool_mass": (100.0, "kg")}
 
 
 def _one() -> list[float]:
@@ -50,7 +52,8 @@ class RandomModelError:
     def __post_init__(self) -> None:
         require(self.seed >= 0, "seed", self.seed, "zero or a positive integer")
         for key in self._kinds():
-            require_not_negative(key, getattr(self, key))
+            most, unit = _MOST_RANDOM.get(key, (1.0, "as a fraction"))
+            require_between(key, getattr(self, key), 0.0, most, unit)
 
     @classmethod
     def _kinds(cls) -> list[str]:
@@ -110,10 +113,26 @@ class ModelErrorParameters:
         good = len(offsets) > 0 and all(abs(value) <= _LARGEST_OFFSET_DEG for value in offsets)
         allowed = f"numbers of at most {_LARGEST_OFFSET_DEG:g} deg, one or one per joint"
         require(good, "joint_offset_deg", offsets, allowed)
-        require(bool(np.isfinite(self.tool_mass)), "tool_mass", self.tool_mass, "a finite number")
+        light = abs(self.tool_mass) <= _HEAVIEST
+        require(light, "tool_mass", self.tool_mass, f"numbers of at most {_HEAVIEST:g} kg")
         require_numbers("tool_center", self.tool_center, 3)
         near = all(abs(value) <= _FARTHEST for value in self.tool_center)
         require(near, "tool_center", self.tool_center, f"up to {_FARTHEST:g} m")
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was perhaps not meant, one sentence each: errors where factors are asked for."""
+        least, most = _DOUBTED
+        doubted = {
+            key: next((f for f in getattr(self, key) if not least <= f <= most), None)
+            for key in _FACTORS
+        }
+        return [
+            f"model_error.{key} = {factor:g} is a factor: the controller believes "
+            f"{factor:g} times what is true; 0.95 is 5 % too low, 1.05 is 5 % too high"
+            for key, factor in doubted.items()
+            if factor is not None
+        ]
 
     @property
     def is_given(self) -> bool:

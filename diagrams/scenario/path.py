@@ -6,7 +6,14 @@ from typing import Union
 
 import numpy as np
 
-from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
+from diagrams.scenario.checks import (
+    LARGEST_ANGLE,
+    require,
+    require_direction,
+    require_length,
+    require_numbers,
+    require_place,
+)
 from diagrams.scenario.surface import SurfaceShape
 from pfsc_drake.geometry.rotation import rotation_to_axis
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
@@ -14,19 +21,6 @@ from pfsc_drake.yaml.files import FILE
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 TASKS = ("full", "tool_axis", "none")
-
-
-def _require_place(key: str, values: list[float]) -> None:
-    """Refuse what is no point [m] within reach of numbers."""
-    require_numbers(key, values, 3)
-    near = max(map(abs, values)) <= FARTHEST
-    require(near, key, values, f"3 numbers of at most {FARTHEST:g} m")
-
-
-def _require_length(key: str, value: float) -> None:
-    """Refuse what is no length of a path [m]."""
-    good = SHORTEST <= value <= FARTHEST
-    require(good, key, value, f"{SHORTEST:g} m to {FARTHEST:g} m")
 
 
 @dc.dataclass
@@ -42,9 +36,9 @@ class Line:
     end: list[float] = dc.field(default_factory=lambda: [0.8, 0.3, 1.0])
 
     def __post_init__(self) -> None:
-        _require_place("start", self.start)
-        _require_place("end", self.end)
-        _require_length("distance of start and end", math.dist(self.start, self.end))
+        require_place("start", self.start)
+        require_place("end", self.end)
+        require_length("distance of start and end", math.dist(self.start, self.end))
 
 
 @dc.dataclass
@@ -65,8 +59,8 @@ class Circle:
     axis_v: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def __post_init__(self) -> None:
-        _require_length("radius", self.radius)
-        _require_place("center", self.center)
+        require_length("radius", self.radius)
+        require_place("center", self.center)
         for key in ("axis_u", "axis_v"):
             require_numbers(key, getattr(self, key), 3)
 
@@ -176,7 +170,7 @@ class Intersection:
             count in (0, 2), "surfaces", f"{count} given", "2, e.g. [!Plane {..}, !Sphere {..}]"
         )
         if self.near:
-            _require_place("near", self.near)
+            require_place("near", self.near)
         good = 1e-9 <= self.tolerance <= FARTHEST
         require(good, "tolerance", self.tolerance, f"1e-09 m to {FARTHEST:g} m")
 
@@ -226,8 +220,7 @@ class OrientationParameters:
     def __post_init__(self) -> None:
         require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
         require(self.task in TASKS, "task", self.task, ", ".join(TASKS))
-        require_numbers("tool_axis", self.tool_axis, 3)
-        require(any(self.tool_axis), "tool_axis", self.tool_axis, "3 numbers, not all zero")
+        require_direction("tool_axis", self.tool_axis)
         for i, keyframe in enumerate(self.keyframes):
             key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
             require_numbers(key, angles, 3)

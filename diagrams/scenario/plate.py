@@ -18,6 +18,7 @@ from pfsc_drake.physics.suction import SuctionParameters
 
 STARTS = ("magazine", "held", "frame")
 _SMALLEST, _LARGEST = 1e-4, 2.0  # m
+_LIGHTEST, _HEAVIEST = 1e-3, 100.0  # kg; what suction cups hold
 _FARTHEST, _LARGEST_TURN = 0.02, 0.2  # m, rad; of misplacements
 _MOST_WEDGES = 64
 
@@ -204,8 +205,8 @@ class PlateParameters:
         require_numbers("size", self.size, 3)
         good = all(_SMALLEST <= length <= _LARGEST for length in self.size)
         require(good, "size", self.size, f"3 numbers of {_SMALLEST:g} to {_LARGEST:g} m")
-        require_positive("mass", self.mass)
-        require_not_negative("believed_mass", self.believed_mass)
+        require_between("mass", self.mass, _LIGHTEST, _HEAVIEST, "kg")
+        require_between("believed_mass", self.believed_mass, 0.0, _HEAVIEST, "kg")
         require(self.start in STARTS, "start", self.start, ", ".join(STARTS))
         require(self.release > 0.0, "release", self.release, "a positive number of seconds")
         require(len(self.rests) >= 3, "rests", self.rests, "three [x, y] or more")

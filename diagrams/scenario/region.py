@@ -8,8 +8,11 @@ import numpy as np
 from diagrams.scenario.checks import (
     require,
     require_between,
+    require_direction,
+    require_length,
     require_not_negative,
     require_numbers,
+    require_place,
     require_positive,
 )
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
@@ -44,7 +47,7 @@ class Box(Placed):
         super().__post_init__()
         require_numbers("size", self.size, 3)
         for length in self.size:
-            require_positive("size", length)
+            require_length("size", length)
 
 
 @dc.dataclass
@@ -121,7 +124,7 @@ class Shift:
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        _require_direction("direction", self.direction)
+        require_direction("direction", self.direction)
         far = self.way.extent <= _LARGEST
         require(far, "way", self.way.extent, f"no further than {_LARGEST:g} m")
 
@@ -141,8 +144,8 @@ class Turn:
     way: Visiting | Swinging = dc.field(default_factory=Visiting)
 
     def __post_init__(self) -> None:
-        _require_direction("axis", self.axis)
-        require_numbers("point", self.point, 3)
+        require_direction("axis", self.axis)
+        require_place("point", self.point)
         far = self.way.extent <= _LARGEST_DEG
         require(far, "way", self.way.extent, f"no further than {_LARGEST_DEG:g} deg")
 
@@ -205,8 +208,3 @@ def encloses(shape: RegionShape) -> bool:
     if isinstance(shape, Fitted):
         return all(shape.closed)
     return not isinstance(shape, Plane)
-
-
-def _require_direction(key: str, values: list[float]) -> None:
-    require_numbers(key, values, 3)
-    require(bool(np.any(values)), key, values, "not all zero")

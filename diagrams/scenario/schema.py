@@ -85,6 +85,8 @@ class Scenario:
         plate: Plate with pins that a gripper takes from a magazine and mounts into a frame. None
             without the block.
         duration: Simulated time [s]; 0 for the length of the reference.
+        judged_after: Simulated time after which targets count, which a run that was cut short does
+            not reach [s]; 0 for ``duration``.
         settling_tolerance: Distance from the path that counts as converged [m].
         targets: What metrics should be, by metric; under a law's name for that law only.
     """
@@ -117,13 +119,15 @@ class Scenario:
     workpiece: WorkpieceParameters | None = None
     plate: PlateParameters | None = None
     duration: float = 0.0
+    judged_after: float = 0.0
     settling_tolerance: float = 1e-4
     targets: dict[str, dict[str, Target]] = dc.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         plain = not set(self.name) & set("/\\:") and self.name not in (".", "..")
         require(plain, "name", self.name, "a name without slashes and colons")
-        require_not_negative("duration", self.duration)
+        for key in ("duration", "judged_after"):
+            require_not_negative(key, getattr(self, key))
         require_positive("settling_tolerance", self.settling_tolerance)
         for law in self.targets:
             require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))

@@ -3,9 +3,7 @@
 import dataclasses as dc
 from typing import Union
 
-import numpy as np
-
-from diagrams.scenario.checks import LARGEST_ANGLE, require, require_numbers
+from diagrams.scenario.checks import LARGEST_ANGLE, require, require_direction, require_numbers
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 
@@ -47,8 +45,7 @@ class SurfaceOrientationParameters:
         good = max(map(abs, self.angles_deg)) <= LARGEST_ANGLE
         allowed = f"3 numbers of at most {LARGEST_ANGLE:g} deg"
         require(good, "angles_deg", self.angles_deg, allowed)
-        require_numbers("tool_axis", self.tool_axis, 3)
-        require(bool(np.any(self.tool_axis)), "tool_axis", self.tool_axis, "not all zero")
+        require_direction("tool_axis", self.tool_axis)
 
 
 @dc.dataclass

@@ -2,9 +2,12 @@
 
 import dataclasses as dc
 
-import numpy as np
-
-from diagrams.scenario.checks import require, require_numbers, require_positive
+from diagrams.scenario.checks import (
+    require,
+    require_direction,
+    require_length,
+    require_place,
+)
 from diagrams.scenario.surface_shapes import Placed, Turned
 from pfsc_drake.geometry.size import FARTHEST
 from pfsc_drake.yaml.files import FILE
@@ -76,13 +79,14 @@ class Fitted(Placed):
         require(good, "grid", self.grid, "empty, or [rows, columns] of two or more each")
         require(len(self.closed) == 2, "closed", self.closed, "two of true and false")
         self._require_of_grids()
-        for key in ("base_axis", "seen_from", "along"):
+        for key in ("base_axis", "along"):
             if getattr(self, key):
-                require_numbers(key, getattr(self, key), 3)
-        require_numbers("base_point", self.base_point, 3)
+                require_direction(key, getattr(self, key))
+        for key in ("base_point", "seen_from"):
+            if getattr(self, key):
+                require_place(key, getattr(self, key))
         if self.base_axis:
             require(self.base == "cylinder", "base", self.base, "cylinder, with base_axis")
-            require(bool(np.any(self.base_axis)), "base_axis", self.base_axis, "not all zero")
 
     def _require_of_grids(self) -> None:
         """Refuse what says nothing of the points that are given."""
@@ -145,7 +149,6 @@ class Extruded(Placed):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_numbers("direction", self.direction, 3)
-        require(bool(np.any(self.direction)), "direction", self.direction, "not all zero")
-        require_positive("length", self.length)
+        require_direction("direction", self.direction)
+        require_length("length", self.length)
         _require_smoothness(self.smoothness)

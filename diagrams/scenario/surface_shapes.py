@@ -2,12 +2,27 @@
 
 import dataclasses as dc
 
-from diagrams.scenario.checks import require, require_numbers
+import numpy as np
+
+from diagrams.scenario.checks import (
+    require,
+    require_direction,
+    require_length,
+    require_numbers,
+    require_place,
+)
+from pfsc_drake.geometry.size import FARTHEST
+from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+
+_LARGEST_TURN = 720.0  # deg
+_MOST_BENT = 1e4  # 1/m
 
 
 def _require_ends(key: str, values: list[float]) -> None:
+    """Refuse what are no ends of a length [m]."""
     require_numbers(key, values, 2)
-    require(values[0] < values[1], key, values, "two numbers that increase")
+    good = -FARTHEST <= values[0] < values[1] <= FARTHEST
+    require(good, key, values, f"two numbers that increase, of at most {FARTHEST:g} m")
 
 
 @dc.dataclass
@@ -17,16 +32,28 @@ class Placed:
     Attributes:
         origin: A point of it, or on its axis [m].
         axis: Direction of its third axis, of any length.
-        start: Direction to which its first axis leans.
+        start: Direction to which its first axis leans; empty for x_0, or y_0 if the third axis is
+            along x_0.
     """
 
     origin: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-    start: list[float] = dc.field(default_factory=lambda: [1.0, 0.0, 0.0])
+    start: list[float] = dc.field(default_factory=list)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Its axes as columns, shape (3, 3).
+
+        Raises:
+            InputError: If ``start`` is along ``axis``.
+        """
+        return rotation_from_axes(self.axis, self.start or None)
 
     def __post_init__(self) -> None:
-        for key in ("origin", "axis", "start"):
-            require_numbers(key, getattr(self, key), 3)
+        require_place("origin", self.origin)
+        require_direction("axis", self.axis)
+        if self.start:
+            require_direction("start", self.start)
 
 
 @dc.dataclass
@@ -44,7 +71,11 @@ class Turned(Placed):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.angles_deg:
-            _require_ends("angles_deg", self.angles_deg)
+            require_numbers("angles_deg", self.angles_deg, 2)
+            first, last = self.angles_deg
+            good = -_LARGEST_TURN <= first < last <= _LARGEST_TURN
+            allowed = f"two numbers that increase, of at most {_LARGEST_TURN:g} deg"
+            require(good, "angles_deg", self.angles_deg, allowed)
 
 
 @dc.dataclass
@@ -80,6 +111,11 @@ class Paraboloid(OverRectangle):
 
     coefficient: float = 1.0
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        good = abs(self.coefficient) <= _MOST_BENT
+        require(good, "coefficient", self.coefficient, f"a number of at most {_MOST_BENT:g} 1/m")
+
 
 @dc.dataclass
 class Cylinder(Turned):
@@ -95,6 +131,7 @@ class Cylinder(Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_length("radius", self.radius)
         _require_ends("heights", self.heights)
 
 
@@ -112,7 +149,11 @@ class Cone(Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        allowed = "above 0 and below 90 deg"
+        require(0.0 < self.opening_deg < 90.0, "opening_deg", self.opening_deg, allowed)
         _require_ends("distances", self.distances)
+        allowed = "positive numbers of m: a cone has no normal at its apex"
+        require(self.distances[0] > 0.0, "distances", self.distances, allowed)
 
 
 @dc.dataclass
@@ -129,7 +170,14 @@ class Sphere(Turned):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_ends("latitudes_deg", self.latitudes_deg)
+        require_length("radius", self.radius)
+        require_numbers("latitudes_deg", self.latitudes_deg, 2)
+        good = -90.0 < self.latitudes_deg[0] < self.latitudes_deg[1] < 90.0
+        allowed = (
+            "two numbers that increase between -90 and 90 deg, without the poles, where longitudes "
+            "are undefined; turn axis to have a pole elsewhere"
+        )
+        require(good, "latitudes_deg", self.latitudes_deg, allowed)
 
 
 @dc.dataclass
@@ -143,3 +191,10 @@ class Torus(Turned):
 
     ring_radius: float = 0.3
     tube_radius: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key in ("ring_radius", "tube_radius"):
+            require_length(key, getattr(self, key))
+        allowed = f"more than tube_radius = {self.tube_radius:g} m"
+        require(self.ring_radius > self.tube_radius, "ring_radius", self.ring_radius, allowed)

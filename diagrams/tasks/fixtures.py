@@ -21,7 +21,6 @@ from pfsc_drake.geometry.regions.checks import (
 )
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.regions.region import Region
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.shapes import plane
 from pfsc_drake.geometry.surfaces.surface import Surface
 
@@ -114,7 +113,7 @@ def _make_fixture(
 
 def _faces(box: Box) -> Sequence[Surface]:
     """Return the six sides of a box."""
-    axes, half = rotation_from_axes(box.axis, box.start), np.array(box.size) / 2.0
+    axes, half = box.rotation, np.array(box.size) / 2.0
     faces = []
     for k, sign in itertools.product(range(3), (-1.0, 1.0)):
         i, j = (k + 1) % 3, (k + 2) % 3

@@ -36,7 +36,6 @@ from pfsc_drake.geometry.regions.shapes import (
     TorusRegion,
 )
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion, normal_points_outwards
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 
 # Class C^k that a region's surface needs.
@@ -75,8 +74,7 @@ def _region_at_rest(
         return _of_profile(shape, inside, folder)
     origin, axis = shape.origin, shape.axis
     if isinstance(shape, Box):
-        rotation = rotation_from_axes(axis, shape.start)
-        return PolyhedronRegion(box_corners(shape.size, origin, rotation))
+        return PolyhedronRegion(box_corners(shape.size, origin, shape.rotation))
     if isinstance(shape, Paraboloid):
         return ParaboloidRegion(shape.coefficient, origin, axis, inside=inside)
     if isinstance(shape, Cylinder):
@@ -110,7 +108,7 @@ def _of_profile(
             # of an open one inside is below, by its normal
             turned = shape.inward and not shape.closed
             return RevolvedRegion(profile, shape.origin, shape.axis, inside=inside != turned)
-        direction = rotation_from_axes(shape.axis, shape.start) @ shape.direction
+        direction = shape.rotation @ shape.direction
         return ExtrudedRegion(profile, direction, inside=inside)
     except InputError as error:
         raise InputError(f"{shape.file}: {error}") from None

@@ -21,7 +21,6 @@ from pfsc_drake.geometry import (
     zyz_to_quaternion,
 )
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.shapes import (
     Pair,
     Turned,
@@ -83,7 +82,7 @@ def surface_from_shape(
 
 
 def _from_numbers(shape: NumberShape) -> Surface:
-    rotation = rotation_from_axes(shape.axis, shape.start)
+    rotation = shape.rotation
     if isinstance(shape, Plane | Paraboloid):
         size = (_pair(shape.first), _pair(shape.second))
         if isinstance(shape, Plane):

@@ -16,7 +16,6 @@ from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
 from pfsc_drake.geometry.surfaces.grid import surface_through_grid
 from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.point_file import Unit, read_surface_points
 from pfsc_drake.geometry.surfaces.profile_file import read_profile
 from pfsc_drake.geometry.surfaces.residuals import Residuals
@@ -57,10 +56,10 @@ def surface_from_file(
         file = _file_of(shape, folder)
         tell(0.0, f"reading {file.name}")
         points = read_surface_points(file, cast(Unit, shape.unit))
-        placed = points @ rotation_from_axes(shape.axis, shape.start).T + shape.origin
+        placed = points @ shape.rotation.T + shape.origin
         tell(0.0, f"fitting a surface to {len(points)} points")
         return _near_grid(shape, placed, made) if shape.grid else _scattered(shape, placed, made)
-    rotation = rotation_from_axes(shape.axis, shape.start)
+    rotation = shape.rotation
     profile = profile_from_file(shape, smoothness, folder)
     if isinstance(shape, Revolved):
         first, last = np.deg2rad(shape.angles_deg) if shape.angles_deg else (0.0, 0.0)
@@ -102,7 +101,7 @@ def profile_from_file(
                 "since a profile must not meet the axis"
             )
     else:
-        rotation = rotation_from_axes(shape.axis, shape.start)
+        rotation = shape.rotation
         points = read_profile(file, ["x", "y", "z"]) @ rotation.T + shape.origin
     try:
         return interpolate(points, smoothness=shape.smoothness or smoothness, closed=shape.closed)

@@ -29,12 +29,13 @@ def checked_placement(
     return o, R
 
 
-def rotation_from_axes(axis: ArrayLike, start: ArrayLike) -> np.ndarray:
+def rotation_from_axes(axis: ArrayLike, start: ArrayLike | None = None) -> np.ndarray:
     """Rotation whose z-axis is a given one, and its x-axis as near as can be to another.
 
     Args:
         axis: Direction of the z-axis, of any length, [3].
-        start: Direction that the x-axis leans to, [3].
+        start: Direction that the x-axis leans to, [3]; by default that of the world's x-axis, or of
+            its y-axis where z is along x.
 
     Returns:
         Rotation matrix [3, 3].
@@ -42,8 +43,11 @@ def rotation_from_axes(axis: ArrayLike, start: ArrayLike) -> np.ndarray:
     Raises:
         InputError: A direction that is none, or both along one line.
     """
-    z, x = _direction("axis", axis), _direction("start", start)
-    y = np.cross(z, x)
+    z = _direction("axis", axis)
+    if start is None:
+        upright = np.hypot(z[1], z[2]) <= _LEAST_ANGLE
+        start = (0.0, 1.0, 0.0) if upright else (1.0, 0.0, 0.0)
+    y = np.cross(z, _direction("start", start))
     if not np.linalg.norm(y) > _LEAST_ANGLE:
         raise InputError(
             f"start: {np.asarray(start).tolist()}; a direction that is not along"

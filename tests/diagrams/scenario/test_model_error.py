@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from diagrams.scenario import ModelErrorParameters, RandomModelError
+from diagrams.builder import build_station
+from diagrams.scenario import ModelErrorParameters, RandomModelError, Scenario
+from experiments.catalog.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 
@@ -61,10 +63,10 @@ def test_a_seed_draws_the_same_whatever_else_is_drawn():
         ({"friction": [-1.0]}, "friction = .*; allowed: factors"),
         ({"stiffness": []}, "stiffness = .*; allowed: factors"),
         ({"joint_offset_deg": 200}, "joint_offset_deg = .*; allowed: numbers of at most 90 deg"),
-        ({"tool_mass": float("inf")}, "tool_mass = inf; allowed: a finite number"),
+        ({"tool_mass": float("inf")}, "tool_mass = inf; allowed: numbers of at most 1000 kg"),
         ({"tool_center": [1.0]}, "tool_center = .*; allowed: 3 finite numbers"),
         ({"tool_center": [0, 0, 99]}, "tool_center = .*; allowed: up to 10 m"),
-        ({"random": {"mass": -0.1}}, "mass = -0.1; allowed: zero or a positive number"),
+        ({"random": {"mass": -0.1}}, "mass = -0.1; allowed: 0 to 1 as a fraction"),
         ({"random": {"seed": -1}}, "seed = -1; allowed: zero or a positive integer"),
         ({"weight": 1.0}, "weight"),
     ],
@@ -81,6 +83,30 @@ def test_as_many_as_links():
 
 
 def test_draws_that_leave_nothing():
-    message = r"^model_error\.random\.mass = 5: with seed 0 it draws a factor of -"
+    message = r"^model_error\.random\.mass = 1: with seed 0 it draws a factor of -"
     with pytest.raises(InputError, match=message):
-        _load(random=RandomModelError(mass=5.0).__dict__).error(np.full(50, True))
+        _load(random=RandomModelError(mass=1.0).__dict__).error(np.full(50, True))
+
+
+@pytest.mark.parametrize(
+    ("data", "parts"),
+    [
+        ({"mass": 0.05}, ["mass = 0.05 is a factor", "0.95 is 5 % too low"]),
+        ({"stiffness": [1.0, 1.0, 10.0]}, ["stiffness = 10 is a factor"]),
+        ({"link_length": 0.001}, ["link_length = 0.001 is a factor"]),
+    ],
+)
+def test_what_was_perhaps_meant_as_an_error_is_said(data, parts):
+    (warning,) = _load(**data).warnings
+    assert all(part in warning for part in parts)
+
+
+def test_factors_that_a_person_would_set_are_taken_without_a_word():
+    assert _load(mass=0.95, friction=[0.5, 2.0, 1.0], joint_offset_deg=20.0).warnings == []
+
+
+def test_a_run_says_that_an_error_is_a_factor():
+    scenario = read_scenario("pfc_elastic_3r", ["model_error.mass=0.05"])
+    settings = load_typed(Scenario, scenario.data, "x")
+    station = build_station(settings, scenario.path.parent)
+    assert any("model_error.mass = 0.05 is a factor" in said for said in station.warnings)

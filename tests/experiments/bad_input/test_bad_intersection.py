@@ -16,7 +16,10 @@ def shape(first, second, more=""):
         ("path.shape=!Intersection {}", ("path.shape.surfaces: none given", "must be 2")),
         (f"path.shape=!Intersection {{surfaces: [{BALL}]}}", ("surfaces = 1 given", "2, e.g.")),
         (shape(FLOOR, "!Line {}"), ("surfaces[1]", "Line")),
-        (shape(FLOOR, "!Sphere {radius: -1}"), ("path.shape.surfaces[1]", "radius", "positive")),
+        (
+            shape(FLOOR, "!Sphere {radius: -1}"),
+            ("path.shape.surfaces[1]", "radius = -1", "0.0001 m"),
+        ),
         (shape(FLOOR, BALL, ", near: [1, 2]"), ("near", "3")),
         (shape(FLOOR, BALL, ", tolerance: 0"), ("tolerance = 0", "1e-09 m")),
         (
