@@ -27,6 +27,7 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.surroundings.operator import add_operator
 from diagrams.surroundings.patch import PressedWorkpiece
+from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.guidance import MODES
 from diagrams.tasks.law import make_law
@@ -37,6 +38,7 @@ from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
@@ -73,6 +75,7 @@ def build_station(
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     friction = believed_friction(part, scenario, folder)
     following = Following(scenario, believed, task, law, on_motors, friction)
+    keep_drive_limits(scenario, task, law, CourseStart(rest().q_J, start.place), friction)
 
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(builder, true_state, part.robot, scenario)
@@ -114,6 +117,7 @@ def build_station(
         on_motors,
         task.warnings
         + scenario.model_error.warnings
+        + ([] if task.drive_plan is None else task.drive_plan.said)
         + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + sensor_warnings(scenario),

@@ -17,6 +17,7 @@ from diagrams.tasks.space_guidance import free_motion
 from diagrams.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
+from experiments.results.drive_metrics import saturation_warnings
 from experiments.results.friction_metrics import friction_metrics
 from experiments.results.guidance_audit import Promise, audit
 from experiments.results.guidance_metrics import guidance_metrics
@@ -24,6 +25,7 @@ from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import lap_length
 from experiments.results.mounting_metrics import mounting_metrics
 from experiments.results.path_metrics import path_following_metrics
+from experiments.results.plan_metrics import plan_metrics
 from experiments.results.posture_metrics import posture_metrics
 from experiments.results.press_metrics import press_metrics
 from experiments.results.promises import broken_promises, set_promises
@@ -203,6 +205,7 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
+    metrics.update(plan_metrics(station.task.drive_plan))
     metrics.update(posture_metrics(log, lap_length(station)))
     metrics.add("real_time_factor", result.real_time_factor, "1")
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
@@ -213,7 +216,12 @@ def _measure(
     set_promises(metrics, settings)
     lasted = end > settings.judged_after - 1.5 * settings.controller.sampling_time
     results.write("metrics.json", metrics.to_json())
-    warnings = [*prepared.warnings, *limits.warnings(log), *_sensor_warnings(log)]
+    warnings = [
+        *prepared.warnings,
+        *limits.warnings(log),
+        *saturation_warnings(log),
+        *_sensor_warnings(log),
+    ]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)
     return _Measured(log, motion, metrics, warnings, result.fault, broken, end)
 

@@ -19,6 +19,7 @@ _FARTHEST = 1e6  # m, many rounds of a closed path
 _LONGEST_REST = 1e6  # s
 _SHORTEST_REST = 1e-6  # s
 _TRANSITIONS = (1e-3, 1e3)  # s
+_LIMITS = ("respect", "warn")
 
 
 @dc.dataclass
@@ -52,6 +53,10 @@ class ReferenceParameters:
         acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
         swings: How the path or surface itself moves along its normals (5.1), (5.2).
+        limits: ``respect``: where the drives, as they are believed, could not follow, the
+            reference is slowed; ``warn``: only that is said.
+        reserve: Share of the drives' torques, and of the speeds of velocity servos, that the
+            reference leaves, from 0 to below 1.
     """
 
     points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1])
@@ -61,6 +66,8 @@ class ReferenceParameters:
     swings: list[Swing] = dc.field(default_factory=list)
     places: list[list[float]] = dc.field(default_factory=list)
     second: SecondReference | None = None
+    limits: str = "respect"
+    reserve: float = 0.3
 
     def __post_init__(self) -> None:
         _check_motion(self)
@@ -74,6 +81,8 @@ class ReferenceParameters:
         good = self.dwell == 0.0 or _SHORTEST_REST <= self.dwell <= _LONGEST_REST
         allowed = f"zero or a positive number, {_SHORTEST_REST:g} to {_LONGEST_REST:g} s"
         require(good, "dwell", self.dwell, allowed)
+        require(self.limits in _LIMITS, "limits", self.limits, ", ".join(_LIMITS))
+        require(0.0 <= self.reserve < 1.0, "reserve", self.reserve, "from 0 to below 1")
 
 
 def _check_motion(motion: SecondReference | ReferenceParameters) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.drawing.manifold_drawing import ManifoldDrawing
+from diagrams.tasks.drive_plan import DrivePlan
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.geometry.surfaces.report import SurfaceReport
@@ -53,6 +54,7 @@ class Task(ABC):
         shape: Numbers of the manifold that decide whether it can be followed, if there are any.
         fit: Where the points stand that the manifold was fitted to, if it was.
         warnings: What is out of proportion in it, one sentence each.
+        drive_plan: What the motion asks of the drives, once that has been found out.
     """
 
     place: PlaceManifold
@@ -61,6 +63,7 @@ class Task(ABC):
     shape: ShapeReport | SurfaceReport | None
     fit: Residuals | None = None
     warnings: list[str]
+    drive_plan: DrivePlan | None = None
 
     @property
     def lap(self) -> float | None:

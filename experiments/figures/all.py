@@ -30,6 +30,7 @@ from experiments.figures.guidance import (
 )
 from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.figures.notch import draw_notch_position
+from experiments.figures.pace import draw_pace
 from experiments.figures.path import draw_path
 from experiments.figures.polish import draw_force_map, draw_pressing
 from experiments.figures.positions import draw_positions
@@ -96,6 +97,7 @@ def _is_along(log: RunLog) -> bool:
 # In the order of the report: when a figure can be drawn, and what draws it.
 _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_is_along, draw_progress),
+    (_has("pace", "tau_planned", "tau_d"), draw_pace),
     (has_regions, draw_guidance),
     (has_contact, draw_contact),
     (gives_energy, draw_energy),

@@ -236,7 +236,9 @@ def path_following_metrics(
     if "tau_d" in log:
         for axis, torque in enumerate(peak_torque(log), start=1):
             metrics.add(f"peak_torque_{axis}", float(torque), log["tau_d"].unit)
-        metrics.add("saturated_samples", saturation_count(log), "1")
+        saturated = saturation_count(log)
+        metrics.add("saturated_samples", saturated, "1")
+        metrics.add("saturated_share", saturated / max(log.time.size, 1), "1")
     if "manifold_force" in log:
         metrics.add("max_manifold_force", max_manifold_force(log), "N")
         metrics.add("max_tangential_force", max_tangential_force(log), "N")
@@ -278,6 +280,7 @@ def metric_names(num_joints: int, signals: Collection[str]) -> list[str]:
         "peak_speed",
         *(f"peak_torque_{axis}" for axis in range(1, num_joints + 1)),
         "saturated_samples",
+        "saturated_share",
         *given["manifold_force"],
         *given["wrench_ext"],
         *given["notch_position"],

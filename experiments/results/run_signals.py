@@ -71,6 +71,7 @@ def collect_log(station: Station, root: Context) -> RunLog:
     add_mounting_signals(log, station, raw)
     add_link_signals(log, station, raw)
     _add_drives(log, station, raw)
+    _add_plan(log, station)
     for name, length in station.further_lengths(pose[:, :3]).items():
         log.add(name, length.values, "m", length.labels, length.limit)
     return log
@@ -136,6 +137,17 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
         K_s, K_d = chain.K_s[elastic], chain.K_d[elastic]
         tau_J = K_s * (q_M - q_J)[:, elastic] + K_d * (v_M - v_J)[:, elastic]
         log.add("tau_J", tau_J, effort, [f"tau_J_{i + 1}" for i in np.flatnonzero(elastic)])
+
+
+def _add_plan(log: RunLog, station: Station) -> None:
+    """Add how the reference was slowed, and what was expected of the drives, if it was."""
+    plan, n = station.task.drive_plan, station.robot.dimension
+    if plan is None or not plan.is_slowed:
+        return
+    log.add("pace", np.interp(log.time, plan.times, plan.pace)[:, None], "1")
+    expected = [np.interp(log.time, plan.times, torque) for torque in plan.demand[:, :n].T]
+    labels = [f"tau_planned_{i + 1}" for i in range(n)]
+    log.add("tau_planned", np.array(expected).T, _joint_units(station)[2], labels)
 
 
 def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:

@@ -89,6 +89,7 @@ class FollowingLaw:
     Attributes:
         layout: Layout of the results.
         robot: The robot.
+        inverse: Inverts the decoupling matrix.
         safe_state: What the drives do after a fault.
 
     Raises:
@@ -134,7 +135,7 @@ class FollowingLaw:
         self.linearization = linearization
         self.stabilization = stabilization
         self.limits = np.asarray(limits, dtype=float)
-        self.posture, self._inverse = posture, inverse
+        self.posture, self.inverse = posture, inverse
         self._max_alpha = max_alpha
         self._tells_velocity = tells_reference_velocity
         self.layout = LawLayout(
@@ -223,7 +224,7 @@ class FollowingLaw:
         _assign(self._friction, friction)
         _assign(self._posture, posture)
         self._linearize()
-        solution = self._inverse.solve(self._A, self._rhs, self._spare())
+        solution = self.inverse.solve(self._A, self._rhs, self._spare())
         self._solution[:] = solution.x
         self._rcond[0] = solution.rcond
         if last_held is None:
@@ -236,7 +237,7 @@ class FollowingLaw:
         result[self._fault_index] = self._judge(solution)
         if self._tells_velocity:
             result = np.append(result, self._reference_velocity())
-        if self._inverse.damped_below:
+        if self.inverse.damped_below:
             missed = solution.residual
             result = np.append(result, np.zeros(len(self._rhs)) if missed is None else missed)
         return result
@@ -259,17 +260,17 @@ class FollowingLaw:
             error = error - self._reference[m : 2 * m]
         moving = self._state[velocity]
         if self.posture is None:
-            return moving - self._inverse.solve(self._A, error).x
+            return moving - self.inverse.solve(self._A, error).x
         n = len(moving)
         spare = Spare(self._posture[n : 2 * n], self._scale)
-        return self._inverse.solve(self._A, self._A @ moving - error, spare).x
+        return self.inverse.solve(self._A, self._A @ moving - error, spare).x
 
     def _judge(self, solution: DecouplingSolution) -> Fault:
         """Return what forbids the use of a result, the root cause first."""
         alpha, status = self._point[self._alpha_index], self._point[self._status_index]
         # written so that NaN is a fault
         if (
-            self._inverse.accepts(solution)
+            self.inverse.accepts(solution)
             and alpha < self._max_alpha
             and status != _NOT_CONVERGED
             and math.isfinite(self._check[0])

@@ -1,0 +1,234 @@
+"""Whether the drives can follow the reference, and a slower one if they cannot."""
+
+from dataclasses import replace
+from math import factorial
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from diagrams.scenario import Scenario
+from diagrams.tasks.drive_plan import DrivePlan
+from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.task import Task
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.planning.course import CourseFinder, CourseStart
+from pfsc_drake.control.planning.drive_demand import DriveDemand, DriveLimits, with_pace
+from pfsc_drake.control.planning.pace import Clock, allowed_demand, find_pace
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.robot.robot_model import largest_speeds
+
+# s, between the samples of a course: while it is checked, and while it is slowed
+_CHECKED, _SLOWED, _FINEST = 4e-3, 1e-3, 2.5e-4
+# of the smallest radius, the way from sample to sample
+_OF_RADIUS = 1.0 / 12.0
+# s of the asked time, over which a change of pace is smoothed
+_SMOOTHING = 0.04
+# s, between the knots of a slowed reference, and its degree
+_KNOTS, _DEGREE = 2e-3, 7
+# share of joint speeds that is left where torques are commanded
+_SPEED_RESERVE = 0.05
+# of the pace, from which on a place counts as slowed
+_SLOW = 0.99
+
+
+def keep_drive_limits(
+    scenario: Scenario,
+    task: Task,
+    law: FollowingLaw,
+    start: CourseStart,
+    friction: tuple[np.ndarray, np.ndarray] | None,
+) -> None:
+    """Give a task its plan, and the reference that the drives can follow, unless it has them.
+
+    Args:
+        scenario: The scenario.
+        task: What the tool is to do.
+        law: The law that does it.
+        start: Where the robot starts, near the first place of the reference.
+        friction: See :func:`plan_drives`.
+    """
+    if task.drive_plan is not None:
+        return
+    task.drive_plan = plan_drives(scenario, task, law, start, friction)
+    if task.drive_plan is not None:
+        task.motion = task.drive_plan.motion
+
+
+def plan_drives(
+    scenario: Scenario,
+    task: Task,
+    law: FollowingLaw,
+    start: CourseStart,
+    friction: tuple[np.ndarray, np.ndarray] | None,
+) -> DrivePlan | None:
+    """Return a reference that the drives can follow, or None where nobody plans the motion.
+
+    Args:
+        scenario: The scenario; ``reference.limits`` says whether the reference may be slowed.
+        task: What the tool is to do.
+        law: The law that does it.
+        start: Where the robot starts, near the first place of the reference.
+        friction: Coefficients f_c and f_v that the drives overcome besides, each (N,), if any
+            are believed.
+    """
+    along = indices(task.place.coordinates, Kind.TANGENTIAL)
+    if isinstance(task, SpaceTask) or law.stabilization.is_free[along].any():
+        return None
+    planner = _Planner(scenario, task, law, start, friction)
+    try:
+        step, course = planner.course(_CHECKED)
+        fits = planner.fits(course)
+        if not fits:
+            step, course = planner.course(_SLOWED)
+        demand = planner.demand.of(course)
+    except InputError as error:
+        return _unknown(task, planner, str(error))
+    ones = np.ones(len(course))
+    asked = DrivePlan(
+        step * np.arange(len(course)), demand, demand, planner.limits, ones, task.motion, []
+    )
+    if fits:
+        return asked
+    if scenario.reference.limits == "warn":
+        return planner.warned(asked)
+    return planner.slowed(asked, course, step)
+
+
+class _Planner:
+    """Plans one reference of one robot."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        task: Task,
+        law: FollowingLaw,
+        start: CourseStart,
+        friction: tuple[np.ndarray, np.ndarray] | None,
+    ) -> None:
+        self._scenario, self._task, self._law, self._start = scenario, task, law, start
+        self.robot, controller = law.robot, scenario.controller
+        reserve = scenario.reference.reserve
+        f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
+        damping = controller.boundary_layer_damping
+        self.demand = DriveDemand(
+            self.robot, controller.law, f_v, np.array(damping) if damping else None
+        )
+        self._finder = CourseFinder(self.robot, task.place, task.evaluate, law.inverse, law.posture)
+        effort = self.robot.gather("effort_limit") * controller.effort_scale
+        effort = np.maximum(effort - f_c, 1e-3 * effort)
+        speed = largest_speeds(self.robot)
+        self.limits = DriveLimits(effort, speed).together
+        # of speeds only servos run short; with torques, nothing but the motion decides over them
+        of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
+        self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
+
+    def course(self, longest: float) -> tuple[float, np.ndarray]:
+        """Return the joints' course on an even grid of the time asked for, and its step [s].
+
+        Args:
+            longest: From sample to sample [s].
+
+        Raises:
+            InputError: If the joints cannot follow.
+        """
+        task, order = self._task, self._law.linearization.relative_degree
+        duration = task.motion.domain[1]
+        step = self._step(longest)
+        times = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
+        asked = task.motion.derivatives(times, order)
+        reference = np.zeros((len(times), order + 1, len(task.place.coordinates)))
+        reference[:, :, : asked.shape[2]] = asked
+        course = self._finder.find(self._start, reference, times)
+        while course.shape[1] <= self.demand.derivatives:
+            further = np.gradient(course[:, -1:], times[1], axis=0)
+            course = np.concatenate([course, further], axis=1)
+        return float(times[1]), course[:, : self.demand.derivatives + 1]
+
+    def _step(self, longest: float) -> float:
+        """Return how far samples may be apart [s]: narrow bends need more of them."""
+        radius = getattr(self._task.shape, "smallest_radius", np.inf)
+        fastest = self._scenario.reference.velocity
+        if self._law.posture is not None:  # it moves as fast as a sampled law lets it
+            longest = min(longest, self._scenario.controller.sampling_time)
+        return float(np.clip(_OF_RADIUS * radius / fastest, min(_FINEST, longest), longest))
+
+    def allowed(self, course: np.ndarray) -> np.ndarray:
+        """Return what may be asked of the drives, (samples, 2N)."""
+        at_rest = self.demand.of(with_pace(course, np.zeros((len(course), 4))))
+        return allowed_demand(at_rest, self.limits, self._reserve)
+
+    def fits(self, course: np.ndarray) -> bool:
+        """Return whether a course asks for no more than it may."""
+        return bool(np.all(np.abs(self.demand.of(course)) <= self.allowed(course)))
+
+    def slowed(self, asked: DrivePlan, course: np.ndarray, step: float) -> DrivePlan:
+        """Return a plan that waits where the drives need it."""
+        reference, duration = self._scenario.reference, self._task.motion.domain[1]
+        change = reference.acceleration / reference.velocity
+        try:
+            pace = find_pace(self.demand, course, step, self.allowed(course), change, _SMOOTHING)
+        except InputError as error:
+            return replace(asked, said=[f"{self._excess(asked)}; and {error}"])
+        clock = Clock(pace.rates[:, 0], step)
+        times, motion = clock.times, _retimed(self._task.motion, clock)
+        demand = self.demand.of(with_pace(course, pace.rates))
+        slow = pace.rates[:, 0]
+        places = np.count_nonzero(np.diff((slow < _SLOW).astype(int), prepend=0) == 1)
+        i = int(slow.argmin())
+        speed = float(np.linalg.norm(self._rates(i * step))) * slow[i]
+        said = (
+            f"the reference is slowed to {speed:.3g} m/s in {places} "
+            f"place{'s' if places > 1 else ''}, {duration:.4g} s become {times[-1]:.4g} s: "
+            f"{self._excess(asked)}"
+        )
+        given = self._scenario.duration
+        if 0.0 < given < times[-1]:
+            said += f"; duration = {given:g} s ends before it does"
+        return DrivePlan(times, demand, asked.demand, asked.limits, slow, motion, [said])
+
+    def warned(self, asked: DrivePlan) -> DrivePlan:
+        """Return a plan as asked for, with what there is to say."""
+        said = f"{self._excess(asked)}; reference.limits: respect would slow it down there"
+        return replace(asked, said=[said])
+
+    def _rates(self, time: float) -> np.ndarray:
+        return self._task.motion.derivatives(np.array([time]), 1)[0, 1]
+
+    def _excess(self, asked: DrivePlan) -> str:
+        """Return what is too much in a motion as it was asked for."""
+        share = np.abs(asked.demand) / asked.limits
+        i, column = np.unravel_index(int(share.argmax()), share.shape)
+        kind = "torque" if column < len(self.limits) // 2 else "speed"
+        where = self.where(asked.times[i])
+        return (
+            f"as asked for it takes {100.0 * share[i, column]:.0f} % of the {kind} of axis "
+            f"{column % (len(self.limits) // 2) + 1} at {where}"
+        )
+
+    def where(self, time: float) -> str:
+        """Return what to call a place of the motion as asked for."""
+        eta = self._task.motion.derivatives(np.array([time]), 0)[0, 0]
+        value = f"{eta[0]:.3g}" if len(eta) == 1 else f"({eta[0]:.3g}, {eta[1]:.3g})"
+        return f"eta = {value} m"
+
+
+def _retimed(motion: PiecewisePolynomialCurve, clock: Clock) -> PiecewisePolynomialCurve:
+    """Return a motion gone through at another pace, of class C^6."""
+    even = np.linspace(0.0, clock.end, int(np.ceil(clock.end / _KNOTS)) + 1)
+    asked = np.minimum(clock.tau(even), motion.domain[1])
+    values = motion.derivatives(asked, 0)[:, 0]
+    rest = [(k, np.zeros(values.shape[1])) for k in range(1, (_DEGREE + 1) // 2)]
+    spline = make_interp_spline(even, values, k=_DEGREE, bc_type=(rest, rest))
+    table = [spline(even[:-1], k) / factorial(k) for k in range(_DEGREE + 1)]
+    coefficients = np.array(table).transpose(1, 0, 2)
+    return PiecewisePolynomialCurve(even, coefficients, closed=False, known_smoothness=_DEGREE - 1)
+
+
+def _unknown(task: Task, planner: _Planner, error: str) -> DrivePlan:
+    """Return a plan of a motion of which nothing is known."""
+    nothing = np.zeros((0, len(planner.limits)))
+    said = f"whether the drives can follow the reference is not known: its course is {error}"
+    empty = np.zeros(0)
+    return DrivePlan(empty, nothing, nothing, planner.limits, empty, task.motion, [said])

@@ -1,0 +1,95 @@
+"""How joints move when the tool follows exactly, against Drake's kinematics."""
+
+import numpy as np
+import pytest
+
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.planning.course import CourseFinder, CourseStart
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import quaternion_to_matrix
+
+STEP = 1e-3
+
+
+def find(robot, law, path, times, start):
+    """Return a course along a path, and the arc lengths."""
+    order = RELATIVE_DEGREE["elastic"]
+    manifold = PathManifold(order, oriented=path.orientation is not None)
+    evaluator = path.evaluator(order)
+    finder = CourseFinder(
+        robot.chain,
+        manifold,
+        lambda y_t, memory: evaluator(y_t.tolist(), memory[0]),
+        law.inverse,
+        law.posture,
+    )
+    eta = rest_to_rest([0.3, 0.45], velocity=1.0, acceleration=8.0)
+    reference = np.zeros((len(times), order + 1, len(manifold.coordinates)))
+    reference[:, :, 0] = eta.derivatives(times, order)[:, :, 0]
+    theta = path.arc_length.parameter(0.3)
+    return finder.find(CourseStart(start, np.array([theta])), reference, times), reference[:, 0, 0]
+
+
+def check(robot, path, course, eta, tolerance=1e-4):
+    """The tool is on the path at its arc length, and derivatives are derivatives."""
+    n = robot.n
+    for q, s in zip(course[::40, 0], eta[::40], strict=True):
+        y_t, R_e = robot.tool_pose(np.concatenate([q, np.zeros(n), q, np.zeros(n)]))
+        theta = path.arc_length.parameter(s)
+        assert np.allclose(y_t, path.position.derivatives(theta, 0)[0], rtol=0, atol=1e-9)
+        if path.orientation is not None:
+            R_d = quaternion_to_matrix(path.orientation.derivatives(theta, 0)[0])
+            assert np.allclose(R_e, R_d, rtol=0, atol=1e-8)
+    for k in range(course.shape[1] - 1):
+        slope = np.array([1.0, -8.0, 8.0, -1.0]) @ course[[18, 19, 21, 22], k] / (12.0 * STEP)
+        scale = np.abs(course[:, k + 1]).max()
+        assert np.allclose(course[20, k + 1], slope, rtol=0, atol=tolerance * scale)
+
+
+def test_six_axes(load_robot, make_law, oriented_path):
+    robot = load_robot("comau_racer_1_4_elastic")
+    law = make_law(robot.chain, "elastic")
+    rigid = load_robot("comau_racer_1_4")
+    theta = oriented_path.arc_length.parameter(0.3)
+    y_t = oriented_path.position.derivatives(theta, 0)[0]
+    near = rigid.reach(y_t) + 0.01
+    course, eta = find(robot, law, oriented_path, np.arange(0.0, 0.15, STEP), near)
+    check(robot, oriented_path, course, eta)
+
+
+def test_joints_beyond_the_outputs_move_next_to_their_posture(load_robot, make_law, position_path):
+    robot = load_robot("comau_racer_1_4_elastic")
+    law = make_law(robot.chain, "elastic", False)
+    rigid = load_robot("comau_racer_1_4")
+    theta = position_path.arc_length.parameter(0.3)
+    start = rigid.reach(position_path.position.derivatives(theta, 0)[0])
+    course, eta = find(robot, law, position_path, np.arange(0.0, 0.2, STEP), start)
+    # what the outputs leave free is held from sample to sample, as by a sampled law
+    check(robot, position_path, course, eta, 0.03)
+
+
+def test_places_out_of_reach_are_refused(load_robot, make_law, position_path):
+    robot = load_robot("comau_racer_1_4_elastic_3r")
+    law = make_law(robot.chain, "elastic", False)
+    with pytest.raises(InputError):
+        find(robot, law, _Moved(position_path), np.arange(0.0, 0.01, STEP), np.zeros(3))
+
+
+class _Moved:
+    """A path that is ten metres further away."""
+
+    def __init__(self, path):
+        self.orientation, self.arc_length = None, path.arc_length
+        self._evaluator = path.evaluator
+
+    def evaluator(self, order):
+        evaluate = self._evaluator(order)
+
+        def moved(y_t, theta):
+            point = evaluate((np.array(y_t) - 10.0).tolist(), theta).copy()
+            point[7:10] += 10.0
+            return point
+
+        return moved

@@ -1,0 +1,115 @@
+"""References that wait for the drives: what is expected comes, and what fits is left alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from diagrams.builder import build_station
+from diagrams.tasks.make import make_task
+from experiments.catalog.scenario_catalog import find_scenario
+from pfsc_drake.control.manifolds.manifold import Kind, indices
+
+ARM = "pfc_elastic_3r"
+FAST, DWELL = 4.0, 0.1  # m/s, s
+
+
+@pytest.fixture(name="settings")
+def fixture_settings(load_exact_scenario):
+    """Return a function that asks three elastic axes for more speed than they have."""
+
+    def change(velocity=FAST, acceleration=20.0, **changes):
+        settings = load_exact_scenario(ARM)
+        reference = settings.reference
+        reference.velocity, reference.acceleration, reference.dwell = velocity, acceleration, DWELL
+        reference.points = reference.points[:2]
+        settings.start.offset = [0.0, 0.0]
+        for key, value in changes.items():
+            setattr(reference, key, value)
+        return settings
+
+    return change
+
+
+def run(settings, duration=0.0):
+    """Return a station, its log, and how far the tool was from its path at most [m]."""
+    station = build_station(settings, Path())
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(duration or station.reference_duration)
+    times, raw = station.log.read(simulator.get_context())
+    across = indices(station.task.place.coordinates, Kind.TRANSVERSAL)
+    xi = raw["law"][:, station.law.layout.manifold_state][:, across]
+    return station, times, raw["law"], np.linalg.norm(xi, axis=1).max()
+
+
+def test_a_reference_that_is_too_fast_waits(settings):
+    """Torques of the simulated plant are those expected, within the reserve, on the path."""
+    station, times, law, deviation = run(settings())
+    plan, layout = station.task.drive_plan, station.law.layout
+    assert plan.is_slowed and len(plan.said) == 1
+    assert "slowed to" in plan.said[0] and "of axis" in plan.said[0]
+    assert deviation < 5e-5
+    torque, limits = law[:, layout.drive], station.law.limits
+    share = np.abs(torque / limits).max()
+    assert share < 0.75 and not law[:, layout.status][:, 2].any()
+    # a torque is held for a tick, and told for its middle
+    middle = times + station.controller.period / 2.0
+    expected = [np.interp(middle, plan.times, tau) for tau in plan.demand[:, :3].T]
+    assert np.abs(np.array(expected).T - torque).max() < 0.03 * np.abs(torque).max()
+    asked, motion = make_task(settings(), Path()).motion, station.task.motion
+    assert station.reference_duration == pytest.approx(
+        asked.domain[1] + plan.waiting_time, abs=1e-3
+    )
+    # smooth enough for the law, from rest to rest, and nowhere faster than asked for
+    assert motion.first_discontinuity(5) is None
+    ends = np.array(motion.domain)
+    values = motion.derivatives(ends, 4)[:, :, 0]
+    assert np.allclose(values[:, 0], settings().reference.points, rtol=0, atol=1e-12)
+    assert np.abs(values[:, 1:4]).max() < 1e-4
+    speed = np.abs(motion.derivatives(np.linspace(*ends, 2000), 1)[:, 1, 0])
+    fastest = np.abs(asked.derivatives(np.linspace(*asked.domain, 2000), 1)[:, 1, 0]).max()
+    assert speed.max() <= fastest * (1.0 + 1e-9)
+
+
+def test_told_only_it_leaves_the_path(settings):
+    station, _, law, deviation = run(settings(limits="warn"), 0.6)
+    assert not station.task.drive_plan.is_slowed
+    assert "limits: respect would slow it down" in station.task.drive_plan.said[0]
+    assert law[:, station.law.layout.status][:, 2].any() and deviation > 1e-4
+
+
+def test_a_reference_that_fits_is_left_as_it_is(settings):
+    """To the last bit, and nothing is said."""
+    given = settings(velocity=0.8, acceleration=2.0)
+    station = build_station(given, Path())
+    asked = make_task(given, Path()).motion
+    assert np.array_equal(station.task.motion.coefficients, asked.coefficients)
+    assert np.array_equal(station.task.motion.breakpoints, asked.breakpoints)
+    assert not station.task.drive_plan.is_slowed and station.task.drive_plan.said == []
+
+
+def quick(name, load_exact_scenario):
+    """Return a shipped scenario whose short motion asks for more than its drives can do."""
+    settings = load_exact_scenario(name)
+    reference = settings.reference
+    reference.dwell, reference.velocity, reference.acceleration = 0.05, 2.0, 20.0
+    reference.points = [reference.points[0], reference.points[0] + 0.2]
+    if reference.places:
+        reference.places = [reference.places[0], [x + 0.1 for x in reference.places[0]]]
+    settings.controller.effort_scale = 0.5
+    return settings
+
+
+@pytest.mark.parametrize("name", ["pfc_panda_7r", "sfc_elastic_6r", "pfc_viscoelastic_3r"])
+def test_other_robots_laws_and_surfaces_wait_too(name, load_exact_scenario):
+    station = build_station(quick(name, load_exact_scenario), find_scenario(name).parent)
+    plan, n = station.task.drive_plan, station.robot.dimension
+    assert plan.is_slowed
+    asked, planned = (
+        np.max(np.abs(demand[:, :n]) / plan.limits[:n]) for demand in (plan.asked, plan.demand)
+    )
+    assert planned < min(asked, 0.75)
+    waited = np.trapezoid(1.0 - plan.pace, plan.times)
+    assert plan.waiting_time == pytest.approx(waited) and waited > 0.0
