@@ -197,3 +197,29 @@ def test_the_eye_errs_by_what_the_seed_says_and_never_much():
 def test_wrong_numbers_are_refused(changes, part):
     with pytest.raises(InputError, match=part):
         MountingHandParameters(**changes)
+
+
+def test_the_eye_errs_about_the_axes_of_the_goal():
+    """The view is turned by an error whose axis is given in the seat, which is not the world."""
+    changes = {"seed": 3, "eye_angle": 0.02}
+    operator, state, time = inserting(
+        persistence=0.0, turning_persistence=0.0, eye_error=0.0, **changes
+    )
+    draws = np.random.default_rng(3).standard_normal(5)
+    torque = operator.wanted(state, time, pose(-PINS), np.zeros(6))[3:]
+    error = 0.02 * np.clip(draws[2:], -2.0, 2.0)
+    expected = MountingHandParameters().turning_stiffness * error
+    np.testing.assert_allclose(GOAL_R.inv().apply(torque), expected, rtol=1e-2)
+
+
+def test_once_the_pins_are_in_the_moment_relaxes_too():
+    p, turn = MountingHandParameters(), [0.0, 0.0, 0.01]
+    where = pose(HOVERING, turn=turn)
+    operator, state, time = aligned(where, 2.0, wobble=0.0)
+    state, time = go(operator, state, time, 0.1, where)
+    deep = pose(-PINS + 6e-3, turn=turn)
+    before = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[3:])
+    assert -before[2] == pytest.approx(p.turning_persistence * 0.01 * 2.0, rel=0.02)
+    state, time = go(operator, state, time, p.relaxation, deep)
+    after = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[3:])
+    assert after[2] / before[2] == pytest.approx(np.exp(-1.0), rel=1e-2)

@@ -9,6 +9,7 @@ from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.jets import constant
 from tests.control.manifolds.surfaces import (
     SITUATIONS,
     GivenOrientation,
@@ -128,3 +129,17 @@ def test_coordinates_are_called_by_what_they_mean():
 def test_wrong_input_is_refused(keys, message):
     with pytest.raises(InputError, match=message):
         SurfaceManifold(2, **keys)
+
+
+@pytest.mark.parametrize("orientation", ["normal", "lead and tilt", "given"])
+def test_a_tool_in_the_reference_orientation_has_no_angles(orientation):
+    theta, distance = SITUATIONS["saddle"]
+    geometry = surface("saddle")
+    given = GivenOrientation(zyx_to_matrix([0.4, 0.3, 2.8]))
+    manifold = SurfaceManifold(ORDER, **ORIENTATIONS[orientation])
+    motion = tool_motion(manifold, geometry, theta, distance, given, np.random.default_rng(4))
+    point = surface_point(manifold, geometry, motion.at(0.0)[0], theta, ETA, given)
+    (R_d,) = manifold.orientation(point[None])
+    outputs = manifold.virtual_output(motion.y, constant(ca.SX(R_d), ORDER), ca.SX(point), [])
+    angles = [float(ca.evalf(x.derivative(0))) for x in outputs[3:]]
+    np.testing.assert_allclose(angles, 0.0, atol=1e-12)

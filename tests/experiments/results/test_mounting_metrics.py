@@ -82,3 +82,9 @@ def test_without_operator_there_are_no_metrics_of_one(log):
 def test_other_runs_have_none():
     assert not mounting_metrics(RunLog(TIME))
     assert mounting_metric_names({"eta"}) == []
+
+
+def test_of_a_plate_that_is_gripped_twice_the_last_time_counts(log):
+    slipped = (log.time > 2.0) & (log.time < 3.0)
+    log["held"].values[slipped] = 0.5
+    assert mounting_metrics(log)["grip_time"].value == pytest.approx(3.0, abs=0.011)

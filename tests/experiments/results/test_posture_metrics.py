@@ -7,6 +7,7 @@ import pytest
 
 from experiments.results.link_signals import lap_before
 from experiments.results.posture_metrics import (
+    elbow_shift,
     elbow_travel,
     posture_metric_names,
     posture_metrics,
@@ -103,3 +104,14 @@ def test_square_robots_have_none_of_them(log):
     log["q_J"].values = log["q_J"].values[:, :6]
     assert not posture_metrics(log, LAP)
     assert not posture_metric_names(log.signals, redundant=False, closed=True)
+
+
+def test_what_the_elbow_does_before_it_is_pushed_is_no_shift(log):
+    first = int(np.argmax(log["push_force"].values[:, 0] > 0.0))
+    assert np.ptp(log["elbow"].values[:first, 0]) > 0.5
+    shift = elbow_shift(log)
+    assert not shift[:first].any()
+    elbow = log["elbow"].values
+    np.testing.assert_allclose(shift[first:], elbow[first:] - elbow[first])
+    log["push_force"].values[:] = 0.0
+    assert not elbow_shift(log).any()

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.coverage import _largest_rectangle, cover
+from pfsc_drake.geometry.surfaces.coverage import _largest_rectangle, cover, stand
 from pfsc_drake.geometry.surfaces.surface import Interval
 
 SIDES = Interval(0.0, 1.0), Interval(2.0, 2.5)
@@ -47,3 +47,16 @@ def test_holes_are_measured_across_seams(closed):
 def test_nothing_covered_is_no_rectangle():
     coverage = cover(np.array([[0.5, 2.2]]), SIDES, 0.01, closed=True)
     assert coverage.covered(0.01, SIDES, True) is None
+
+
+def test_points_stand_as_they_do_over_most_of_the_area():
+    """A grid of 0.1 m, and in one corner of it more points than in all the rest."""
+    sides = np.linspace(0.0, 1.0, 11)
+    grid = np.stack(np.meshgrid(sides, sides), axis=-1).reshape(-1, 2)
+    cluster = np.random.default_rng(3).uniform(0.02, 0.08, (900, 2))
+    diagonal = 0.1 * np.sqrt(2.0)
+    assert stand(grid) == pytest.approx(diagonal)
+    assert stand(np.concatenate([grid, cluster])) == pytest.approx(diagonal)
+    # thrown at random: 1.8 / sqrt(density)
+    thrown = np.random.default_rng(4).uniform(size=(4000, 2))
+    assert stand(thrown) == pytest.approx(1.8 / np.sqrt(4000.0), rel=0.05)

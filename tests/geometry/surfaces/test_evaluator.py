@@ -251,3 +251,27 @@ def test_what_it_cannot_be_made_of():
         SurfaceEvaluator(surface, 3)
     with pytest.raises(InputError, match="surface orientation"):
         SurfaceEvaluator(surface, 2, orientation=[0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("lap", [-2, 0, 3])
+@pytest.mark.parametrize("guess", [1.67, -1.67])
+def test_a_far_jump_finds_the_nearest_sheet_on_the_lap_of_the_guess(guess, lap):
+    """Within an elliptic tube the way down from the guess leads to the farther of two feet."""
+    ellipse = FourierCurve([0, 0, 0], [[0.1, 0, 0]], [[0, 0.14, 0]])
+    evaluator = SurfaceEvaluator(extruded_surface(ellipse, (0.0, 0.0, 1.0), 0.3), 2)
+    turns = 2.0 * math.pi * lap
+    row = evaluator([0.01, 0.0, 0.1], (turns + guess, 0.1), (0.0, 0.0))
+    assert row[5] == ProjectionStatus.OK
+    np.testing.assert_allclose(row[:2], [turns, 0.1], atol=1e-9)
+
+
+def test_beyond_both_centres_of_curvature_no_maximum_is_taken():
+    """In a sphere, past its centre: f has a maximum at the guess, and the foot is opposite."""
+    surface = sphere(0.2, (-1.4, 1.4), TURNED)
+    theta = np.array([0.3, 0.2])
+    point = ORIGIN + 0.25 * (surface.partials(theta, 0)[0] - ORIGIN)
+    row = SurfaceEvaluator(surface, 2)(
+        point.tolist(), (theta[0] + math.pi + 0.01, -theta[1] + 0.01), (0.0, 0.0)
+    )
+    np.testing.assert_allclose(row[6:9], surface.partials(theta, 0)[0], atol=1e-12)
+    assert row[4] == pytest.approx(0.75)

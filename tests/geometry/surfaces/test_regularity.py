@@ -98,3 +98,16 @@ def test_coefficients_that_are_none():
     backwards = PowerBasis([0.0, -1.0], 1)
     with pytest.raises(InputError, match="breakpoints of theta_2"):
         ProductSurface(basis, backwards, np.zeros((1, 1, 2, 2, 3)), smoothness=math.inf)
+
+
+def test_a_closed_profile_with_a_kink_is_refused():
+    """A drop: its ends meet, at an angle."""
+    side = PowerBasis([0.0, 1.0], 3, closed=True)
+    coefficients = np.zeros((1, 1, 4, 2, 3))
+    # x = u (1 - u), y = u (1 - u) (1 - 2 u)
+    coefficients[0, 0, :, 0, 0] = [0.0, 1.0, -1.0, 0.0]
+    coefficients[0, 0, :, 0, 1] = [0.0, 1.0, -3.0, 2.0]
+    coefficients[0, 0, 0, 1] = [0.0, 0.0, 1.0]
+    surface = ProductSurface(side, PowerBasis([0.0, 1.0], 1), coefficients, smoothness=math.inf)
+    with pytest.raises(InputError, match="does not close smoothly in theta_1"):
+        sample_grid(surface)

@@ -220,3 +220,16 @@ def changed(row, value):
 def test_points_that_make_no_surface_are_refused(points, options, reason):
     with pytest.raises(InputError, match=reason):
         fit_scattered(points, ScatteredFitOptions(**options))
+
+
+def test_noise_is_that_along_the_normal_where_the_patch_is_steep():
+    """Up to 58 degrees: heights over the base scatter by up to 1.9 times as much."""
+    rng = np.random.default_rng(5)
+    x, y = rng.uniform(-0.2, 0.2, 2000), rng.uniform(-0.15, 0.15, 2000)
+    slope = 8.0 * x
+    normals = np.stack([-slope, 0.0 * x, np.ones_like(x)], axis=1) / np.hypot(1.0, slope)[:, None]
+    points = np.stack([x, y, 4.0 * x**2], axis=1)
+    points += NOISE * rng.normal(size=(2000, 1)) * normals
+    fit = fit_scattered(points, ScatteredFitOptions(base="plane"))
+    np.testing.assert_allclose(fit.noise, NOISE, rtol=0.04)
+    np.testing.assert_allclose(rms(fit.residuals.distances), NOISE, rtol=0.04)

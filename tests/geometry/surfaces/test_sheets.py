@@ -72,3 +72,15 @@ def test_surfaces_that_meet_themselves(surface):
 )
 def test_single_sheets(surface):
     check_single_sheet(surface)
+
+
+def test_neighbours_across_the_seam_do_not_crowd_out_a_crossing():
+    """An eight whose parameter creeps at the seam: thousands of pairs there are near each other."""
+    t = 2.0 * math.pi * np.arange(512) / 512
+    angle = t - 0.97 * np.sin(t)
+    series = np.fft.rfft(np.stack([0.2 * np.cos(angle), 0.1 * np.sin(2.0 * angle)], axis=1), axis=0)
+    series = series[:80] / 256.0
+    series = np.column_stack([series, np.zeros(80)])
+    eight = FourierCurve([*series[0, :2].real / 2.0, 0.0], series[1:].real, -series[1:].imag)
+    with pytest.raises(InputError, match="meets itself"):
+        check_single_sheet(extruded_surface(eight, (0.0, 0.0, 1.0), 3.0))
