@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from diagrams.builder import build_station
@@ -162,4 +163,20 @@ def test_a_start_with_a_pin_in_the_frame_is_refused():
 
 
 def test_defaults_are_a_plate_that_fits():
-    PlateParameters()
+    """Believed to be nearly as heavy as it is; cups, rests and pins on it, pins within bores."""
+    plate = PlateParameters()
+    half = np.array(plate.size[:2]) / 2.0
+    assert plate.believed_mass == pytest.approx(plate.mass, rel=0.05)
+    assert np.all(np.abs(plate.pins.positions) + plate.pins.radius < half)
+    assert np.all(np.abs(plate.suction.cups) < half)
+    assert 0.0 < plate.frame.clearance < plate.pins.radius
+    assert plate.frame.depth > plate.pins.length
+    # the seat holds its weight: it lies within the rests
+    hull = Delaunay(plate.rests)
+    assert hull.find_simplex([0.0, 0.0]) >= 0
+    # what rests on the frame is beside the bores
+    bores = np.array(plate.pins.positions)[:, None] - np.array(plate.rests)
+    assert np.linalg.norm(bores, axis=2).min() > plate.frame.ring
+    # and the cups bear it, with room for acceleration
+    weight = 9.81 * plate.mass
+    assert len(plate.suction.cups) * plate.suction.pull_off > 2.0 * weight

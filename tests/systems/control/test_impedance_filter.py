@@ -12,6 +12,7 @@ from pydrake.systems.primitives import (
     VectorLogSink,
     ZeroOrderHold,
 )
+from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
@@ -23,6 +24,12 @@ from pfsc_drake.control.compliance.impedance import (
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import (
+    Path,
+    interpolate_orientation,
+    quaternion_to_matrix,
+    zyx_to_quaternion,
+)
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.control.following_controller import FollowingController
@@ -232,14 +239,45 @@ def test_only_the_desired_reference_acts_at_once():
     assert acting == ["desired_reference"]
 
 
-def test_the_rotational_forces_may_depend_on_the_reference():
-    """phi_pd of (3.44) is the filter's own output; that is no algebraic loop."""
+def test_the_rotational_forces_may_depend_on_the_reference(path):
+    """phi_pd of (3.44) is the filter's own output; that is no algebraic loop.
+
+    It comes to rest where springs and torque do no work together in any turn.
+    """
+    stiffness, moment, manifold = 20.0, np.array([3.0, -5.0, 4.0]), PathManifold(2, oriented=True)
+    angle = CoordinateImpedance(Profile(0.1), Profile(4.0), Profile(stiffness))
+    parameters = ImpedanceParameters(angle, angle, angle)
+    law = ImpedanceLaw(parameters, COORDINATES[6], 2, PERIOD)
+    quaternions = zyx_to_quaternion(np.array([[0.4, -0.2, 0.7]]))
+    theta = np.array([0.0, 2.0 * np.pi])
+    turned = interpolate_orientation(quaternions, theta, smoothness=3, closed=True)
+    point = Path(path.position, turned).evaluator(2)([0.9, 0.2, 1.1], 0.6)
+    R_d = Rotation.from_matrix(quaternion_to_matrix(point[manifold.layout.quaternion][:4]))
     builder = DiagramBuilder()
-    system = builder.AddSystem(ImpedanceFilter(make_law(m=6)))
-    transform = builder.AddSystem(ManifoldForceTransform(PathManifold(2, oriented=True)))
+    system = builder.AddSystem(ImpedanceFilter(law))
+    transform = builder.AddSystem(ManifoldForceTransform(manifold))
     builder.Connect(system.GetOutputPort("reference"), transform.GetInputPort("reference"))
     builder.Connect(transform.get_output_port(), system.GetInputPort("manifold_force"))
-    builder.Build()
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    inside = system.GetMyMutableContextFromRoot(root)
+    for name in ("desired_reference", "manifold_state"):
+        port = system.GetInputPort(name)
+        port.FixValue(inside, np.zeros(port.size()))
+    inside = transform.GetMyMutableContextFromRoot(root)
+    transform.GetInputPort("wrench").FixValue(inside, [0.0, 0.0, 0.0, *moment])
+    transform.GetInputPort("manifold_point").FixValue(inside, point)
+    simulator.AdvanceTo(3.0)
+    output = system.GetOutputPort("reference").Eval(system.GetMyContextFromRoot(root))
+    phi = output.ravel()[3:6]
+    assert np.abs(phi).min() > 0.05
+
+    def turn(angles):
+        return R_d * Rotation.from_euler("ZYX", angles)
+
+    for i, step in enumerate(1e-6 * np.eye(3)):
+        way = (turn(phi + step) * turn(phi - step).inv()).as_rotvec()
+        assert stiffness * phi[i] * 2e-6 == pytest.approx(moment @ way, rel=1e-5)
 
 
 @pytest.mark.parametrize("start", ["reference", "actual"])

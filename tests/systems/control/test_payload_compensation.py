@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.systems.control.payload_compensation import PayloadCompensation
@@ -52,10 +53,27 @@ def test_what_was_tared_is_not_taken_off_twice():
 
 
 def test_it_takes_its_inputs_from_a_diagram():
+    """Tared, and then gripped: as with inputs that are fixed."""
     builder = DiagramBuilder()
     system = builder.AddSystem(PayloadCompensation(MASS, CENTER, GRAVITY, PERIOD))
-    sizes = {"wrench": 6, "tool_pose": 12, "held": 1, "tared": 1}
-    for name, size in sizes.items():
-        source = builder.AddSystem(ConstantVectorSource(np.zeros(size)))
+    builder.ExportOutput(system.GetOutputPort("payload_free"))
+    pose = np.concatenate([[0.5, 0.2, 0.7], R.as_matrix().ravel()])
+    steps = {"tared": 0.5 * PERIOD, "held": 2.5 * PERIOD}
+    sources = {
+        name: TrajectorySource(PiecewisePolynomial.ZeroOrderHold([0.0, at, 1.0], [[0, 1, 1]]))
+        for name, at in steps.items()
+    }
+    sources |= {
+        name: ConstantVectorSource(value)
+        for name, value in {"wrench": WRENCH, "tool_pose": pose}.items()
+    }
+    for name, source in sources.items():
+        builder.AddSystem(source)
         builder.Connect(source.get_output_port(), system.GetInputPort(name))
-    Simulator(builder.Build()).AdvanceTo(2.0 * PERIOD)
+    simulator = Simulator(builder.Build())
+    output = simulator.get_system().get_output_port()
+    simulator.AdvanceTo(2.0 * PERIOD)
+    np.testing.assert_array_equal(output.Eval(simulator.get_context()), WRENCH)
+    simulator.AdvanceTo(4.0 * PERIOD)
+    expected = WRENCH - load(1.0)
+    np.testing.assert_allclose(output.Eval(simulator.get_context()), expected, atol=1e-12)

@@ -36,9 +36,30 @@ def test_regions_are_drawn_and_one_moves_by_the_clock(meshcat):
     assert set(told) == {0.7}
 
 
-def test_nothing_moves_without_a_clock_or_a_place(meshcat):
-    system = RegionVisualizer([], {0: lambda clock: RigidTransform([np.nan] * 3)}, 5, meshcat, 0.1)
+class Scene:
+    """Stands in for Meshcat, and remembers what was moved."""
+
+    def __init__(self):
+        self.moved = []
+
+    def SetTransform(self, path, X, time=None):
+        if time is not None:
+            self.moved.append(path)
+
+    def __getattr__(self, method):
+        return lambda *arguments, **options: None
+
+
+@pytest.mark.parametrize("place", [np.nan, 0.3])
+@pytest.mark.parametrize("clock", [[], [0.7]])
+def test_nothing_moves_without_a_clock_or_a_place(place, clock):
+    scene = Scene()
+    system = RegionVisualizer([], {0: lambda _: RigidTransform()}, 5, scene, 0.1)
     simulator = Simulator(system)
     context = simulator.get_mutable_context()
-    system.GetInputPort("manifold_point").FixValue(context, np.full(5, np.nan))
-    simulator.AdvanceTo(0.15)  # no transform that is no number
+    system.GetInputPort("manifold_point").FixValue(context, np.full(5, place))
+    if clock:
+        system.GetInputPort("region_clock").FixValue(context, clock)
+    simulator.AdvanceTo(0.15)
+    frame = ["fixtures/frame"] if np.isfinite(place) else []
+    assert set(scene.moved) == {*frame, *(["fixtures/0"] if clock else [])}
