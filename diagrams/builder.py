@@ -29,7 +29,7 @@ from diagrams.surroundings.operator import add_operator
 from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.guidance import MODES
+from diagrams.tasks.guidance import MODES, stiff_regions
 from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.make import make_task
@@ -120,6 +120,7 @@ def build_station(
         + ([] if task.drive_plan is None else task.drive_plan.said)
         + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
+        + stiff_regions(scenario)
         + sensor_warnings(scenario),
         workpiece,
         operator,

@@ -21,6 +21,7 @@ from experiments.results.drive_metrics import saturation_warnings
 from experiments.results.friction_metrics import friction_metrics
 from experiments.results.guidance_audit import Promise, audit
 from experiments.results.guidance_metrics import guidance_metrics
+from experiments.results.guidance_warnings import guidance_warnings
 from experiments.results.joint_limits import JointLimits
 from experiments.results.link_signals import lap_length
 from experiments.results.mounting_metrics import mounting_metrics
@@ -221,6 +222,7 @@ def _measure(
         *limits.warnings(log),
         *saturation_warnings(log),
         *_sensor_warnings(log),
+        *guidance_warnings(log, settings),
     ]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)
     return _Measured(log, motion, metrics, warnings, result.fault, broken, end)

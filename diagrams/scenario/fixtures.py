@@ -48,6 +48,14 @@ class FixtureParameters:
         kinds = (type(region.shape).__name__.lower() for region in self.regions)
         return [f"{kind}_{number}" for number, kind in enumerate(kinds, start=1)]
 
+    def lag_behind(self, bandwidth: float) -> float:
+        """Return ``tau`` [s] of the servos as it is believed.
+
+        Args:
+            bandwidth: Of the servos as the scenario has it [rad/s].
+        """
+        return self.servo_lag if self.servo_lag >= 0.0 else 1.0 / bandwidth
+
     def __post_init__(self) -> None:
         known = self.start_inside in _START
         require(known, "start_inside", self.start_inside, ", ".join(_START))

@@ -15,6 +15,7 @@ from diagrams.tasks.surface import surface_from_shape
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.checks import (
+    blocked_start,
     refuse_forbidden_start,
     refuse_same_regions,
     tangent_regions,
@@ -97,7 +98,8 @@ def make_fixtures(
             refuse_forbidden_start(hard, start)
     except InputError as error:
         raise InputError(f"fixtures: {error}") from None
-    return fixtures, [f"fixtures: {sentence}" for sentence in tangent_regions(hard, start)]
+    odd = [*blocked_start(hard, start), *tangent_regions(hard, start)]
+    return fixtures, [f"fixtures: {sentence}" for sentence in odd]
 
 
 def _make_fixture(

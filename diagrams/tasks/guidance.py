@@ -14,6 +14,7 @@ from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.fixtures.soft_region import bearable_stiffness
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.errors import InputError
@@ -109,6 +110,27 @@ def make_guidance(scenario: Scenario, task: SpaceTask) -> Guidance:
     return ProgramGuidance(parameters.guidance, admittance, lead, nearby, stiffness)
 
 
+def stiff_regions(scenario: Scenario) -> list[str]:
+    """Return which soft regions may ring behind servos, one sentence each.
+
+    Args:
+        scenario: The scenario.
+    """
+    fixtures, servos = scenario.fixtures, RELATIVE_DEGREE[scenario.controller.law] == 1
+    if fixtures is None or not servos or scenario.controller.manifold != "space":
+        return []
+    motion, lag = free_motion(scenario), make_lead(scenario).lag
+    most = bearable_stiffness(motion, lag)
+    return [
+        f"fixtures.regions[{number}].stiffness = {region.stiffness:g} N/m: compliance.tangential "
+        f"with {motion.damping:g} N s/m bears {most:.2g} N/m where servos and bus, "
+        f"{1e3 * lag:.2g} ms, are later than believed by a fifth or a tick; a stiffer region may "
+        "ring: make it softer or hard, or the damping larger"
+        for number, region in enumerate(fixtures.regions)
+        if region.stiffness is not None and region.stiffness > most
+    ]
+
+
 def make_lead(scenario: Scenario) -> Lead:
     """Return what is between the velocity that is asked for and the tool.
 
@@ -119,5 +141,5 @@ def make_lead(scenario: Scenario) -> Lead:
     period, degree = scenario.controller.sampling_time, RELATIVE_DEGREE[scenario.controller.law]
     if degree > 1:
         return FilterLead(degree, parameters.smoothing, period)
-    lag = parameters.servo_lag if parameters.servo_lag >= 0.0 else 1.0 / scenario.servo.bandwidth
+    lag = parameters.lag_behind(scenario.servo.bandwidth)
     return ServoLead(lag, scenario.servo.bus_delay, period)

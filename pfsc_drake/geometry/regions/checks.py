@@ -58,6 +58,27 @@ def refuse_forbidden_start(regions: Regions, start: ArrayLike, clock: float = 0.
     raise InputError(f"start {_place(y)} is in a forbidden region, {which}; {hint}")
 
 
+def blocked_start(regions: Regions, start: ArrayLike, clock: float = 0.0) -> list[str]:
+    """Say of a start on the forbidden side of a region if there is no way out.
+
+    Args:
+        regions: By name.
+        start: Tool point, [3], m.
+        clock: Time of the regions' clock [s].
+
+    Returns:
+        A sentence if a search of 0.5 m around found no admissible point.
+    """
+    y = np.asarray(start, dtype=float)
+    inside = [name for name, region in regions.items() if _distance(region, y, clock)[0] < 0.0]
+    if not inside or _admissible_near(list(regions.values()), y, clock) is not None:
+        return []
+    return [
+        f"start {_place(y)} is in that of {' and '.join(inside)}, and no admissible point was found"
+        " near it: regions exclude each other there, and squeeze the tool"
+    ]
+
+
 def refuse_same_regions(regions: Regions, start: ArrayLike, clock: float = 0.0) -> None:
     """Refuse regions that are given twice, or exclude each other with one boundary.
 

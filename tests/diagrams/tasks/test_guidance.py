@@ -11,6 +11,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.operator import OperatorParameters
 from diagrams.surroundings.operator import idle_controls
 from diagrams.surroundings.operator_file import controls_text
+from diagrams.tasks.guidance import stiff_regions
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.yaml.typed import load_file
 
@@ -28,6 +29,19 @@ def test_names_of_modes_and_regions(wedge):
     assert settings.fixtures.names == ["plane_1", "plane_2"]
     assert [fixture.name for fixture in station.task.fixtures] == settings.fixtures.names
     assert "mode" in station.log.rows
+
+
+def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
+    """What 90 N s/m bear behind 1/300 s and 2 ms; hard ones and those of other laws may be any."""
+    settings = copy.deepcopy(wedge[0])
+    assert stiff_regions(settings) == []
+    settings.fixtures.regions[1].stiffness = 3e3
+    assert stiff_regions(settings) == []
+    settings.fixtures.regions[1].stiffness = 1e6
+    (said,) = stiff_regions(settings)
+    assert "fixtures.regions[1].stiffness = 1e+06 N/m" in said and "bears 1.6e+05 N/m" in said
+    settings.controller.law = "rigid"
+    assert stiff_regions(settings) == []
 
 
 def test_a_person_switches_a_region_off(wedge, tmp_path):

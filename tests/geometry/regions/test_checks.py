@@ -8,6 +8,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.checks import (
+    blocked_start,
     refuse_forbidden_start,
     refuse_same_regions,
     tangent_regions,
@@ -68,6 +69,17 @@ def test_no_admissible_point_near(scene):
     scene["ball"] = SphereRegion(START, 3.0, inside=False)
     with pytest.raises(InputError, match="3000 mm deep in that of ball; no admissible point"):
         refuse_forbidden_start(scene, START)
+
+
+def test_a_start_without_a_way_out():
+    """Two walls that overlap admit nothing; apart by a millimetre they do."""
+    floor, ceiling = HalfSpace((0, 0, 0.81), UP), HalfSpace((0, 0, 0.80), (0, 0, -1))
+    walls = {"floor": floor, "ceiling": ceiling}
+    (said,) = blocked_start(walls, (0, 0, 0.812))
+    assert "in that of ceiling, and no admissible point" in said
+    walls["ceiling"] = HalfSpace((0, 0, 0.811), (0, 0, -1))
+    assert blocked_start(walls, (0, 0, 0.812)) == []
+    assert blocked_start(walls, (0, 0, 0.8105)) == []
 
 
 def test_moving_regions_are_where_the_clock_says():
