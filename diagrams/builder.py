@@ -176,10 +176,26 @@ def _start(
         workpiece.check_start(start.target.y_t)
     if mounting is not None:
         start = mounting.start(start, task)
-    q_J = part.posture(start.target, scenario.start)
+    q_J = _posture(scenario, task, part, start)
     for position, where in task.way():
         part.check_reach(position, where)
     return start, part.state_at_rest(q_J)
+
+
+def _posture(scenario: Scenario, task: Task, part: RobotPart, start: StartPoint) -> np.ndarray:
+    """Return the joints at the start, shape (N,); say it if only the inverted one is in reach."""
+    try:
+        return part.posture(start.target, scenario.start)
+    except InputError as error:
+        inverted = task.inverted(start)
+        if inverted is None:
+            raise
+        target, advice = inverted
+        try:
+            part.posture(target, scenario.start)
+        except InputError:
+            raise error from None
+        raise InputError(f"{error}; {advice}") from None
 
 
 def _rest(task: Task, part: RobotPart, start: StartPoint, state: np.ndarray) -> RestPosture:

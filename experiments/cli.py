@@ -366,7 +366,7 @@ def margins_command(
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         console, box = Console(), Box(mass, stiffness, rotor, tool)
-        with ProgressDisplay(console, loaded.name, None) as progress:
+        with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
             outcome = write_margins(loaded, folder, box, progress)
         for table in (place_table(outcome.analysis), case_table(outcome.analysis)):
             console.print(table)

@@ -55,18 +55,23 @@ class ProgressDisplay:
         simulated_time: s, the largest so far.
     """
 
-    def __init__(self, console: Console, title: str, duration: float | None) -> None:
+    def __init__(
+        self, console: Console, title: str, duration: float | None, *, paced: bool = True
+    ) -> None:
         """Starts at zero.
 
         Args:
             console: Where to write.
             title: Name of the run.
             duration: s, simulated time at the end; None if unknown.
+            paced: Whether the time is simulated step by step, so that its pace tells something;
+                else it is where the work is, and each phase begins anew.
         """
         self.simulated_time = 0.0
         self._console = console
         self._title = title
         self._duration = duration
+        self._paced = paced
         self._phase = ""
         self._phase_start = (time.monotonic(), 0.0)
         self._next_line = 0.0
@@ -106,6 +111,8 @@ class ProgressDisplay:
         if new_phase:
             self._phase = phase
             self._phase_start = (time.monotonic(), simulated_time)
+        if new_phase and not self._paced:
+            self.simulated_time = self._next_line = 0.0
         self.simulated_time = max(self.simulated_time, simulated_time)
         if self._bar is not None:
             self._bar.update(self._task, completed=self.simulated_time, status=self._status())
@@ -122,5 +129,7 @@ class ProgressDisplay:
         if advanced <= 0.0 or wall <= 0.0:
             return self._phase
         total = f" of {self._duration:.2f}" if self._duration else ""
+        if not self._paced:
+            return f"{self._phase}, t = {self.simulated_time:.2f}{total} s"
         factor = advanced / wall
         return f"{self._phase} {self.simulated_time:.2f}{total} s, {factor:.1f} x real time"

@@ -105,12 +105,12 @@ def _noise(path: Path, shape: ShapeReport) -> str | None:
 
 
 def _swing(shape: ShapeReport) -> str | None:
-    off, chord = shape.distance_from_points, shape.chord_there
+    off, chord = shape.distance_from_polygon, shape.chord_there
     if off is None or chord is None or off <= max(_SMALL, _SWING * chord):
         return None
     return (
         f"the path swings {_length(off)} beside the straight line between two waypoints "
-        f"{_length(chord)} apart, at eta = {shape.distance_from_points_at:.4g} m: add waypoints "
+        f"{_length(chord)} apart, at eta = {shape.distance_from_polygon_at:.4g} m: add waypoints "
         "there, or write path.shape.corner_distance (m) for straight lines with rounded corners"
     )
 

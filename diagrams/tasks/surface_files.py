@@ -22,6 +22,9 @@ from pfsc_drake.geometry.surfaces.residuals import Residuals
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered
 from pfsc_drake.geometry.surfaces.surface import Surface
 
+# how many times further apart neighbours are where a row ends unseen
+_JUMP = 3.0
+
 
 @dataclass(frozen=True)
 class MadeSurface:
@@ -123,12 +126,29 @@ def _near_grid(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurfac
             "rows times columns must be all of its points"
         )
     table, closed = points.reshape(rows, columns, 3), (shape.closed[0], shape.closed[1])
+    _refuse_swapped(shape, points)
     if shape.interpolate:
         return MadeSurface(surface_through_grid(table, smoothness=smoothness, closed=closed))
     tolerance = shape.tolerance or None
     return MadeSurface(
         *smooth_surface_near_grid(table, smoothness=smoothness, tolerance=tolerance, closed=closed)
     )
+
+
+def _refuse_swapped(shape: Fitted, points: np.ndarray) -> None:
+    """Refuse a grid whose rows jump, where those of the swapped one do not."""
+    rows, columns = shape.grid
+
+    def widest(count: int) -> float:
+        steps = np.diff(points.reshape(-1, count, 3), axis=1)
+        return float(np.linalg.norm(steps, axis=2).max())
+
+    if widest(columns) > _JUMP * widest(rows):
+        raise InputError(
+            f"grid = {shape.grid}: neighbours in a row are up to {widest(columns):.3g} m apart, "
+            f"with [{columns}, {rows}] {widest(rows):.3g} m: rows and columns are swapped; must "
+            "be [rows, columns] of points that are given row by row"
+        )
 
 
 def _scattered(shape: Fitted, points: np.ndarray, smoothness: int) -> MadeSurface:

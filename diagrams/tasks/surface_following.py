@@ -1,6 +1,7 @@
 """Following a surface: the tool converges to it, and moves along it as two coordinates say."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -152,6 +153,21 @@ class SurfaceTask(Task):
             R_d = self.place.orientation(point[None])[0]
             target = ToolTarget(y_t, R_d @ deviation, self.place.tool_axis)
         return StartPoint(target, place)
+
+    def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:
+        """See :class:`Task`."""
+        parameters, R_e = self._scenario.surface, start.target.R_e
+        if parameters is None or parameters.orientation.kind != "normal" or R_e is None:
+            return None
+        axes = self.place.axes(self.point(start))
+        # the tangent stays, which leaves the frame right-handed
+        turned = axes @ np.diag([1.0, -1.0, -1.0]) @ axes.T @ R_e
+        advice = (
+            f"with the normal {np.round(axes[:, 2], 3).tolist()} inverted it is within reach: let "
+            "the shape's axis, inward or seen_from turn the normal over, or "
+            "surface.orientation.angles_deg the tool"
+        )
+        return replace(start.target, R_e=turned), advice
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""

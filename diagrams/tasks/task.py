@@ -75,6 +75,17 @@ class Task(ABC):
         """Length of the manifold [m] if it is a path; else 0."""
         return 0.0
 
+    def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:
+        """Return what a start may have been meant to be, and how to say so.
+
+        Args:
+            start: The start as the scenario says.
+
+        Returns:
+            The pose with the manifold's normal inverted, and advice; None where no normal decides.
+        """
+        return None
+
     @abstractmethod
     def require_joints(self, num_joints: int) -> None:
         """Refuse a robot that cannot follow, or would lose its orientation by oversight.

@@ -36,6 +36,8 @@ def shape_metrics(
         metrics.add("path_smallest_radius_at", shape.smallest_radius_at, "m")
     if shape.distance_from_points is not None:
         metrics.add("path_distance_from_points", shape.distance_from_points, "m")
+    if shape.distance_from_polygon is not None:
+        metrics.add("path_distance_from_polygon", shape.distance_from_polygon, "m")
     if shape.largest_angle_rate is not None:
         metrics.add("path_angle_rate", shape.largest_angle_rate, "rad/m")
     return metrics

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.measurement.record import REQUIRED_SIGNALS, SIGNALS, MeasuredRobot, Record
-from identification.measurement.units import to_si
+from identification.measurement.units import si_unit, to_si
 from pfsc_drake.errors import InputError, shortened
 
 TIME = "t"
@@ -92,6 +92,7 @@ class _Table:
     def __init__(self, robot: MeasuredRobot, reading: Reading, source: str) -> None:
         self._robot, self._reading, self._source = robot, reading, source
         self._columns: dict[tuple[str, int], np.ndarray] = {}
+        self._without_unit: list[tuple[str, int]] = []
         self._unused = {
             option: set(getattr(reading, option)) for option in ("names", "units", "scale")
         }
@@ -165,13 +166,32 @@ class _Table:
         unit = str(given or stated)
         scale = self._option("scale", signal, index)
         if not unit and scale is None:
-            raise InputError(f"{where}: no unit is stated; it must be, as in 'tau_1 [Nm]'")
+            self._without_unit.append((signal, index))
+            return 1.0
         joint_unit = self._robot.joint_units[index]
         return to_si(signal, joint_unit, unit, None if scale is None else float(scale), where)
+
+    def _refuse_without_unit(self) -> None:
+        """Refuse columns whose unit is known to nobody, all of them in one line."""
+        if self._without_unit:
+            labels = ", ".join(self._label(*column) for column in self._without_unit)
+            alike = len(set(self._robot.joint_units)) == 1
+            units = {
+                signal if alike else self._label(signal, index): si_unit(
+                    signal, self._robot.joint_units[index]
+                )
+                for signal, index in self._without_unit
+            }
+            options = " ".join(f"--unit {name}={unit}" for name, unit in units.items())
+            raise InputError(
+                f"{self._source}: {labels}: no unit is stated; each must be, as in 'tau_1 [Nm]', "
+                f"or by options like {options}"
+            )
 
     def record(self, period: float | None) -> Record:
         """Return the record."""
         self._refuse_unused()
+        self._refuse_without_unit()
         names = tuple(self._robot.joint_names)
         if (TIME, 0) not in self._columns:
             raise InputError(f"{self._source}: no time; 't [s]' is required")

@@ -43,3 +43,15 @@ def test_terminal_shows_a_bar_with_the_title_as_it_is():
         assert progress.simulated_time == 0.5
     assert "[red]x" in stream.getvalue()
     assert "drawing figures" in stream.getvalue()
+
+
+def test_where_work_is_has_no_pace():
+    """Each phase begins anew, and jumps in it are no speed."""
+    stream = io.StringIO()
+    with ProgressDisplay(Console(file=stream, width=200), "x", 4.0, paced=False) as progress:
+        progress(4.0, "walking")
+        for time in (0.0, 2.0, 4.0):
+            progress(time, "linearizing, masses +5 %")
+    lines = stream.getvalue().splitlines()
+    assert not any("real time" in line for line in lines)
+    assert "x: linearizing, masses +5 %, t = 2.00 of 4.00 s" in lines

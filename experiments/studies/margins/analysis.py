@@ -242,7 +242,7 @@ class _Study:
     chosen: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
     def build(self, error: Error) -> StationLoop:
-        self.progress(self.duration, f"linearizing, {error}")
+        self.progress(0.0, f"linearizing, {error}")
         return StationLoop(error.applied_to(self.settings), self.folder, self.walked.station.task)
 
     def section(self, loop: StationLoop, instant: Instant) -> Context:

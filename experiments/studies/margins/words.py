@@ -12,6 +12,10 @@ from reporting.metrics import Metrics
 
 # disc margin and damping ratio from which on a loop is robust and well damped by custom
 GOOD_DISC, GOOD_DAMPING = 0.75, 0.3
+_WHAT_TO_DO = (
+    ": one sampling interval between measurement and drive makes the loop unstable; slower poles, "
+    "or a shorter controller.sampling_time, leave room for it"
+)
 _PARAMETERS = {
     "mass": "the masses",
     "stiffness": "the joint stiffnesses",
@@ -47,8 +51,7 @@ def one_line(analysis: MarginAnalysis) -> str:
     if tightest is not None and analysis.nominal.is_stable:
         drive = int(np.argmin([margin.alpha for margin in tightest.drives]))
         parts.append(
-            f"drive {drive + 1} bears {_borne(tightest.drives[drive])}; "
-            f"all bear {_intervals(analysis.delay)} of delay"
+            f"drive {drive + 1} bears {_borne(tightest.drives[drive])}; {_delay(analysis.delay)}"
         )
     unstable = [case for case in analysis.cases[1:] if not case.is_stable]
     if unstable and analysis.nominal.is_stable:
@@ -162,8 +165,8 @@ def _drives(analysis: MarginAnalysis) -> list[str]:
     return [
         f"The weakest drive is {analysis.joints[drive]}, {tightest.instant.place}: its {what} may "
         f"be wrong by {_borne(margin)} (disc margin {margin.alpha:.3g} at "
-        f"{margin.frequency / (2.0 * np.pi):.3g} Hz). Beside what there is, all drives bear "
-        f"{_intervals(analysis.delay)} of delay."
+        f"{margin.frequency / (2.0 * np.pi):.3g} Hz). Beside what there is, "
+        f"{_delay(analysis.delay)}{'' if analysis.delay > 0 else _WHAT_TO_DO}."
     ]
 
 
@@ -191,10 +194,11 @@ def _borne(margin: DiscMargin) -> str:
     return f"{100.0 * (low - 1.0):+.3g} to {100.0 * (high - 1.0):+.3g} % or {degrees:.2g} deg"
 
 
-def _intervals(delay: int) -> str:
+def _delay(delay: int) -> str:
     if delay <= 0:
-        return "no sampling interval"
-    return f"{delay} sampling interval{'s' if delay > 1 else ''}"
+        return "no extra delay is tolerated"
+    intervals = f"{delay} sampling interval{'s' if delay > 1 else ''}"
+    return f"all drives tolerate an extra delay of {intervals}"
 
 
 def _instant_data(item: Any) -> dict[str, Any]:

@@ -4,12 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pfsc_drake.geometry.paths.path import Path
+from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 
 _SAMPLES_PER_SEGMENT = 16
 _FEWEST_SAMPLES = 2048
 # Samples that are evaluated at once.
 _CHUNK = 20_000
+# Newton steps to the points of a path that are nearest to its waypoints.
+_FOOT_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -20,9 +23,10 @@ class ShapeReport:
         length: Length (of one lap), m.
         smallest_radius: Smallest radius of curvature, m; infinite on a straight line.
         smallest_radius_at: eta there, m.
-        distance_from_points: Largest distance of the path from the polygon through its
+        distance_from_points: Largest distance of a waypoint from the path, m; None without.
+        distance_from_polygon: Largest distance of the path from the polygon through its
             waypoints, m; None without waypoints.
-        distance_from_points_at: eta there, m, or None.
+        distance_from_polygon_at: eta there, m, or None.
         chord_there: Length of the polygon's side there, m, or None.
         largest_angle_rate: Largest angle the orientation turns by, rad/m; None without.
         largest_angle_rate_at: eta there, m, or None.
@@ -33,7 +37,8 @@ class ShapeReport:
     smallest_radius: float
     smallest_radius_at: float
     distance_from_points: float | None
-    distance_from_points_at: float | None
+    distance_from_polygon: float | None
+    distance_from_polygon_at: float | None
     chord_there: float | None
     largest_angle_rate: float | None
     largest_angle_rate_at: float | None
@@ -58,8 +63,9 @@ def shape_report(path: Path) -> ShapeReport:
     curvature = np.concatenate([_curvatures(path, chunk) for chunk in chunks])
     bend = int(np.argmax(curvature[:, 0]))
     largest = float(curvature[bend, 0])
-    distance = distance_at = chord = rate = rate_at = None
+    missed = distance = distance_at = chord = rate = rate_at = None
     if path.waypoints is not None:
+        missed = _largest_miss(path.position, path.waypoints)
         off, chords = _distances_from_polygon(path, theta, chunks)
         far = int(np.argmax(off))
         distance, chord = float(off[far]), float(chords[far])
@@ -72,6 +78,7 @@ def shape_report(path: Path) -> ShapeReport:
         path.length,
         1.0 / largest if largest > 0.0 else np.inf,
         path.arc_length(float(theta[bend])),
+        missed,
         distance,
         distance_at,
         chord,
@@ -93,6 +100,23 @@ def _curvatures(path: Path, theta: np.ndarray) -> np.ndarray:
     rate = (d3 - ratio_rate * d1 - along / square * d2) / square - 2.0 * along / square * kappa
     speed = np.sqrt(square)
     return np.stack([np.linalg.norm(kappa, axis=1), np.linalg.norm(rate / speed, axis=1)], axis=1)
+
+
+def _largest_miss(curve: Curve, waypoints: PathWaypoints) -> float:
+    """Largest distance of a waypoint from the curve near its parameter, m."""
+    theta, points = waypoints.parameters, waypoints.positions[: len(waypoints.parameters)]
+    begin, end = curve.domain
+    longest = float(np.diff(curve.breakpoints).max())
+    least = np.full(len(points), np.inf)
+    for _ in range(_FOOT_STEPS):
+        values = curve.derivatives(theta, 1)
+        off, slope = points - values[:, 0], values[:, 1]
+        least = np.minimum(least, np.linalg.norm(off, axis=1))
+        step = np.sum(off * slope, axis=1) / np.sum(slope**2, axis=1)
+        theta = theta + np.clip(step, -longest, longest)
+        if not curve.closed:
+            theta = np.clip(theta, begin, end)
+    return float(least.max())
 
 
 def _distances_from_polygon(

@@ -1,5 +1,6 @@
 """Paths through waypoints."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,11 +36,11 @@ class Tolerance:
 
     Attributes:
         position: m, positive.
-        orientation: rad, positive.
+        orientation: rad, positive; 1 deg by default.
     """
 
     position: float
-    orientation: float
+    orientation: float = math.radians(1.0)
 
 
 def path_from_waypoints(
@@ -48,7 +49,7 @@ def path_from_waypoints(
     smoothness: int,
     closed: bool = False,
     parametrization: Parametrization = "chord",
-    tolerance: Tolerance | None = None,
+    tolerance: Tolerance | float | None = None,
     corner_distance: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
@@ -61,7 +62,7 @@ def path_from_waypoints(
         closed: True for a closed path.
         parametrization: "chord" or "centripetal", see `interpolate`.
         tolerance: If given, the smoothest path that comes as near as this to all waypoints,
-            see `smooth_positions`; neighbours may then coincide.
+            see `smooth_positions`; neighbours may then coincide. A number is that of positions, m.
         corner_distance: If given, m: the path consists of straight lines, blended up to this
             distance from each corner (at most half of the line), see `round_corners`.
         progress: Told the fraction done and what is done.
@@ -83,6 +84,8 @@ def path_from_waypoints(
     check_smoothness(smoothness)
     if tolerance is not None:
         _require_no(table, corner_distance, "path.shape.tolerance")
+        if not isinstance(tolerance, Tolerance):
+            tolerance = Tolerance(tolerance)
         return _smooth_path(table, smoothness, closed, tolerance, progress)
     if len(positions) > MAX_INTERPOLATED:
         raise InputError(

@@ -215,7 +215,7 @@ def test_corners_are_rounded(tmp_path):
     )
     turn = Rotation.from_matrix(path.orientation.rotation_matrix(middles)).as_euler("ZYX", True)
     np.testing.assert_allclose(turn[:, 0], [15.0, 60.0, 45.0, 0.0], atol=1e-9)
-    assert shape_report(path).distance_from_points < 0.01
+    assert shape_report(path).distance_from_polygon < 0.01
 
 
 @pytest.mark.parametrize(

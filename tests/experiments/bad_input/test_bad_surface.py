@@ -147,6 +147,7 @@ def test_grids(wrong, tmp_path):
     wrong("tolerance", changes=fitted(", grid: [25, 25], interpolate: true, tolerance: 1e-3"))
     csv(tmp_path, dish(SQUARE[:75]))
     wrong("C^4", changes=fitted(", grid: [3, 25], interpolate: true"))
+    wrong("grid = [25, 3]", "[3, 25]", "swapped", changes=fitted(", grid: [25, 3]"))
 
 
 @pytest.mark.parametrize(
@@ -189,6 +190,18 @@ def test_a_profile_that_crosses_itself_or_the_axis(wrong, tmp_path):
     csv(tmp_path, np.column_stack([0.7 + t / 20, 0 * t, 1.0 + 0 * t]))
     changes = ["surface.shape=!Extruded {file: points.csv, direction: [1, 0, 0]}"]
     wrong("not regular", changes=changes)
+
+
+def test_an_inverted_normal_is_named(refused, mine):
+    """The tool would have to come from below, through the table."""
+    shape = "!Plane {{origin: [0.9, 0, 0.2], axis: [0, 0, {}]}}"
+    changes = [
+        "surface.orientation={kind: normal, angles_deg: [0, 0, 180]}",
+        "start={posture_deg: [0, 105, -40, 0, 75, 0], offset: [0, 0]}",
+        "reference.places=[[0, 0], [0.05, 0]]",
+    ]
+    wrong = [f"surface.shape={shape.format(-1)}", *changes]
+    refused(mine("sfc_elastic_6r"), "normal [0.0, 0.0, -1.0] inverted", "reach", changes=wrong)
 
 
 def test_starts_and_ways(wrong, tmp_path):

@@ -28,5 +28,6 @@ def test_what_exists_is_given():
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     path = path_from_waypoints(WaypointTable(points), smoothness=3, closed=True)
     report = shape_report(path)
-    metric = shape_metrics(report)["path_distance_from_points"]
-    assert metric.value == report.distance_from_points
+    metrics = shape_metrics(report)
+    assert metrics["path_distance_from_points"].value == report.distance_from_points
+    assert metrics["path_distance_from_polygon"].value == report.distance_from_polygon

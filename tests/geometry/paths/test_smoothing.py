@@ -173,3 +173,15 @@ def test_points_that_say_too_little() -> None:
         )
     with pytest.raises(InputError, match="is too much for a path whose waypoints reach"):
         smooth_positions(_circle(50), smoothness=3, tolerance=0.5, closed=True)
+
+
+def test_a_tolerance_is_a_number_too() -> None:
+    points = _circle(200) + 1e-4 * np.random.default_rng(4).normal(size=(200, 3))
+    table = WaypointTable(points, zyx_to_quaternion(np.zeros((200, 3))))
+    said = path_from_waypoints(table, smoothness=3, tolerance=Tolerance(5e-4, np.radians(1.0)))
+    short = path_from_waypoints(table, smoothness=3, tolerance=5e-4)
+    theta = np.linspace(*said.position.domain, 50)
+    for one, other in ((said.position, short.position), (said.orientation, short.orientation)):
+        np.testing.assert_array_equal(one.derivatives(theta, 2), other.derivatives(theta, 2))
+    with pytest.raises(InputError, match="tolerance"):
+        path_from_waypoints(table, smoothness=3, tolerance=-1.0)

@@ -128,8 +128,12 @@ def test_too_many_columns(tmp_path, record, robot):
 
 def test_mat_without_units(tmp_path, record, robot):
     savemat(tmp_path / "a.mat", {"t": record.t, "q": record.q, "tau": record.tau})
-    with pytest.raises(InputError, match="no unit is stated"):
+    with pytest.raises(InputError) as refused:
         read_record(tmp_path / "a.mat", robot)
+    # all that is missing, and one line that says it
+    assert "t, q_1, q_2, tau_1, tau_2: no unit is stated" in str(refused.value)
+    options = "--unit t=s --unit q_1=rad --unit q_2=m --unit tau_1=Nm --unit tau_2=N"
+    assert str(refused.value).endswith(options)
     units = {"t": "s", "q_1": "rad", "q_2": "m", "tau_1": "Nm", "tau_2": "N"}
     read = read_record(tmp_path / "a.mat", robot, 2.0, Reading(units=units))
     np.testing.assert_array_equal(read.tau, record.tau)

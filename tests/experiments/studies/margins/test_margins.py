@@ -9,10 +9,10 @@ import pytest
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
-from experiments.studies.margins.analysis import analyse
+from experiments.studies.margins.analysis import MarginAnalysis, analyse
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.smooth import smooth
-from experiments.studies.margins.words import one_line
+from experiments.studies.margins.words import one_line, sentences
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 
@@ -191,3 +191,19 @@ def test_margins_along_a_surface():
     assert 0.5 < max(speeds) <= 1.0
     assert "eta = (-0.15, 0.2) m" in instants[-1].place
     assert all(place.modes is not None for place in analysis.nominal.places)
+
+
+@pytest.mark.parametrize(
+    ("delay", "words"),
+    [
+        (0, "no extra delay is tolerated"),
+        (1, "all drives tolerate an extra delay of 1 sampling interval"),
+        (3, "all drives tolerate an extra delay of 3 sampling intervals"),
+    ],
+)
+def test_delays_in_words(delay, words, monkeypatch):
+    analysis = analysis_of("pfc_elastic_3r")
+    monkeypatch.setattr(MarginAnalysis, "delay", delay)
+    assert one_line(analysis).endswith(words)
+    said = next(sentence for sentence in sentences(analysis) if words in sentence)
+    assert ("a shorter controller.sampling_time" in said) == (delay == 0)
