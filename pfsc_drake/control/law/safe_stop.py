@@ -181,8 +181,9 @@ class SafeStop:
         expected = before.copy()
         expected[[_Q_J, _Q_M]] += step
         found = np.where(good, now, expected)
-        deflection = self._weight(found[_Q_J]) * self._compliance
         # what was implausible may have been so for a while: then the other side knows better
+        nearest = np.where(suspect[_Q_J] & ~suspect[_Q_M], found[_Q_M], found[_Q_J])
+        deflection = self._weight(nearest) * self._compliance
         for own, other, shift in ((_Q_J, _Q_M, -deflection), (_Q_M, _Q_J, deflection)):
             rely = suspect[own] & ~suspect[other]
             found[own] = np.where(rely, found[other] + shift, found[own])

@@ -259,6 +259,25 @@ def test_damped_drives_are_averaged_over_the_hold(load_robot, law):
     assert np.all(np.divide(errors[:-1], errors[1:]) > 3.0)
 
 
+def test_damping_of_drives_adds_what_it_takes_of_the_mean_velocity(load_robot):
+    """``d (v_M + T_s/2 a_M)`` with the motor acceleration of the free law, for any jerk."""
+    model, d, T_s = "comau_racer_1_4_elastic_3r", np.array([300.0, 200.0, 100.0]), 1e-3
+    joints, jerk = (10.0, 8.0, 6.0), 1e3 * np.array([2.0, -1.0, 3.0])
+    damped, free = load_robot(model, joints, tuple(d)), load_robot(model, joints)
+    state = random_state(damped, np.random.default_rng(12))
+    drives = []
+    for robot in (damped, free):
+        evaluate = compile_law(robot.chain, actuation.visco_elastic, 2, T_s)
+        q, gain, drift, offset = evaluate(state, np.zeros(6))
+        drives.append(gain @ jerk + drift + offset)
+    chain = free.chain
+    v_J, v_M, D_M, K = state[3:6], state[9:], chain.D_M, chain.K_d + chain.K_s * T_s
+    tau_J_rate = (gain @ jerk + drift - T_s / 2 * D_M * jerk) / (D_M / K + T_s / 2)
+    a_J = q[2] + T_s / 2 * jerk
+    a_M = a_J + (tau_J_rate - chain.K_s * (v_M - v_J)) / K
+    np.testing.assert_allclose(drives[0] - drives[1], d * (v_M + T_s / 2 * a_M), rtol=1e-9)
+
+
 def test_rigid_joints_among_elastic_ones(load_robot):
     """Each joint by itself: a rigid one as in the rigid robot, an elastic one by its motor."""
     chain = load_robot("comau_racer_1_4_elastic_3r").chain

@@ -125,6 +125,25 @@ def test_the_fast_pole_is_the_slowest_that_suffices(arm):
     assert worst(fast) <= -0.5 * bandwidth < worst(0.8 * fast)
 
 
+def test_a_slow_coordinate_asks_no_more_of_the_fast_pole_than_it_converges(arm):
+    """Coordinates of 20 and 60 1/s: every mode is to keep half of 20, which the slow ones can."""
+    robot, _ = arm(1e-3)
+    error = 0.05
+
+    def mixed(fast):
+        each = [gains_from_poles(rule_of_poles(b, fast, 4)) for b in (20.0, 60.0, 60.0)]
+        return LoopGains(Stabilization(each, 4, ["x"] * 3))
+
+    fast = choose_fast_pole(robot, mixed, [20.0, 60.0, 60.0], error)
+    both = [RobotError(1.0 + m * error, 1.0 + k * error) for m in (-1, 1) for k in (-1, 1)]
+    assert set(both) < set(robot.corners(error))
+
+    def worst(fast):
+        return max(robot.rate(mixed(fast), wrong) for wrong in robot.corners(error))
+
+    assert worst(fast) <= -10.0 < worst(0.8 * fast)
+
+
 def test_rule_of_poles():
     assert rule_of_poles(60.0, 250.0, 4) == [-60.0, -60.0, -250.0, -350.0]
     assert rule_of_poles(60.0, 250.0, 3) == [-60.0, -60.0, -250.0]

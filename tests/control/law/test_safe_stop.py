@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces
 
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
 from pfsc_drake.control.law.stopping_step import StopMemory
@@ -182,6 +183,45 @@ def test_what_moves_up_stops_sooner_than_what_moves_down(robot):
     sooner, later = durations
     weight, limit = abs(robot.weight(POSTURE)[1]), 0.7 * robot.limits[1]
     assert later / sooner == pytest.approx((limit + weight) / (limit - weight))
+
+
+def test_braking_peaks_at_the_share_of_the_drive_that_it_was_planned_with(robot):
+    """Axis 1, which bears no weight: momentum p in T takes 1.5 p / T at the steepest."""
+    if np.isfinite(robot.chain.K_s).all():
+        pytest.skip("the swing of elastic links adds to it")
+    speed = np.array([2.0, 0.0, 0.0])
+    _, torques = stop(robot, speed=speed, ticks=400)
+    assert np.abs(torques[5:, 0]).max() == pytest.approx(0.7 * robot.limits[0], rel=0.1)
+
+
+def test_nothing_jumps_where_motors_and_links_part(robot):
+    """At the instant of the fault the drives get what the motion takes anyway, by Drake."""
+    if np.isinf(robot.chain.K_s).all():
+        pytest.skip("rigid joints do not part")
+    x = robot.rows @ robot.state(POSTURE, SPEED)
+    x[3 * N :] += [0.3, -0.2, 0.4]
+    rigid = Robot("comau_racer_1_4_3r")
+    rigid.plant.SetPositionsAndVelocities(
+        rigid.context, rigid.coordinates.plant_state(np.tile([*POSTURE, *SPEED], 2))
+    )
+    forces = MultibodyForces(rigid.plant)
+    rigid.plant.CalcForceElementsContribution(rigid.context, forces)
+    borne = rigid.plant.CalcInverseDynamics(rigid.context, np.zeros(N), forces)
+    torque = robot.safe.drive(robot.safe.start(x, x, NOTHING), x)
+    np.testing.assert_allclose(torque, borne, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("lost", [1, 2 * N + 1])
+def test_an_implausible_side_is_taken_from_the_other_and_the_weight_between(robot, lost):
+    """A position of link or motor 2, long wrong: the spring tells where it is."""
+    true = robot.rows @ robot.state(POSTURE, np.zeros(N))
+    wrong, suspects, at = true.copy(), NOTHING.copy(), StopMemory(N)
+    wrong[lost] += 0.5
+    suspects[lost] = 1.0
+    memory = robot.safe.start(wrong, wrong, suspects)
+    found = memory[at.q_0 if lost < N else at.position][1]
+    bend = abs(robot.weight(POSTURE)[1] / robot.chain.K_s[1])
+    assert found == pytest.approx(true[lost], abs=1e-9 + 0.1 * bend)
 
 
 def test_the_swing_of_soft_links_dies_out():
