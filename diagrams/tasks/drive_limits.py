@@ -21,6 +21,8 @@ from pfsc_drake.robot.robot_model import largest_speeds
 
 # s, between the samples of a course: while it is checked, and while it is slowed
 _CHECKED, _SLOWED, _FINEST = 4e-3, 1e-3, 2.5e-4
+# s, of motions that are planned; and the most samples of one
+_LONGEST, _MOST = 1000.0, 100_000
 # of the smallest radius, the way from sample to sample
 _OF_RADIUS = 1.0 / 12.0
 # s of the asked time, over which a change of pace is smoothed
@@ -74,7 +76,8 @@ def plan_drives(
             are believed.
     """
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
-    if isinstance(task, SpaceTask) or law.stabilization.is_free[along].any():
+    led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
+    if led or task.motion.domain[1] > _LONGEST:
         return None
     planner = _Planner(scenario, task, law, start, friction)
     try:
@@ -152,7 +155,8 @@ class _Planner:
         fastest = self._scenario.reference.velocity
         if self._law.posture is not None:  # it moves as fast as a sampled law lets it
             longest = min(longest, self._scenario.controller.sampling_time)
-        return float(np.clip(_OF_RADIUS * radius / fastest, min(_FINEST, longest), longest))
+        step = np.clip(_OF_RADIUS * radius / fastest, min(_FINEST, longest), longest)
+        return max(float(step), self._task.motion.domain[1] / _MOST)
 
     def allowed(self, course: np.ndarray) -> np.ndarray:
         """Return what may be asked of the drives, (samples, 2N)."""
