@@ -74,7 +74,9 @@ def build_station(
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
     friction = believed_friction(part, scenario, folder)
-    following = Following(scenario, believed, task, law, on_motors, friction)
+    link_state = part.coordinates.link_rows @ initial_state
+    start_posture = link_state[: part.robot.dimension]
+    following = Following(scenario, believed, task, law, start_posture, on_motors, friction)
     keep_drive_limits(scenario, task, law, CourseStart(rest().q_J, start.place), friction)
 
     true_state = part.joint_state(builder)
@@ -103,7 +105,6 @@ def build_station(
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "station")
-    link_state = part.coordinates.link_rows @ initial_state
     return Station(
         diagram,
         part,
@@ -118,7 +119,7 @@ def build_station(
         task.warnings
         + scenario.model_error.warnings
         + ([] if task.drive_plan is None else task.drive_plan.said)
-        + part.start_warnings(scenario.start, link_state[: part.robot.dimension], start.target)
+        + part.start_warnings(scenario.start, start_posture, start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + stiff_regions(scenario)
         + sensor_warnings(scenario),

@@ -5,7 +5,7 @@ import dataclasses as dc
 from diagrams.scenario.checks import require, require_between, require_not_negative
 from diagrams.scenario.region import RegionParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
-from pfsc_drake.control.fixtures.parameters import GuidanceParameters
+from pfsc_drake.control.fixtures.parameters import GuidanceParameters, RobotLimitParameters
 
 _START = ("refuse", "move_out")
 
@@ -19,6 +19,7 @@ class FixtureParameters:
     Attributes:
         regions: Where the tool may not go.
         guidance: How it is kept out.
+        limits: How far it follows a hand to where the robot itself cannot go on.
         orientation: That the tool keeps.
         start_inside: Of a region that the tool starts in: ``refuse``, or ``move_out`` slowly.
         servo_lag: ``tau`` [s] of the velocity servos as it is believed; negative for the inverse
@@ -33,6 +34,7 @@ class FixtureParameters:
 
     regions: list[RegionParameters] = dc.field(default_factory=list)
     guidance: GuidanceParameters = dc.field(default_factory=GuidanceParameters)
+    limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
     orientation: SurfaceOrientationParameters = dc.field(
         default_factory=SurfaceOrientationParameters
     )

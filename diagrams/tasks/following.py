@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
@@ -44,6 +45,7 @@ class Following:
         robot: The robot as it is believed to be.
         task: What it is to do.
         law: The law.
+        start: Joint coordinates at the start, shape (N,).
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
     """
@@ -52,6 +54,7 @@ class Following:
     robot: RobotModel
     task: Task
     law: FollowingLaw
+    start: np.ndarray
     on_motors: bool = False
     friction: Coefficients | None = None
 
@@ -207,7 +210,7 @@ def _add_guidance(
     task, scenario = following.task, following.scenario
     assert isinstance(task, SpaceTask)  # see add_place
     order = reference_order(scenario, following.law.linearization)
-    return add_guidance(builder, scenario, following.robot, task, order, signals)
+    return add_guidance(builder, scenario, following.robot, task, order, signals, following.start)
 
 
 def _add_smooth_start(

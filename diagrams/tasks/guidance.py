@@ -14,6 +14,7 @@ from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.fixtures.soft_region import bearable_stiffness
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Kind
@@ -32,6 +33,7 @@ def add_guidance(
     task: SpaceTask,
     order: int,
     ports: dict[str, OutputPort],
+    start: np.ndarray,
 ) -> FixtureGuidance:
     """Add what leads the tool.
 
@@ -44,6 +46,7 @@ def add_guidance(
         ports: ``joint_state`` as measured; ``wrench_measured`` and ``tared``, or without a sensor
             ``wrench_observed`` and ``ready``; where a person can change them, ``regions_on`` and
             ``impedance_wish``, see :class:`ImpedanceTuner`.
+        start: Joint coordinates at the start, shape (N,).
 
     Raises:
         InputError: If the rules do not suit the law.
@@ -58,6 +61,7 @@ def add_guidance(
             len(task.manifold.coordinates),
             record,
             period,
+            _robot_limits(scenario, robot, task, start),
         ),
     )
     wrench, ready = "wrench_measured", "tared"
@@ -76,6 +80,23 @@ def add_guidance(
         builder.Connect(ports["impedance_wish"], damping.get_input_port())
         builder.Connect(damping.get_output_port(), system.GetInputPort("damping"))
     return system
+
+
+def _robot_limits(
+    scenario: Scenario, robot: RobotModel, task: SpaceTask, start: np.ndarray
+) -> RobotLimits | None:
+    """Return what of the robot limits the hand, if anything is to."""
+    parameters, place = scenario.fixtures or FixtureParameters(), task.place
+    if not parameters.limits.on or parameters.guidance.rules == "printed":
+        return None
+    return RobotLimits(
+        robot,
+        parameters.limits,
+        start,
+        oriented=place.is_oriented,
+        tool_axis=place.tool_axis,
+        fastest=parameters.guidance.largest_speed + max(task.region_speeds, default=0.0),
+    )
 
 
 def make_guidance(scenario: Scenario, task: SpaceTask) -> Guidance:

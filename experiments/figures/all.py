@@ -24,9 +24,11 @@ from experiments.figures.guidance import (
     draw_contact,
     draw_energy,
     draw_guidance,
+    draw_limits,
     gives_energy,
     has_contact,
     has_regions,
+    held_by_robot,
 )
 from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.figures.notch import draw_notch_position
@@ -101,6 +103,7 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (has_regions, draw_guidance),
     (has_contact, draw_contact),
     (gives_energy, draw_energy),
+    (held_by_robot, draw_limits),
     (_has("seat_gap", "manifold_force", "damping"), draw_use_case),
     (_has("seat_gap"), draw_mounting),
     (_has("xi"), draw_transversal),

@@ -165,3 +165,35 @@ def draw_energy(log: RunLog) -> Drawing:
         "the work of the hand never falls below what was stored at the start."
     )
     return Drawing("energy", "Energy of the fixtures", caption, canvas)
+
+
+def held_by_robot(log: RunLog) -> bool:
+    """Whether what the robot itself can do held the tool."""
+    return "limit_force" in log and bool(np.any(log["limit_force"].values > 0.0))
+
+
+def draw_limits(log: RunLog) -> Drawing:
+    """Which joint, at its speed or its end, or which singular posture held the tool, and how."""
+    canvas, (force, speed) = make_panels(2)
+    forces = log["limit_force"]
+    shown = np.flatnonzero(np.any(forces.values > 0.0, axis=0))
+    for k, column in enumerate(shown):
+        colour = COLOURS[k % len(COLOURS)]
+        label = _limit_label(forces.labels[column])
+        force.plot(log.time, forces.values[:, column], color=colour, label=label)
+    force.set(title="Forces by which the robot's own limits hold the hand", ylabel="force in N")
+    command = np.linalg.norm(log["velocity_command"].values, axis=1)
+    speed.plot(log.time, command, color=COLOURS[0])
+    speed.set(title="Speed that is asked of the tool", ylabel="speed in m/s")
+    place_legend(force)
+    caption = (
+        "Where joints are at their speeds or ends, or the arm is nearly singular, the hand feels a "
+        "wall as that of a region."
+    )
+    return Drawing("limits", "Limits of the robot", caption, canvas)
+
+
+def _limit_label(kind: str) -> str:
+    """Return ``speed_3`` as ``axis 3, speed``."""
+    name, _, axis = kind.partition("_")
+    return f"axis {axis}, {name}" if axis else "singular posture"

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from diagrams.station import Station
+from experiments.live.holding import POSTURES, holding_limit, joint_text, posture_text
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -26,6 +27,7 @@ class LiveStatus:
         time: Simulated time [s].
         factor: Simulated over real time.
         mode: Which mode the law is in, if it has several.
+        limit: Which limit of the robot itself holds the hand, if one does.
         deviation: Transversal coordinates, by name [m]; in space the distance from the nearest
             region, if one is near.
         progress: Tangential coordinates, by name [m].
@@ -48,6 +50,7 @@ class LiveStatus:
     time: float = 0.0
     factor: float = 1.0
     mode: str | None = None
+    limit: str | None = None
     deviation: dict[str, float] = field(default_factory=dict)
     progress: dict[str, float] = field(default_factory=dict)
     angles: dict[str, float] = field(default_factory=dict)
@@ -99,6 +102,7 @@ class LiveStatus:
             self.tank = float(signals["tank"][0])
         if "guidance" in signals:
             self._observe_guidance(signals["guidance"])
+            self._observe_limit(station, signals)
         self.ready = "tared" not in signals or bool(signals["tared"][0] > 0.5)
         if "mode" in signals:
             self.mode = station.mode_name(int(signals["mode"][0]))
@@ -111,9 +115,23 @@ class LiveStatus:
         self.measured = self.measured | dict(forces)
         self.damping = self.damping | dict.fromkeys(axes, float(row[_RECORD["damping"]][0]))
         near = row[_RECORD["near"]].reshape(-1, len(SLOT))
-        distances = near[near[:, SLOT.index("index")] >= 0.0, SLOT.index("h")]
+        index = near[:, SLOT.index("index")]
+        # behind the regions are limits of the robot
+        is_region = (index >= 0.0) & (index < GuidanceRecord.regions_in(row.size))
+        distances = near[is_region, SLOT.index("h")]
         if distances.size:
             self.deviation = {"nearest region": float(distances.min())}
+
+    def _observe_limit(self, station: Station, signals: dict[str, np.ndarray]) -> None:
+        """Take over what of the robot itself holds the hand."""
+        n = station.robot.dimension
+        kind = holding_limit(signals["guidance"], n)
+        if kind is None:
+            self.limit = None
+        elif kind != "singular":
+            self.limit = joint_text(kind)
+        elif self.limit not in POSTURES:  # its name takes a while to find
+            self.limit = posture_text(station, signals["joint_state"][:n])
 
 
 def _plain(value: object) -> object:

@@ -6,8 +6,9 @@ from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.labels import Mode
-from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
+from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 
 # of the record: log name, unit, labels
 _SINGLE = {
@@ -46,13 +47,37 @@ def add_guidance(
     for name, (signal, unit, labels) in _SINGLE.items():
         log.add(signal, rows[name], unit, labels)
     names = [fixture.name for fixture in task.fixtures]
-    slots = [f"{key}_{slot}" for slot in range(MOST_NEAR) for key in SLOT]
+    slots = [f"{key}_{slot}" for slot in range(SLOTS) for key in SLOT]
     log.add("near_regions", rows["near"], _SLOT_UNITS, slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), "1", names)
     distances = task.distances(y_t, region_times(log, station))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, "m", names)
+    kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)
+    log.add("limit_force", forces, "N", kinds)
+
+
+def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str], FloatArray]:
+    """Return by what forces the limits of the robot itself held the tool.
+
+    Args:
+        near: Slots as recorded, shape (samples, slots x 10).
+        regions: Number of regions, behind which the limits are numbered.
+        joints: N.
+
+    Returns:
+        Kinds of limits as in :func:`limit_kinds`, each once, and their forces [N], shape
+        (samples, kinds).
+    """
+    all_kinds = limit_kinds(joints)
+    kinds = list(dict.fromkeys(all_kinds))
+    slots = near.reshape(len(near), -1, len(SLOT))
+    index, phi = slots[..., SLOT.index("index")] - regions, slots[..., SLOT.index("phi")]
+    forces = np.zeros((len(near), len(kinds)))
+    for number, kind in enumerate(all_kinds):
+        forces[:, kinds.index(kind)] += np.sum(np.where(index == number, phi, 0.0), axis=1)
+    return kinds, forces
 
 
 def region_times(log: RunLog, station: Station) -> FloatArray:

@@ -18,7 +18,9 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.fixtures.guidance import GuidanceStep
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.lead import Lead
+from pfsc_drake.control.fixtures.program import NearRegion
 from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.fixtures.vectors import Vector
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 from pfsc_drake.systems.optional_input import value_or_none
@@ -44,6 +46,7 @@ class Guidance(Protocol):
         force: Vector,
         active: Sequence[float] | None = None,
         damping: float | None = None,
+        limits: Sequence[NearRegion] = (),
     ) -> GuidanceStep:
         """Return what to do at a tick."""
 
@@ -103,6 +106,7 @@ class FixtureGuidance(LeafSystem):
         num_outputs: m.
         layout: Of the record.
         period: Sampling time [s].
+        limits: What the robot can do; if omitted, nothing limits what is asked of it.
     """
 
     def __init__(
@@ -113,8 +117,10 @@ class FixtureGuidance(LeafSystem):
         num_outputs: int,
         layout: GuidanceRecord,
         period: float,
+        limits: RobotLimits | None = None,
     ) -> None:
         super().__init__()
+        self._limits = limits
         self._guidance, self._order, self.layout = guidance, order, layout
         self._num_outputs, self._n = num_outputs, robot.dimension
         kept = self.abstract_state_ticket(self.DeclareAbstractState(Value(_Kept())))
@@ -189,8 +195,15 @@ class FixtureGuidance(LeafSystem):
             force if ready else _STILL,
             self._switches(context),
             damping,
+            self._of_robot(),
         )
         output.set_value((step, motion))
+
+    def _of_robot(self) -> Sequence[NearRegion]:
+        """Return what the robot can do, in the state that was looked at last."""
+        if self._limits is None:
+            return ()
+        return self._limits.rows(self._q, self._v, self.layout.num_regions)
 
     def _calc_reference(self, context: Context, output: BasicVector) -> None:
         step, motion = self._step.Eval(context)

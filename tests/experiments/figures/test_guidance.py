@@ -8,11 +8,13 @@ from experiments.figures.guidance import (
     draw_contact,
     draw_energy,
     draw_guidance,
+    draw_limits,
     gives_energy,
     has_contact,
+    held_by_robot,
 )
 from experiments.results.run_log import RunLog
-from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
 
 TIME = np.linspace(0.0, 2.0, 2001)
@@ -31,7 +33,7 @@ def fixture_log():
     near = np.where(ON, 1e-5, 0.01)
     log.add("region_distance", np.column_stack([near, np.full(count, 0.5)]), "m", ["well", "far"])
     log.add("region_labels", np.column_stack([ON, 0 * ON]).astype(int), "1", ["well", "far"])
-    slots = np.zeros((count, MOST_NEAR, len(SLOT)))
+    slots = np.zeros((count, SLOTS, len(SLOT)))
     slots[..., 0] = -1.0
     slots[:, 2, 0] = 0.0  # the well stands in any slot
     slots[:, 2, 2:5] = -np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
@@ -89,3 +91,17 @@ def test_a_tool_in_space_has_no_progress_along_anything(log):
     assert {"guidance", "contact"} <= set(names)
     log["region_labels"].values[:] = 0
     assert not has_contact(log)
+
+
+def test_limits_of_the_robot_that_held_are_drawn(log):
+    assert not held_by_robot(log)
+    forces = np.zeros((len(TIME), 3))
+    log.add("limit_force", forces, "N", ["speed_3", "end_5", "singular"])
+    assert not held_by_robot(log)
+    forces[100:, 1], forces[200:, 2] = 4.0, 9.0
+    log.add("limit_force", forces, "N", ["speed_3", "end_5", "singular"])
+    assert held_by_robot(log)
+    panel = draw_limits(log).canvas.axes[0]
+    shown = {line.get_label(): line.get_ydata() for line in panel.lines}
+    assert list(shown) == ["axis 5, end", "singular posture"]
+    np.testing.assert_array_equal(shown["axis 5, end"], forces[:, 1])

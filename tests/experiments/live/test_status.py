@@ -7,10 +7,11 @@ import numpy as np
 
 from diagrams.station import Station
 from experiments.live.status import LiveStatus
-from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
+from tests.control.conftest import Robot
 
 COORDINATES = PathManifold(2, oriented=False).coordinates
 STATION = SimpleNamespace(
@@ -53,7 +54,7 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
     row = np.zeros(record.size)
     row[record.fields["force"]] = 4.0, 5.0, 6.0
     row[record.fields["damping"]] = 90.0
-    slots = np.zeros((MOST_NEAR, len(SLOT)))
+    slots = np.zeros((SLOTS, len(SLOT)))
     slots[:, 0] = -1.0
     slots[:2, :2] = [[1.0, 0.02], [0.0, -1e-4]]
     row[record.fields["near"]] = slots.ravel()
@@ -63,7 +64,7 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
         linearization=SimpleNamespace(manifold=manifold),
         layout=SimpleNamespace(manifold_state=slice(0, 3)),
     )
-    station = SimpleNamespace(law=law)
+    station = SimpleNamespace(law=law, robot=SimpleNamespace(dimension=6))
     signals = {"law": np.zeros(3), "wrench_ext": np.zeros(6), "guidance": row}
     status = LiveStatus("mine")
     status.observe(station, signals)
@@ -74,6 +75,47 @@ def test_in_space_it_tells_the_nearest_region_and_what_leads():
     row[record.fields["near"]] = slots.ravel()
     status.observe(station, signals)
     assert status.deviation == {}
+
+
+def chain_at_its_end():
+    """A station of a Comau whose elbow is nearly stretched."""
+    chain = Robot("comau_racer_1_4").chain
+    axes = SpaceManifold(1).coordinates
+    law = SimpleNamespace(
+        linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=axes)),
+        layout=SimpleNamespace(manifold_state=slice(0, 3)),
+    )
+    place = SimpleNamespace(is_oriented=True, tool_axis=None)
+    part = SimpleNamespace(belief=SimpleNamespace(robot=chain))
+    task = SimpleNamespace(place=place)
+    station = SimpleNamespace(law=law, robot=chain, part=part, task=task)
+    q = np.deg2rad([2.0, 60.0, 74.0, 5.0, 60.0, 3.0])
+    return station, {"law": np.zeros(3), "wrench_ext": np.zeros(6), "joint_state": np.tile(q, 4)}
+
+
+def test_it_names_what_of_the_robot_holds_the_hand():
+    """The limit that holds most; it is no region that is near."""
+    station, signals = chain_at_its_end()
+    record, status = GuidanceRecord(2), LiveStatus("mine")
+    index, phi = SLOT.index("index"), SLOT.index("phi")
+    for (first, force), (second, other), expected in [
+        ((2 + 4 * 2, 5.0), (2 + 4 * 4 + 3, 1.0), "axis 3 at its speed"),
+        ((2 + 4 * 2, 5.0), (2 + 4 * 4 + 3, 9.0), "axis 5 near its end"),
+        ((2 + 4 * 2, 0.0), (2 + 4 * 6, 3.0), "elbow nearly stretched or folded"),
+        ((2 + 4 * 2, 0.0), (1, 9.0), None),
+    ]:
+        slots = np.zeros((SLOTS, len(SLOT)))
+        slots[:, index] = -1.0
+        slots[0, index], slots[0, phi] = 0.0, 20.0
+        slots[0, SLOT.index("h")] = 1e-3
+        slots[1, index], slots[1, phi] = first, force
+        slots[2, index], slots[2, phi] = second, other
+        slots[2, SLOT.index("h")] = 2e-3 if second < 2 else 0.0
+        row = np.zeros(record.size)
+        row[record.fields["near"]] = slots.ravel()
+        status.observe(station, signals | {"guidance": row})
+        assert status.limit == expected
+        assert status.deviation == {"nearest region": 1e-3}
 
 
 def test_without_modes_there_is_none_and_unknown_ones_are_numbers():

@@ -12,7 +12,7 @@ from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
-from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.geometry.regions.shapes import SphereRegion
 from tests.control.fixtures.point_robot import (
@@ -34,7 +34,7 @@ REGIONS = [FLOOR, half_space((0, 0, 0.06), (0, 0, -1)), ball((0.0, 0.0, 0.03), 0
 
 
 def column(log, key):
-    return np.arange(MOST_NEAR) * len(SLOT) + SLOT.index(key)
+    return np.arange(SLOTS) * len(SLOT) + SLOT.index(key)
 
 
 def happened(damping=None):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from experiments.results.guidance_metrics import deepest_violation, guidance_metrics
+from experiments.results.guidance_signals import limit_forces
 from experiments.results.run_log import RunLog
-from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT
 
 NAN = np.nan
@@ -39,7 +40,7 @@ def test_a_soft_region_that_yields_is_not_violated():
     log = RunLog(1e-3 * np.arange(ticks))
     soft, core = [2e-3, -3e-3, -8e-3, -8.5e-3], [12e-3, 7e-3, 2e-3, -0.3e-3]
     log.add("region_distance", np.array([soft, core]).T, "m")
-    slots = np.zeros((ticks, MOST_NEAR, len(SLOT)))
+    slots = np.zeros((ticks, SLOTS, len(SLOT)))
     slots[..., SLOT.index("index")] = -1.0
     slots[1:, 0, SLOT.index("index")] = 0.0
     slots[1:, 0, SLOT.index("stiffness")] = 3e3
@@ -52,3 +53,17 @@ def test_a_soft_region_that_yields_is_not_violated():
     metrics = guidance_metrics(log)
     assert metrics["deepest_violation"].value == pytest.approx(0.3e-3)
     assert metrics["deepest_in_soft"].value == pytest.approx(8.5e-3)
+
+
+def test_forces_of_the_robots_own_limits_stand_behind_the_regions():
+    """Of two regions and three joints: joint 2 at its speed, its lower end, a singular posture."""
+    slots = np.zeros((2, SLOTS, len(SLOT)))
+    index, phi = SLOT.index("index"), SLOT.index("phi")
+    slots[..., index] = -1.0
+    held = [(1, 50.0), (2 + 4, 1.0), (2 + 5, 2.0), (2 + 7, 4.0), (2 + 12, 8.0), (2 + 13, 16.0)]
+    for slot, (number, force) in enumerate(held):
+        slots[1, slot, index], slots[1, slot, phi] = number, force
+    kinds, forces = limit_forces(slots.reshape(2, -1), 2, 3)
+    assert kinds == ["speed_1", "end_1", "speed_2", "end_2", "speed_3", "end_3", "singular"]
+    assert not forces[0].any()
+    np.testing.assert_array_equal(forces[1], [0, 0, 3.0, 4.0, 0, 0, 24.0])
