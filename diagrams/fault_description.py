@@ -190,9 +190,13 @@ def _outside(scene: FaultScene) -> str:
 def _singular(scene: FaultScene) -> str:
     n, state = scene.robot.dimension, scene.now.measured_state
     q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
-    place = scene.place
+    place, tool = scene.place, scene.place.tool
     posture = singular_posture(
-        scene.robot, q, oriented=place.is_oriented, tool_axis=place.tool_axis
+        scene.robot,
+        q,
+        oriented=place.is_oriented,
+        tool_axis=tool.tool_axis,
+        yaw_axis=tool.yaw_axis,
     )
     A = _decoupling_matrix(scene)
     distance = float(np.linalg.norm(_beside(scene)))

@@ -25,13 +25,13 @@ from diagrams.robots.plant_wiring import (
     connect_torques,
     joint_state_of,
 )
-from diagrams.robots.start_posture import posture_near, posture_warnings
+from diagrams.robots.start_posture import posture_warnings, start_posture, tilt_warnings
 from diagrams.scenario import Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -92,8 +92,7 @@ class Arm(RobotPart):
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """See :class:`RobotPart`."""
         self.check_reach(target.y_t, "start")
-        near = posture_near(start.posture_deg, self.robot)
-        return solve_pose(self.robot, target, near, "start")
+        return start_posture(start.posture_deg, self.robot, target)
 
     def check_reach(self, position: np.ndarray, where: str) -> None:
         """See :class:`RobotPart`; what is out of reach for other reasons has to be tried."""
@@ -110,7 +109,8 @@ class Arm(RobotPart):
         self, start: StartParameters, q_J: np.ndarray, target: ToolTarget
     ) -> list[str]:
         """See :class:`RobotPart`."""
-        return self.true.warnings + posture_warnings(start.posture_deg, self.robot, q_J, target)
+        found = posture_warnings(start.posture_deg, self.robot, q_J, target)
+        return self.true.warnings + found + tilt_warnings(self.robot, q_J, target)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""

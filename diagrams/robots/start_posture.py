@@ -5,11 +5,73 @@ import numpy as np
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import UNLIMITED, ToolTarget, solve_pose
+from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 
 # from where on a posture that was found is another one than the posture given
 _FAR_DEG = 60.0
 _FAR_SLIDE = 0.3  # m
+# of a tool against its orientation, where it is no task
+_LARGEST_TILT_DEG, _SMALL_TILT_DEG = 90.0, 1.0
+
+
+def start_posture(posture_deg: list[float], chain: SerialChain, target: ToolTarget) -> np.ndarray:
+    """Return the posture in which the tool starts, shape (N,) [rad or m].
+
+    Args:
+        posture_deg: From where it is looked for, as the scenario gives it; empty for none.
+        chain: The robot.
+        target: Where the tool starts.
+
+    Raises:
+        InputError: If it is out of reach, or the tool's tilt, where it is no task, is far from
+            what the task's orientation asks.
+    """
+    near = posture_near(posture_deg, chain)
+    if target.yaw_axis is None:
+        return solve_pose(chain, target, near, "start")
+    try:
+        q_J = solve_pose(chain, target, near, "start")
+    except InputError:
+        _require_upright(chain, near, target)
+        raise
+    _require_upright(chain, q_J, target)
+    return q_J
+
+
+def _tilt(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> float:
+    """Return by how much the tool is tilted against the target [rad], where that is no task."""
+    return target.tilt(np.array(pose_function(chain)(q_J)).ravel()[3:].reshape(3, 3))
+
+
+def _require_upright(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> None:
+    tilt = np.rad2deg(_tilt(chain, q_J, target))
+    if tilt > _LARGEST_TILT_DEG:
+        raise InputError(
+            f"start: the tool is tilted by {tilt:.3g} deg against the orientation of the task, and "
+            f"task: yaw leaves the tilt as it is; at most {_LARGEST_TILT_DEG:g} deg are allowed: "
+            "give the orientation the tool's tilt (a tool that points down: angles_deg "
+            "[yaw, 0, 180], convention zyx)"
+        )
+
+
+def tilt_warnings(chain: SerialChain, q_J: np.ndarray, target: ToolTarget) -> list[str]:
+    """Return what is said of a tilt that the task asks and the tool does not have.
+
+    Args:
+        chain: The robot.
+        q_J: Start posture, shape (N,) [rad or m].
+        target: Where the tool starts.
+    """
+    if target.yaw_axis is None:
+        return []
+    tilt = np.rad2deg(_tilt(chain, q_J, target))
+    if tilt <= _SMALL_TILT_DEG:
+        return []
+    return [
+        f"the tool is tilted by {tilt:.3g} deg against the orientation of the task; task: yaw "
+        "leaves the tilt as it is"
+    ]
 
 
 def posture_warnings(

@@ -4,8 +4,6 @@ import dataclasses as dc
 import math
 from typing import Union
 
-import numpy as np
-
 from diagrams.scenario.checks import (
     LARGEST_ANGLE,
     require,
@@ -15,12 +13,11 @@ from diagrams.scenario.checks import (
     require_place,
 )
 from diagrams.scenario.surface import SurfaceShape
-from pfsc_drake.geometry.rotation import rotation_to_axis
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.yaml.files import FILE
 
 _SHORTEST_TOLERANCE = 1e-7  # m
-TASKS = ("full", "tool_axis", "none")
+TASKS = ("full", "tool_axis", "yaw", "none")
 
 
 @dc.dataclass
@@ -203,24 +200,24 @@ class OrientationParameters:
         keyframes: Orientations to interpolate; one alone is kept everywhere; on a
             closed path the first is repeated at the end.
         task: What of it the tool follows: ``full``, all that the path has; ``tool_axis``, the
-            direction of an axis of the tool, about which it may turn as it likes; ``none``.
+            direction of an axis of the tool, about which it may turn as it likes; ``yaw``, the
+            turn about an axis in the world, the tool's tilt being as it is (four outputs, as an
+            SCARA has); ``none``.
         tool_axis: The axis, in the tool frame, of any length.
+        yaw_axis: The axis of ``yaw``, in the world, of any length; by default the vertical.
     """
 
     convention: str = "zyx"
     keyframes: list[Keyframe] = dc.field(default_factory=list)
     task: str = "full"
     tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
-
-    @property
-    def axis(self) -> np.ndarray | None:
-        """The axis that alone matters, of length one, shape (3,), or None."""
-        return rotation_to_axis(self.tool_axis)[:, 0] if self.task == "tool_axis" else None
+    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def __post_init__(self) -> None:
         require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
         require(self.task in TASKS, "task", self.task, ", ".join(TASKS))
         require_direction("tool_axis", self.tool_axis)
+        require_direction("yaw_axis", self.yaw_axis)
         for i, keyframe in enumerate(self.keyframes):
             key, angles = f"keyframes[{i}].angles_deg", keyframe.angles_deg
             require_numbers(key, angles, 3)

@@ -8,7 +8,7 @@ from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 
 _KINDS = ("none", "given", "normal")
-_TASKS = ("full", "tool_axis")
+_TASKS = ("full", "tool_axis", "yaw")
 _CONVENTIONS = ("zyx", "zyz")
 
 FileShape = Fitted | Revolved | Extruded
@@ -28,8 +28,10 @@ class SurfaceOrientationParameters:
             frame of first tangent, second and normal.
         convention: ``zyx`` (2.7) or ``zyz`` (2.6).
         angles_deg: Euler angles [deg]: of the orientation, or of its turn away from the frame.
-        task: ``full``, or ``tool_axis``, whose turn about itself is free.
+        task: ``full``; ``tool_axis``, whose turn about itself is free; or ``yaw``, the turn about
+            an axis in the world alone.
         tool_axis: Axis in the tool frame, of any length, for ``tool_axis``.
+        yaw_axis: Axis in the world, of any length, for ``yaw``; by default the vertical.
     """
 
     kind: str = "none"
@@ -37,6 +39,7 @@ class SurfaceOrientationParameters:
     angles_deg: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
     task: str = "full"
     tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
 
     def __post_init__(self) -> None:
         for key, values in {"kind": _KINDS, "convention": _CONVENTIONS, "task": _TASKS}.items():
@@ -46,6 +49,7 @@ class SurfaceOrientationParameters:
         allowed = f"3 numbers of at most {LARGEST_ANGLE:g} deg"
         require(good, "angles_deg", self.angles_deg, allowed)
         require_direction("tool_axis", self.tool_axis)
+        require_direction("yaw_axis", self.yaw_axis)
 
 
 @dc.dataclass

@@ -134,7 +134,10 @@ def _soft_joints(
         return []
     q_J = link_state[: robot.dimension]
     turns = any(coordinate.kind is Kind.ROTATIONAL for coordinate in manifold.coordinates)
-    joints = soft_joints(robot, q_J, oriented=turns, tool_axis=manifold.tool_axis)
+    tool = manifold.tool
+    joints = soft_joints(
+        robot, q_J, oriented=turns, tool_axis=tool.tool_axis, yaw_axis=tool.yaw_axis
+    )
     if parameters.law == "rigid":
         softness = bending(joints)
         what = "acts on the motors, and bending joints let the tool leave the path"

@@ -72,9 +72,9 @@ def make_path(
     task = parameters.orientation.task
     if task == "none" and path.orientation is not None:
         path = Path(path.position, waypoints=path.waypoints)
-    if task == "tool_axis" and path.orientation is None:
+    if task in ("tool_axis", "yaw") and path.orientation is None:
         raise InputError(
-            f"path.orientation.task = tool_axis: the path has no orientation; {_GIVE_ORIENTATION}"
+            f"path.orientation.task = {task}: the path has no orientation; {_GIVE_ORIENTATION}"
         )
     path.require_smoothness(smoothness, f"the law '{law}'")
     return path
@@ -96,6 +96,8 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
         num_outputs, outputs = 3, "position only"
     elif task == "tool_axis":
         num_outputs, outputs = 5, "position and direction of the tool's axis"
+    elif task == "yaw":
+        num_outputs, outputs = 4, "position and turn about the vertical"
     else:
         num_outputs, outputs = 6, "position and orientation"
     said = f"path: {num_joints} joints for {num_outputs} outputs ({outputs})"
@@ -103,6 +105,8 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
         ways = ["3 joints follow a path without orientation, 6 one with"]
         if num_joints == 5:
             ways.append("5 the direction of an axis: write path.orientation.task: tool_axis")
+        if num_joints in (4, 5):
+            ways.append("4 a turn about the vertical: write path.orientation.task: yaw")
         if num_joints >= 3:
             ways.append("for a position only write path.orientation.task: none")
         raise InputError("; ".join([said, *ways]))

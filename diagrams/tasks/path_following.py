@@ -13,7 +13,7 @@ from diagrams.scenario.checks import require
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
-from diagrams.tasks.surface import followed_axis, require_joints
+from diagrams.tasks.surface import followed_axes, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
@@ -58,16 +58,16 @@ class PathTask(Task):
         surface = surface_of_path(scenario)
         if surface is None:
             self.path = make_path(scenario.path, law, folder, progress)
-            tool_axis = scenario.path.orientation.axis
+            said: Any = scenario.path.orientation
         else:
             self.path = make_path_on_surface(scenario.path, surface, law, folder, progress)
-            tool_axis = followed_axis(surface.orientation)
+            said = surface.orientation
         self.shape = shape_report(self.path)
         self.warnings = path_warnings(self.path, self.shape)
         self.relative_degree = RELATIVE_DEGREE[law]
         followed: dict[str, Any] = {
             "oriented": self.path.orientation is not None,
-            "tool_axis": tool_axis,
+            **followed_axes(said),
             "turning": self.path.frame.turns,
         }
         self.place = PathManifold(self.relative_degree, **followed)
@@ -156,7 +156,8 @@ class PathTask(Task):
         if self.path.orientation is not None:
             deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
-        target = ToolTarget(y_t, R_e, self.place.tool_axis)
+        tool = self.place.tool
+        target = ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis)
         return StartPoint(target, np.array([projection.theta]))
 
     def point(self, start: StartPoint) -> np.ndarray:

@@ -39,7 +39,7 @@ def surface_of_path(scenario: Scenario) -> SurfaceParameters | None:
     if said.keyframes or said.task != "full":
         raise InputError(
             "path.orientation: given, and a path on a surface takes surface.orientation: "
-            "{kind: none|given|normal, task: full|tool_axis}; leave out path.orientation"
+            "{kind: none|given|normal, task: full|tool_axis|yaw}; leave out path.orientation"
         )
     return scenario.surface
 

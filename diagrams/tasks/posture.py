@@ -165,5 +165,5 @@ def warn_unused(parameters: ControllerParameters, law: FollowingLaw) -> list[str
     m = law.linearization.num_outputs
     return [
         f"{_KEY} is not used: the task's {m} outputs leave none of the {m} joints free; "
-        "path.orientation.task: tool_axis or none would"
+        "path.orientation.task: tool_axis, yaw or none would"
     ]

@@ -11,7 +11,7 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.fixtures import make_fixtures
-from diagrams.tasks.surface import followed_axis, given_quaternion, require_joints
+from diagrams.tasks.surface import followed_axes, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.fixtures.parameters import Admittance
@@ -54,7 +54,7 @@ class SpaceTask(Task):
         self.place = SpaceManifold(
             RELATIVE_DEGREE[scenario.controller.law],
             given_quaternion(said),
-            tool_axis=followed_axis(said),
+            **followed_axes(said),
         )
         self.manifold = self.place
         given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
@@ -104,7 +104,8 @@ class SpaceTask(Task):
             deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
             quaternion = self.place.point(y_t)[self.place.layout.quaternion]
             R_e = quaternion_to_matrix(quaternion) @ deviation
-        return StartPoint(ToolTarget(y_t, R_e, self.place.tool_axis), y_t)
+        tool = self.place.tool
+        return StartPoint(ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis), y_t)
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""

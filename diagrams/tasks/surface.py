@@ -5,7 +5,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from diagrams.scenario import SurfaceParameters
+from diagrams.scenario import OrientationParameters, SurfaceParameters
 from diagrams.scenario.surface import NumberShape, SurfaceOrientationParameters, SurfaceShape
 from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
@@ -126,14 +126,28 @@ def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceM
     said = parameters.orientation
     kind = None if said.kind == "none" else cast(Literal["given", "normal"], said.kind)
     offset = normal_offset(said) if kind == "normal" else None
-    return SurfaceManifold(order, orientation=kind, offset=offset, tool_axis=followed_axis(said))
+    return SurfaceManifold(order, orientation=kind, offset=offset, **followed_axes(said))
 
 
-def followed_axis(orientation: SurfaceOrientationParameters) -> np.ndarray | None:
-    """Return the axis of the tool that alone follows an orientation, shape (3,), or None."""
-    if orientation.kind == "none" or orientation.task != "tool_axis":
-        return None
-    return rotation_to_axis(orientation.tool_axis)[:, 0]
+def followed_axes(
+    orientation: OrientationParameters | SurfaceOrientationParameters,
+) -> dict[str, np.ndarray | None]:
+    """Return the axis of the tool, or that in the world, that alone follows an orientation.
+
+    Args:
+        orientation: What the scenario says.
+
+    Returns:
+        ``tool_axis`` and ``yaw_axis``, each of shape (3,) and length one, or None.
+    """
+    none = isinstance(orientation, SurfaceOrientationParameters) and orientation.kind == "none"
+    task = "none" if none else orientation.task
+    axes = {"tool_axis": orientation.tool_axis, "yaw_axis": orientation.yaw_axis}
+    chosen = {"tool_axis": "tool_axis", "yaw": "yaw_axis"}.get(task)
+    return {
+        name: rotation_to_axis(axis)[:, 0] if name == chosen else None
+        for name, axis in axes.items()
+    }
 
 
 def require_joints(manifold: Manifold, num_joints: int) -> None:
@@ -150,7 +164,7 @@ def require_joints(manifold: Manifold, num_joints: int) -> None:
     if num_joints < len(names):
         raise InputError(
             f"surface: {num_joints} joints for {len(names)} outputs ({', '.join(names)}); "
-            "surface.orientation.task: tool_axis needs 5, kind: none 3"
+            "surface.orientation.task: tool_axis needs 5, yaw 4, kind: none 3"
         )
 
 

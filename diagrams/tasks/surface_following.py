@@ -151,7 +151,8 @@ class SurfaceTask(Task):
             point = self.evaluate(y_t, place)
             deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
             R_d = self.place.orientation(point[None])[0]
-            target = ToolTarget(y_t, R_d @ deviation, self.place.tool_axis)
+            tool = self.place.tool
+            target = ToolTarget(y_t, R_d @ deviation, tool.tool_axis, tool.yaw_axis)
         return StartPoint(target, place)
 
     def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:

@@ -122,15 +122,17 @@ def draw_transversal(log: RunLog) -> Drawing:
 def draw_orientation(log: RunLog) -> Drawing:
     """Orientation errors: components with references and, on a logarithmic scale, their norm."""
     canvas, panels = make_panels(3 if _is_used(log, "phi_p") else 2)
-    of_axis = log["phi"].dim == 2
+    angles = log["phi"].dim
+    of_axis, of_yaw = angles == 2, angles == 1
     labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
-    if of_axis:
-        labels = [r"$\varphi$", r"$\vartheta$"]
+    if angles < 3:
+        labels = [r"$\varphi$", r"$\vartheta$"][:angles]
     error = _draw_with_references(panels[0], log, "phi", r"\phi", labels)
     subject = "Orientation of the tool's axis" if of_axis else "Orientation"
-    name = f"{subject} relative to the path"
-    if error is None:
-        name = "Error of the tool's axis" if of_axis else "Orientation error"
+    fault = "Error of the tool's axis" if of_axis else "Orientation error"
+    if of_yaw:
+        subject, fault = "Turn of the tool", "Error of the tool's turn"
+    name = f"{subject} relative to the path" if error is not None else fault
     panels[0].set(ylabel="angle in mrad", title=name)
     sizes = {r"$\|\phi\|$": log["phi"].values}
     if error is not None:
@@ -147,12 +149,17 @@ def draw_orientation(log: RunLog) -> Drawing:
         if of_axis
         else "ZYX angles of the tool against the orientation that belongs to its place"
     )
+    if of_yaw:
+        caption = (
+            "Angle by which the tool is turned about the yaw axis against the orientation that"
+            " belongs to its place; its tilt is no task"
+        )
     caption += "." if error is None else ", over the reference that yields to torques (broad)."
     return Drawing("orientation", name, caption, canvas)
 
 
 def draw_angles(log: RunLog) -> Drawing:
-    """ZYX angles of the tool over those of the reference orientation, a panel for each."""
+    """Angles of the tool over those of the reference orientation, a panel for each."""
     tool, path = (np.rad2deg(log[name].values) for name in ("angles_e", "angles_d"))
     tool = tool + _whole_turns(path - tool)
     canvas, panels = make_panels(tool.shape[1], height=1.9)
@@ -165,11 +172,12 @@ def draw_angles(log: RunLog) -> Drawing:
     # the tool has another colour in each panel
     for panel in panels:
         place_legend(panel)
+    angles = "Turns about the yaw axis since the start" if tool.shape[1] == 1 else "ZYX angles"
     caption = (
-        "ZYX angles of tool and reference in the world: the reference belongs to a point that"
+        f"{angles} of tool and reference in the world: the reference belongs to a point that"
         " moves with time and runs on, whatever holds the tool."
         if "tracking_error" in log
-        else "ZYX angles of tool and path in the world: the reference belongs to the place of the"
+        else f"{angles} of tool and path in the world: the reference belongs to the place of the"
         " tool on the path and waits where the tool waits."
     )
     return Drawing("angles", "Orientation of tool and reference", caption, canvas)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from diagrams.station import Station
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
-from pfsc_drake.geometry import angle_between, matrix_to_zyx
+from pfsc_drake.geometry import angle_between, matrix_to_zyx, turn_about
 
 
 def add_orientation(
@@ -15,7 +15,8 @@ def add_orientation(
     """Add the ZYX angles of the tool and of the reference that the law compares it with.
 
     And how far that reference is away from the orientation that belongs to the tool's place.
-    Where only an axis of the tool matters, its directions take the place of the angles.
+    Where only an axis of the tool matters, its directions take the place of the angles; where only
+    its turn about an axis in space does, the turn since the reference that the run begins with.
 
     Args:
         log: To add to; nothing without an orientation to follow.
@@ -31,9 +32,14 @@ def add_orientation(
     R_e, R_d = _rotations(station.task.place, pose, point)
     _, R_place = _rotations(station.task.place, pose, place)
     unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
-    axis = station.task.place.tool_axis
+    tool = station.task.place.tool
+    axis, yaw_axis = tool.tool_axis, tool.yaw_axis
+    begin = R_d[int(np.argmin(unknown))]
     for name, R in {"e": R_e, "d": R_d}.items():
-        if axis is None:
+        if yaw_axis is not None:
+            turn = np.unwrap(turn_about(yaw_axis, R, begin))
+            log.add(f"angles_{name}", np.where(unknown, np.nan, turn), "rad", ["the yaw axis"])
+        elif axis is None:
             angles = np.unwrap(matrix_to_zyx(R), axis=0)
             angles[unknown] = np.nan
             log.add(f"angles_{name}", angles, "rad", ["z", "y", "x"])
@@ -41,7 +47,9 @@ def add_orientation(
             directions = np.where(unknown[:, None], np.nan, R @ axis)
             log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])
     lead = np.full(len(place), np.nan)
-    if axis is not None:
+    if yaw_axis is not None:
+        lead[~unknown] = np.abs(turn_about(yaw_axis, R_d, R_place))[~unknown]
+    elif axis is not None:
         lead[~unknown] = angle_between(R_place @ axis, R_d @ axis)[~unknown]
     elif not unknown.all():
         between = np.swapaxes(R_place, 1, 2) @ R_d

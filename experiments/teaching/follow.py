@@ -105,7 +105,8 @@ def _orientation(settings: Scenario) -> dict[str, Any]:
     said = settings.fixtures.orientation
     if said.task == "full":
         return {}
-    return {"orientation": {"task": said.task, "tool_axis": list(said.tool_axis)}}
+    axis = {"tool_axis": "tool_axis", "yaw": "yaw_axis"}[said.task]
+    return {"orientation": {"task": said.task, axis: list(getattr(said, axis))}}
 
 
 def _posture(taught: Taught) -> list[float]:

@@ -164,6 +164,26 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), dot)
 
 
+def turn_about(axis: ArrayLike, rotation: ArrayLike, reference: ArrayLike) -> np.ndarray:
+    """Angle by which rotations are turned about a fixed axis against others.
+
+    Of ``M = R R_0'``, a turn by this angle about the axis follows on one by the shortest way that
+    leaves the axis's angle out (swing and twist).
+
+    Args:
+        axis: The axis, in the frame that the rotations lead to, of any length but zero, [3].
+        rotation: ``R``, [..., 3, 3].
+        reference: ``R_0``, [..., 3, 3].
+
+    Returns:
+        rad, [...], from -pi to pi; of no meaning where the rest of M is half a turn.
+    """
+    _, b, c = rotation_to_axis(axis).T
+    M = np.asarray(rotation, dtype=float) @ np.swapaxes(np.asarray(reference, dtype=float), -1, -2)
+    M_b, M_c = M @ b, M @ c
+    return np.arctan2(M_b @ c - M_c @ b, M_b @ b + M_c @ c)
+
+
 def rotation_to_axis(axis: ArrayLike) -> np.ndarray:
     """Rotation of least angle that turns the x-axis to a direction.
 

@@ -1,5 +1,6 @@
 """Inverse kinematics of any robot, for start poses."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,12 +8,15 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry import rotation_to_axis
 from pfsc_drake.robot.robot_model import RobotModel, pose_function
 
 _TOLERANCE = 1e-9
 _RESTARTS = 30
 # limits of this magnitude are none [rad or m]
 UNLIMITED = 1e6
+# below which a turn about an axis is not defined
+_LEAST_TURN = 1e-9
 _STEPS = 100  # of one attempt; one that succeeds needs about ten
 # weight of the way to the guess, m or 1 per rad or m, beside errors of the pose
 _PULL = 1e-3
@@ -26,22 +30,66 @@ class ToolTarget:
         y_t: Tool point in the world [m], shape (3,).
         R_e: Orientation of the tool, shape (3, 3), or None if any will do.
         tool_axis: Axis in the tool frame, of length one, shape (3,), that alone is to have the
-            direction that R_e gives it; None if all of R_e matters.
+            direction that R_e gives it; None if more of R_e matters.
+        yaw_axis: Axis in the world, of length one, shape (3,), about which alone the tool is to
+            be turned as R_e is; None if more of R_e matters.
     """
 
     y_t: np.ndarray
     R_e: np.ndarray | None = None
     tool_axis: np.ndarray | None = None
+    yaw_axis: np.ndarray | None = None
 
     @property
     def num_outputs(self) -> int:
-        """Number of coordinates that the tool is to have: 3, 5 or 6."""
+        """Number of coordinates that the tool is to have: 3, 4, 5 or 6."""
         if self.R_e is None:
             return 3
+        if self.yaw_axis is not None:
+            return 4
         return 6 if self.tool_axis is None else 5
 
+    def error(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a pose lacks of the target, and its slope.
+
+        Args:
+            pose: ``[y_t, R by rows]``, shape (12,).
+
+        Returns:
+            The error, zero where the pose is one of those that are meant, shape (k,), and its
+            derivatives by the pose, shape (k, 12).
+        """
+        R_e = np.zeros((3, 3)) if self.R_e is None else self.R_e
+        wanted = np.concatenate([self.y_t, np.ravel(R_e)])
+        if self.R_e is None or self.yaw_axis is None:
+            rows = self._rows
+            return rows @ (pose - wanted), rows
+        # sine and cosine of the turn, times a positive number, see ``yaw_error``
+        _, b, c = rotation_to_axis(self.yaw_axis).T
+        turn = np.array([np.outer(c, b) - np.outer(b, c), np.outer(b, b) + np.outer(c, c)])
+        rows = (turn @ R_e).reshape(2, 9)
+        turned = rows @ pose[3:]
+        size = max(float(np.linalg.norm(turned)), _LEAST_TURN)
+        turned = turned / size
+        slope = (np.eye(2) - np.outer(turned, turned)) @ rows / size
+        across = np.hstack([np.zeros((2, 3)), slope])
+        error = np.append(pose[:3] - self.y_t, turned - [0.0, 1.0])
+        return error, np.vstack([np.eye(3, 12), across])
+
+    def tilt(self, R: np.ndarray) -> float:
+        """Return how far an orientation is turned away from R_e about all but the yaw axis [rad].
+
+        Args:
+            R: Shape (3, 3).
+        """
+        assert self.R_e is not None and self.yaw_axis is not None
+        _, b, c = rotation_to_axis(self.yaw_axis).T
+        M = R @ self.R_e.T
+        size = math.hypot(c @ M @ b - b @ M @ c, b @ M @ b + c @ M @ c) / 2.0
+        return math.acos(min(max(2.0 * size - 1.0, -1.0), 1.0))
+
     @property
-    def rows(self) -> np.ndarray:
+    def _rows(self) -> np.ndarray:
         """What matters of ``[y_t, R_e by rows]`` as a linear map, shape (.., 12)."""
         if self.R_e is None:
             return np.eye(3, 12)
@@ -67,18 +115,16 @@ def solve_pose(robot: RobotModel, target: ToolTarget, guess: np.ndarray, name: s
     Raises:
         InputError: If the pose is out of reach within the joint limits.
     """
-    pose, rows = pose_function(robot), target.rows
+    pose = pose_function(robot)
     jacobian = pose.factory("jacobian", ["q"], ["jac:pose:q"])
-    R_e = np.zeros((3, 3)) if target.R_e is None else target.R_e
-    wanted = rows @ np.concatenate([target.y_t, np.ravel(R_e)])
     limits = robot.gather("position_limits")
     lower, upper = np.where(np.abs(limits) < UNLIMITED, limits, np.copysign(np.inf, limits)).T
 
     def residual(q: np.ndarray) -> np.ndarray:
-        return rows @ np.array(pose(q)).ravel() - wanted
+        return target.error(np.array(pose(q)).ravel())[0]
 
     def slope(q: np.ndarray) -> np.ndarray:
-        return rows @ np.array(jacobian(q))
+        return target.error(np.array(pose(q)).ravel())[1] @ np.array(jacobian(q))
 
     random = np.random.default_rng(0)
     spread = np.minimum(upper - lower, 2.0 * np.pi)

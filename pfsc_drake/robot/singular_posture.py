@@ -70,7 +70,12 @@ def tool_jacobian(robot: RobotModel, q: ca.SX) -> ca.SX:
 
 
 def task_jacobian(
-    robot: RobotModel, q: ca.SX, *, oriented: bool, tool_axis: np.ndarray | None = None
+    robot: RobotModel,
+    q: ca.SX,
+    *,
+    oriented: bool,
+    tool_axis: np.ndarray | None = None,
+    yaw_axis: np.ndarray | None = None,
 ) -> ca.SX:
     """Return the rows of the tool's Jacobian that matter.
 
@@ -79,14 +84,18 @@ def task_jacobian(
         q: Joint coordinates, shape (N, 1).
         oriented: Whether the tool's orientation matters.
         tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
+        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
 
     Returns:
         Shape (6, N), (3, N) without orientation, or with an axis (5, N): the angular velocity
-        then is that about two directions across the axis, which turn with the tool.
+        then is that about two directions across the axis, which turn with the tool; with an axis
+        in the world (4, N): that about it.
     """
     J = tool_jacobian(robot, q)
     if not oriented:
         return J[:3, :]
+    if yaw_axis is not None:
+        return ca.densify(ca.vertcat(J[:3, :], ca.DM(yaw_axis).T @ J[3:, :]))
     if tool_axis is None:
         return J
     still = [jets.constant(q[i], 1) for i in range(robot.dimension)]
@@ -96,7 +105,12 @@ def task_jacobian(
 
 
 def singular_posture(
-    robot: RobotModel, q: np.ndarray, *, oriented: bool, tool_axis: np.ndarray | None = None
+    robot: RobotModel,
+    q: np.ndarray,
+    *,
+    oriented: bool,
+    tool_axis: np.ndarray | None = None,
+    yaw_axis: np.ndarray | None = None,
 ) -> SingularPosture:
     """Return how close a posture is to a singular one, and through which joints.
 
@@ -109,9 +123,12 @@ def singular_posture(
         q: Joint coordinates, shape (N,).
         oriented: Whether the tool's orientation matters.
         tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
+        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
     """
     symbol = ca.SX.sym("q", robot.dimension)
-    expression = task_jacobian(robot, symbol, oriented=oriented, tool_axis=tool_axis)
+    expression = task_jacobian(
+        robot, symbol, oriented=oriented, tool_axis=tool_axis, yaw_axis=yaw_axis
+    )
     rows = expression.shape[0]
     J = np.array(ca.Function("J", [symbol], [expression])(q))
     length = float(np.max(np.linalg.norm(J[:3], axis=0)))

@@ -24,7 +24,9 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
     zyx_to_quaternion,
 )
+from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.files import resolve_model
+from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 # of joints beyond the number of outputs [1/s]
@@ -41,15 +43,13 @@ class Robot:
     Nothing in here uses the chain's own kinematics and dynamics.
     """
 
-    def __init__(self, model, joint_damping=(), drive_damping=()):
+    def __init__(self, model, joint_damping=(), drive_damping=(), stiffness=()):
         self.plant = MultibodyPlant(0.0)
-        Parser(self.plant).AddModels(str(resolve_model(model)))
-        for i, damping in enumerate(joint_damping):
-            self.plant.GetJointByName(f"flex_{i + 1}").set_default_damping(damping)
-        drive = "motor" if self.plant.HasJointNamed("motor_1") else "joint"
-        for i, damping in enumerate(drive_damping):
-            self.plant.GetJointByName(f"{drive}_{i + 1}").set_default_damping(damping)
-        self.plant.Finalize()
+        if stiffness:
+            elastic = ElasticJoints(np.array(stiffness), np.array(joint_damping))
+            read_model(self.plant, resolve_model(model), ModelOptions(elastic=elastic))
+        else:
+            self._read(model, joint_damping, drive_damping)
         self.tool = self.plant.GetFrameByName("tool_point")
         self.chain, self.coordinates = chain_from_plant(self.plant, self.tool)
         self.n = self.chain.dimension
@@ -57,6 +57,15 @@ class Robot:
         self._rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         nq = self.plant.num_positions()
         self._link_velocity = self.coordinates.link_rows[self.n :, nq:]
+
+    def _read(self, model, joint_damping, drive_damping):
+        Parser(self.plant).AddModels(str(resolve_model(model)))
+        for i, damping in enumerate(joint_damping):
+            self.plant.GetJointByName(f"flex_{i + 1}").set_default_damping(damping)
+        drive = "motor" if self.plant.HasJointNamed("motor_1") else "joint"
+        for i, damping in enumerate(drive_damping):
+            self.plant.GetJointByName(f"{drive}_{i + 1}").set_default_damping(damping)
+        self.plant.Finalize()
 
     def set_state(self, state):
         """Set ``[q_J, v_J, q_M, v_M]``; the last two are ignored by a rigid robot."""
@@ -114,8 +123,8 @@ class Robot:
 @pytest.fixture(scope="session")
 def load_robot():
     @cache
-    def load(model, joint_damping=(), drive_damping=()):
-        return Robot(model, joint_damping, drive_damping)
+    def load(model, joint_damping=(), drive_damping=(), stiffness=()):
+        return Robot(model, joint_damping, drive_damping, stiffness)
 
     return load
 

@@ -34,7 +34,12 @@ class SoftJoints:
 
 
 def soft_joints(
-    robot: RobotModel, q_J: np.ndarray, *, oriented: bool, tool_axis: np.ndarray | None = None
+    robot: RobotModel,
+    q_J: np.ndarray,
+    *,
+    oriented: bool,
+    tool_axis: np.ndarray | None = None,
+    yaw_axis: np.ndarray | None = None,
 ) -> SoftJoints:
     """Return the elastic joints of a robot near a posture.
 
@@ -43,9 +48,10 @@ def soft_joints(
         q_J: Joint coordinates, shape (N,).
         oriented: Whether the tool's orientation matters.
         tool_axis: Axis in the tool frame about which it may turn, shape (3,), or None.
+        yaw_axis: Axis in the world about which alone its turn matters, shape (3,), or None.
     """
     q = ca.SX.sym("q", robot.dimension)
-    J_q = task_jacobian(robot, q, oriented=oriented, tool_axis=tool_axis)
+    J_q = task_jacobian(robot, q, oriented=oriented, tool_axis=tool_axis, yaw_axis=yaw_axis)
     expressions = [robot.mass_matrix(q), J_q]
     D_E, J = (np.array(x) for x in ca.Function("soft", [q], expressions)(q_J))
     return SoftJoints(D_E, robot.D_M, robot.K_s, J)

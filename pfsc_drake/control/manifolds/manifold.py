@@ -1,42 +1,25 @@
 """What a law needs to know of a manifold: a path, a moving point, and others to come."""
 
-import enum
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.jets import Jet
 
-
-class Kind(enum.Enum):
-    """What a coordinate of a manifold means; the value is its symbol in the dissertation."""
-
-    TANGENTIAL = "eta"
-    TRANSVERSAL = "xi"
-    ROTATIONAL = "phi"
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the coordinate."""
-        return "rad" if self is Kind.ROTATIONAL else "m"
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """One coordinate of the virtual output.
-
-    Attributes:
-        name: Its name.
-        kind: Its kind, which decides gains, compliance and unit.
-        force: Name of the generalized force along it.
-    """
-
-    name: str
-    kind: Kind
-    force: str
+__all__ = [
+    "Coordinate",
+    "Kind",
+    "Manifold",
+    "PlaceLayout",
+    "PlaceManifold",
+    "PointLayout",
+    "indices",
+    "manifold_force_function",
+]
 
 
 class PointLayout(Protocol):
@@ -104,8 +87,8 @@ class Manifold(Protocol):
         """Layout of the manifold's point."""
 
     @property
-    def tool_axis(self) -> np.ndarray | None:
-        """Axis of the tool frame that alone follows the orientation, of length one, shape (3,)."""
+    def tool(self) -> ToolOrientation:
+        """What of the tool's orientation there are coordinates for."""
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
         """Return the coordinates of a moving tool, m scalar jets of the order of ``y``.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.orientation import orientation_error, quaternion_rotation
+from pfsc_drake.control.manifolds.orientation import quaternion_rotation
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, transported, turned
 from pfsc_drake.control.manifolds.path_force import force_components
 from pfsc_drake.jets import Jet
@@ -26,8 +26,8 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
         eta_d: Arc length of the reference point over time [m], scalar jet of order r.
 
     Returns:
-        3, 5 or 6 scalar jets of order r [m, m, m, rad, rad, rad]: along the tangent and the two
-        normals of the reference point, and angles, see :func:`orientation_error`.
+        3 to 6 scalar jets of order r [m, m, m, rad, rad, rad]: along the tangent and the two
+        normals of the reference point, and angles, see :meth:`ToolOrientation.error`.
     """
 
     def rate(theta: Jet) -> Jet:
@@ -46,7 +46,7 @@ def trajectory_errors(y: Jet, R_e: Jet, path: PathGeometry, eta_d: Jet) -> list[
     if not path.quaternion:
         return position
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta_d))
-    return [*position, *orientation_error(R_e, R_d, path.alignment)]
+    return [*position, *path.tool.error(R_e, R_d)]
 
 
 class MovingPoint(PathManifold):

@@ -1,50 +1,11 @@
-"""Orientation of a tool against a reference on jets: three angles, or two of its axis."""
+"""Orientation of a tool against a reference on jets: three angles, two of its axis, or its yaw."""
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import rotation_to_axis
 from pfsc_drake.jets import Jet
-
-_ANGLES = tuple(
-    Coordinate(f"phi_{axis}", Kind.ROTATIONAL, f"tau_{axis}") for axis in ("z", "y", "x")
-)
-
-
-class ToolOrientation:
-    """What of a tool's orientation a manifold has coordinates for.
-
-    Args:
-        oriented: Whether the manifold has an orientation.
-        tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
-            shape (3,); None if the whole tool does.
-        manifold: What to call the manifold in errors.
-
-    Attributes:
-        alignment: Rotation whose first column is the axis, shape (3, 3), or None, see
-            :func:`orientation_error`.
-        coordinates: None, the three ZYX angles of the tool, or the two of its axis.
-
-    Raises:
-        InputError: If the axis has no direction, or no orientation to follow.
-    """
-
-    def __init__(self, oriented: bool, tool_axis: np.ndarray | None, manifold: str) -> None:
-        if tool_axis is not None and not oriented:
-            raise InputError(
-                f"tool axis {list(tool_axis)}: the {manifold} has no orientation to follow"
-            )
-        self.alignment = None if tool_axis is None else rotation_to_axis(tool_axis)
-        angles = _ANGLES if tool_axis is None else _ANGLES[:2]
-        self.coordinates = angles if oriented else ()
-
-    @property
-    def tool_axis(self) -> np.ndarray | None:
-        """The axis that alone follows the orientation, of length one, shape (3,), or None."""
-        return None if self.alignment is None else self.alignment[:, 0]
 
 
 def orientation_error(R_e: Jet, R_d: Jet, alignment: np.ndarray | None = None) -> list[Jet]:
@@ -75,6 +36,27 @@ def orientation_error(R_e: Jet, R_d: Jet, alignment: np.ndarray | None = None) -
         return direction
     z = R_d[:, 2]
     return [*direction, jets.atan2(jets.dot(z, R_e[:, 1]), jets.dot(z, R_e[:, 2]))]
+
+
+def yaw_error(R_e: Jet, R_d: Jet, axis: np.ndarray) -> Jet:
+    """Return the angle by which ``R_e`` is turned about a fixed axis against ``R_d`` [rad].
+
+    With the quaternion ``(w, v)`` of ``M = R_e R_d'`` and the axis ``a`` it is
+    ``2 atan2(a . v, w)``. In right-handed axes ``a, b, c`` it comes from the entries of M:
+    ``c' M b - b' M c = 4 w a . v`` and ``b' M b + c' M c = 2 w^2 - 2 (a . v)^2``. Where the tool is
+    not tilted against its reference it is the angle of M itself, and its rate the relative angular
+    velocity about ``a``; it is defined unless the tilt is half a turn. A factor that scales all
+    entries of ``R_d`` alike cancels.
+
+    Args:
+        R_e: Tool orientation, matrix jet.
+        R_d: Reference orientation, matrix jet, times any positive scalar signal.
+        axis: ``a``, world axes, of length one, shape (3,).
+    """
+    _, b, c = rotation_to_axis(axis).T
+    b_e, c_e, b_d, c_d = R_e.T @ b, R_e.T @ c, R_d.T @ b, R_d.T @ c
+    sine = jets.dot(c_e, b_d) - jets.dot(b_e, c_d)
+    return jets.atan2(sine, jets.dot(b_e, b_d) + jets.dot(c_e, c_d))
 
 
 def quaternion_rotation(q: Jet) -> Jet:

@@ -1,18 +1,14 @@
 """The path manifold on jets: tool motion to tangential, transversal, rotational coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import (
-    ToolOrientation,
-    orientation_error,
-    quaternion_rotation,
-)
+from pfsc_drake.control.manifolds.orientation import quaternion_rotation
 from pfsc_drake.control.manifolds.orientation_force import (
     in_axes_of,
     quaternion_matrix,
@@ -24,6 +20,7 @@ from pfsc_drake.control.manifolds.path_force import (
     translational_force,
     turning_force,
 )
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix
 from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
@@ -46,8 +43,7 @@ class PathGeometry:
         quaternion: Quaternion (w, x, y, z) of the reference orientation, of any
             positive norm, and its derivatives by theta, orders 0..r, each (4, 1);
             empty for arms that have no orientation to follow.
-        alignment: Rotation whose first column is the axis of the tool that alone matters, shape
-            (3, 3), see :func:`orientation_error`; None if all of the orientation does.
+        tool: What of the tool's orientation matters.
         turn: Derivatives 1..r by theta of the angle about the tangent by which ``e_perp`` turns
             against parallel transport [rad], scalars; empty where it does not.
     """
@@ -56,7 +52,7 @@ class PathGeometry:
     normal: ca.SX
     position: Sequence[ca.SX]
     quaternion: Sequence[ca.SX]
-    alignment: np.ndarray | None = None
+    tool: ToolOrientation = field(default_factory=ToolOrientation)
     turn: Sequence[ca.SX] = ()
 
 
@@ -86,7 +82,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     ``xi_i' = e_i . y_t'`` (3.16), (3.17); ``e_perp' = -(e_par' . e_perp) e_par``
     (3.4), primes being time derivatives. A given frame, which turns about the tangent by the angle
     ``psi``, sees them turned by it. ``phi`` are the ZYX Euler angles of
-    ``R_d' R_e``, see (3.43)-(3.47), or the two of the tool's axis; that the reference
+    ``R_d' R_e``, see (3.43)-(3.47), or what else :class:`ToolOrientation` has; that the reference
     orientation moves with the progress on the path sits in their derivatives.
 
     Args:
@@ -95,7 +91,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
         path: The path at the projection of the tool point.
 
     Returns:
-        3, 5 or 6 scalar jets of order r [m, m, m, rad, rad, rad].
+        3 to 6 scalar jets of order r [m, m, m, rad, rad, rad].
     """
     theta = path_parameter(y, path)
     tangent = jets.compose(path.position[1 : y.order + 1], theta)
@@ -114,7 +110,7 @@ def path_coordinates(y: Jet, R_e: Jet, path: PathGeometry) -> list[Jet]:
     if not path.quaternion:
         return [eta, *xi]
     R_d = quaternion_rotation(jets.compose(path.quaternion, theta))
-    return [eta, *xi, *orientation_error(R_e, R_d, path.alignment)]
+    return [eta, *xi, *path.tool.error(R_e, R_d)]
 
 
 def transported(normal: ca.SX, e_par: Jet) -> Jet:
@@ -135,22 +131,24 @@ class PathManifold:
     """A path as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
     Its coordinates are arc length, two transversal ones and, with orientation, the three ZYX
-    angles of the tool or the two of an axis of it, about which the tool may then turn as it likes.
+    angles of the tool, the two of an axis of it, about which the tool may then turn as it likes, or
+    the one of its turn about an axis in space, such as an SCARA has.
 
     Args:
         order: Relative degree r of the law, 1 to 5.
         oriented: Whether the path has an orientation.
         tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
+        yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
+            of any length, shape (3,); None if more does.
         turning: Whether ``e_perp`` is given with the path, such as the normal of a surface that
             the path lies on, rather than transported in parallel.
 
     Attributes:
-        alignment: Rotation whose first column is the axis, shape (3, 3), or None.
-        tool_axis: The axis, of length one, shape (3,), or None.
+        tool: What of the tool's orientation matters.
 
     Raises:
-        InputError: If the order is out of range, or the axis has no direction, or no orientation
+        InputError: If the order is out of range, or an axis has no direction, or no orientation
             to follow.
     """
 
@@ -163,12 +161,14 @@ class PathManifold:
         *,
         oriented: bool,
         tool_axis: np.ndarray | None = None,
+        yaw_axis: np.ndarray | None = None,
         turning: bool = False,
     ) -> None:
-        orientation = ToolOrientation(oriented, tool_axis, self.name)
+        self.tool = ToolOrientation(
+            oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+        )
         self.layout = PathPointLayout(order, oriented, turning)
-        self.alignment, self.tool_axis = orientation.alignment, orientation.tool_axis
-        self.coordinates = (*_TRANSLATIONAL, *orientation.coordinates)
+        self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
 
     @property
     def is_oriented(self) -> bool:
@@ -188,7 +188,7 @@ class PathManifold:
             normal=point[layout.normal],
             position=ca.vertsplit(point[layout.position], 3),
             quaternion=quaternion,
-            alignment=self.alignment,
+            tool=self.tool,
             turn=ca.vertsplit(point[layout.turn]) if layout.turning else (),
         )
 
@@ -206,8 +206,9 @@ class PathManifold:
         with eta, the tool is taken to be where the reference tells. With
         ``with_turning`` :func:`turning_force` is added to the tangential one; the power is then
         ``f . y_t' + mu . omega``, and ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where
-        only an axis of the tool matters, all of this holds for torques across it; what acts about
-        it moves none of the coordinates and has no part in the forces.
+        only an axis of the tool matters, all of this holds for torques across it, where only its
+        turn about an axis in space does, for torques about that one; what else acts moves none of
+        the coordinates and has no part in the forces.
         """
         force, torque, layout = wrench[:3], wrench[3:], self.layout
         translational = translational_force(force, point, layout)
@@ -226,13 +227,14 @@ class PathManifold:
         Args:
             torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
             point: Path point.
-            phi: Angles that the tool is to have [rad], shape (3,), or (2,) of an axis.
+            phi: Angles that the tool is to have [rad], shape (3,), (2,) or (1,).
         """
-        quaternion = point[self.layout.quaternion][:4]
-        if self.alignment is not None:
-            R_d = quaternion_matrix(quaternion)
-            torque = torque_across_axis(torque, R_d, phi, self.alignment)
-        return torque, rotational_force(in_axes_of(quaternion, torque), phi, self.alignment)
+        if self.tool.yaw_axis is not None:
+            return self.tool.yaw_torque(torque)
+        quaternion, alignment = point[self.layout.quaternion][:4], self.tool.alignment
+        if alignment is not None:
+            torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, alignment)
+        return torque, rotational_force(in_axes_of(quaternion, torque), phi, alignment)
 
     def axes(self, point: np.ndarray) -> np.ndarray:
         """Return ``[e_par, e_perp, e_cross]`` as columns, shape (3, 3)."""

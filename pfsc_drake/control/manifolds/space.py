@@ -8,17 +8,14 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import (
-    ToolOrientation,
-    orientation_error,
-    quaternion_rotation,
-)
+from pfsc_drake.control.manifolds.orientation import quaternion_rotation
 from pfsc_drake.control.manifolds.orientation_force import (
     in_axes_of,
     quaternion_matrix,
     rotational_force,
     torque_across_axis,
 )
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.jets import Jet
@@ -79,21 +76,22 @@ class SpaceManifold:
     """All of space as a :class:`~pfsc_drake.control.manifolds.manifold.Manifold`.
 
     Its coordinates are those of the tool point along the world's axes, all of them tangential, and,
-    with orientation, the ZYX angles of ``R_d' R_e`` against one ``R_d``, or the two of an axis of
-    the tool.
+    with orientation, the ZYX angles of ``R_d' R_e`` against one ``R_d``, the two of an axis of
+    the tool, or the one of its turn about an axis in space.
 
     Args:
         order: Relative degree r of the law.
         quaternion: Of ``R_d`` (w, x, y, z), shape (4,); None for no orientation.
         tool_axis: The axis that alone keeps the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
+        yaw_axis: The axis about which alone the tool's turn keeps the orientation, world axes,
+            of any length, shape (3,); None if more does.
 
     Attributes:
-        alignment: Rotation whose first column is the axis, shape (3, 3), or None.
-        tool_axis: The axis, of length one, shape (3,), or None.
+        tool: What of the tool's orientation matters.
 
     Raises:
-        InputError: If the axis has no direction, or no orientation to follow.
+        InputError: If an axis has no direction, or no orientation to follow.
     """
 
     name = "space"
@@ -105,15 +103,17 @@ class SpaceManifold:
         quaternion: np.ndarray | None = None,
         *,
         tool_axis: np.ndarray | None = None,
+        yaw_axis: np.ndarray | None = None,
     ) -> None:
         self.layout = SpacePointLayout(order, quaternion is not None)
         self._point = np.zeros(self.layout.size)
         self._point[self.layout.status] = ProjectionStatus.OK
         if quaternion is not None:
             self._point[self.layout.quaternion] = quaternion
-        tool = ToolOrientation(self.is_oriented, tool_axis, self.name)
-        self.alignment, self.tool_axis = tool.alignment, tool.tool_axis
-        self.coordinates = (*_TRANSLATIONAL, *tool.coordinates)
+        self.tool = ToolOrientation(
+            self.is_oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+        )
+        self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
 
     @property
     def is_oriented(self) -> bool:
@@ -136,7 +136,7 @@ class SpaceManifold:
         if not self.is_oriented:
             return position
         R_d = quaternion_rotation(jets.constant(point[self.layout.quaternion], y.order))
-        return [*position, *orientation_error(R_e, R_d, self.alignment)]
+        return [*position, *self.tool.error(R_e, R_d)]
 
     def force(
         self, wrench: ca.SX, point: ca.SX, reference: ca.SX, *, with_turning: bool = False
@@ -145,10 +145,13 @@ class SpaceManifold:
         force, torque = wrench[:3], wrench[3:]
         if not self.is_oriented:
             return force
+        if self.tool.yaw_axis is not None:
+            return ca.vertcat(force, self.tool.yaw_torque(torque)[1])
         phi, quaternion = reference[3:], point[self.layout.quaternion]
-        if self.alignment is not None:
-            torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, self.alignment)
-        turned = rotational_force(in_axes_of(quaternion, torque), phi, self.alignment)
+        alignment = self.tool.alignment
+        if alignment is not None:
+            torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, alignment)
+        turned = rotational_force(in_axes_of(quaternion, torque), phi, alignment)
         return ca.vertcat(force, turned)
 
     def axes(self, point: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The surface manifold on jets: tool motion to tangential, transversal, rotational coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import casadi as ca
@@ -9,11 +9,7 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import (
-    ToolOrientation,
-    orientation_error,
-    quaternion_rotation,
-)
+from pfsc_drake.control.manifolds.orientation import quaternion_rotation
 from pfsc_drake.control.manifolds.orientation_force import (
     quaternion_matrix,
     rotational_force,
@@ -25,6 +21,7 @@ from pfsc_drake.control.manifolds.surface_force import (
     tangent_plane,
     translational_force,
 )
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import check_rotation_matrix, quaternion_to_matrix
 from pfsc_drake.geometry.surfaces.frame import surface_axes
@@ -51,15 +48,14 @@ class SurfaceGeometry:
             norm, up to order r, each (4, 1); empty if it has none.
         offset: Rotation of the tool against the surface's frame, shape (3, 3); None if the
             frame's own axes are not the reference orientation.
-        alignment: Rotation whose first column is the axis of the tool that alone matters, shape
-            (3, 3), see :func:`orientation_error`; None if all of the orientation does.
+        tool: What of the tool's orientation matters.
     """
 
     eta: ca.SX
     position: Sequence[ca.SX]
     quaternion: Sequence[ca.SX] = ()
     offset: np.ndarray | None = None
-    alignment: np.ndarray | None = None
+    tool: ToolOrientation = field(default_factory=ToolOrientation)
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ def surface_coordinates(y: Jet, R_e: Jet, surface: SurfaceGeometry) -> list[Jet]
         surface: The surface at the projection of the tool point.
 
     Returns:
-        3, 5 or 6 scalar jets of order r [m, m, m, rad, rad, rad].
+        3 to 6 scalar jets of order r [m, m, m, rad, rad, rad].
     """
     theta, r = surface_parameters(y, surface.position), y.order
     frame = surface_frame(surface.position, r if surface.offset is not None else r - 1, theta)
@@ -167,7 +163,7 @@ def surface_coordinates(y: Jet, R_e: Jet, surface: SurfaceGeometry) -> list[Jet]
         R_d = quaternion_rotation(jets.compose_pair(surface.quaternion, *theta))
     else:
         return [*eta, xi]
-    return [*eta, xi, *orientation_error(R_e, R_d, surface.alignment)]
+    return [*eta, xi, *surface.tool.error(R_e, R_d)]
 
 
 class SurfaceManifold:
@@ -175,7 +171,8 @@ class SurfaceManifold:
 
     Its coordinates are two tangential ones, lengths in orthogonal directions of which the first is
     that of theta_1, the distance along the normal, and, with orientation, the three ZYX angles of
-    the tool or the two of an axis of it, about which the tool may then turn as it likes.
+    the tool, the two of an axis of it, about which the tool may then turn as it likes, or the one
+    of its turn about an axis in space.
 
     Args:
         order: Relative degree r of the law, 1 to 5.
@@ -185,15 +182,16 @@ class SurfaceManifold:
             as lead and tilt, shape (3, 3); the identity by default. Only for ``"normal"``.
         tool_axis: The axis that alone follows the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
+        yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
+            of any length, shape (3,); None if more does.
 
     Attributes:
-        alignment: Rotation whose first column is the axis, shape (3, 3), or None.
-        tool_axis: The axis, of length one, shape (3,), or None.
+        tool: What of the tool's orientation matters.
         offset: The rotation, or None if the orientation is not the frame's.
 
     Raises:
         InputError: If the order is out of range, the orientation is unknown, the offset is no
-            rotation or has no frame, or the axis has no direction, or no orientation to follow.
+            rotation or has no frame, or an axis has no direction, or no orientation to follow.
     """
 
     name = "surface"
@@ -206,6 +204,7 @@ class SurfaceManifold:
         orientation: Literal["given", "normal"] | None = None,
         offset: np.ndarray | None = None,
         tool_axis: np.ndarray | None = None,
+        yaw_axis: np.ndarray | None = None,
     ) -> None:
         if orientation not in (None, "given", "normal"):
             raise InputError(f"orientation '{orientation}': unknown; allowed are given, normal")
@@ -214,9 +213,10 @@ class SurfaceManifold:
                 f"offset: given for the orientation '{orientation}'; only 'normal' has one"
             )
         self.layout = SurfacePointLayout(order, orientation == "given")
-        tool = ToolOrientation(orientation is not None, tool_axis, self.name)
-        self.alignment, self.tool_axis = tool.alignment, tool.tool_axis
-        self.coordinates = (*_TRANSLATIONAL, *tool.coordinates)
+        self.tool = ToolOrientation(
+            orientation is not None, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+        )
+        self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
         self.offset: np.ndarray | None = None
         if orientation == "normal":
             self.offset = check_rotation_matrix(np.eye(3) if offset is None else offset, "offset")
@@ -240,7 +240,7 @@ class SurfaceManifold:
             position=ca.vertsplit(point[layout.position], 3),
             quaternion=ca.vertsplit(point[layout.quaternion], 4) if layout.oriented else (),
             offset=self.offset,
-            alignment=self.alignment,
+            tool=self.tool,
         )
 
     def virtual_output(self, y: Jet, R_e: Jet, point: ca.SX, lead: Sequence[Jet]) -> list[Jet]:
@@ -255,7 +255,8 @@ class SurfaceManifold:
         Their power ``tau . yhat'`` is that of the wrench, the rotation being that relative to the
         surface's orientation; with ``with_turning`` it is all of the wrench's power, and
         ``A' tau = J_g' wrench`` with ``A = d yhat / dq``. Where only an axis of the tool matters,
-        this holds for torques across it. The tool is taken to be at the reference's distance xi
+        this holds for torques across it, where only its turn about an axis in space does, for
+        torques about that one. The tool is taken to be at the reference's distance xi
         from the surface.
         """
         force, torque = wrench[:3], wrench[3:]
@@ -266,16 +267,21 @@ class SurfaceManifold:
         phi, quaternion = reference[3:], point[self.layout.quaternion]
         frame = None if self.offset is None else plane.axes @ self.offset
         R_d = quaternion_matrix(quaternion[:4]) if frame is None else frame
-        if self.alignment is not None:
-            torque = torque_across_axis(torque, R_d, phi, self.alignment)
+        alignment = self.tool.alignment
+        if alignment is not None:
+            torque = torque_across_axis(torque, R_d, phi, alignment)
+        yaw = None
+        if self.tool.yaw_axis is not None:
+            torque, yaw = self.tool.yaw_torque(torque)
         if with_turning:
             if self.offset is None:
                 turning = quaternion_turning_force(torque, plane, quaternion)
             else:
                 turning = frame_turning_force(torque, plane)
             translational[:2] += turning
-        rotational = rotational_force(R_d.T @ torque, phi, self.alignment)
-        return ca.vertcat(translational, rotational)
+        if yaw is not None:
+            return ca.vertcat(translational, yaw)
+        return ca.vertcat(translational, rotational_force(R_d.T @ torque, phi, alignment))
 
     def axes(self, point: np.ndarray) -> np.ndarray:
         """Return ``[t_1, e_perp x t_1, e_perp]`` as columns, shape (3, 3)."""

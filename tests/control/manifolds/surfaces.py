@@ -123,6 +123,9 @@ def further_coordinates(manifold, geometry, theta, y_t, R_e, given=None):
     if len(manifold.coordinates) == 3:
         return np.array([xi])
     R_d = reference_rotation(manifold, geometry, theta, given)
-    C = np.eye(3) if manifold.alignment is None else manifold.alignment
+    C = np.eye(3) if manifold.tool.alignment is None else manifold.tool.alignment
     angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX")
+    if manifold.tool.yaw_axis is not None:
+        *v, w = Rotation.from_matrix(R_e @ R_d.T).as_quat(canonical=True)
+        angles = [2.0 * np.arctan2(manifold.tool.yaw_axis @ v, w)]
     return np.array([xi, *angles[: len(manifold.coordinates) - 3]])

@@ -24,11 +24,18 @@ def test_coordinates_by_kind(oriented):
 
 
 @pytest.mark.parametrize(
-    ("oriented", "axis"), [(False, None), (True, None), (True, [0.0, 0.6, 0.8])]
+    ("oriented", "axis", "yaw"),
+    [
+        (False, None, None),
+        (True, None, None),
+        (True, [0.0, 0.6, 0.8], None),
+        (True, None, [0, -0.6, 0.8]),
+    ],
 )
-def test_force_of_a_moving_point_is_its_power(oriented, axis):
+def test_force_of_a_moving_point_is_its_power(oriented, axis, yaw):
     """At rest, the power of a wrench is that of the force along the errors' rates."""
-    rng, manifold = np.random.default_rng(3), MovingPoint(1, oriented=oriented, tool_axis=axis)
+    rng = np.random.default_rng(3)
+    manifold = MovingPoint(1, oriented=oriented, tool_axis=axis, yaw_axis=yaw)
     point = rng.uniform(-1.0, 1.0, manifold.layout.size)
     slope = point[manifold.layout.position][3:6]
     normal = np.cross(slope, rng.uniform(-1.0, 1.0, 3))
@@ -37,6 +44,10 @@ def test_force_of_a_moving_point_is_its_power(oriented, axis):
     y_t, R_e = rng.uniform(-1, 1, 3), Rotation.random(random_state=3).as_matrix()
     if axis is not None:
         wrench[3:] -= R_e @ axis * (R_e @ axis @ wrench[3:])
+    if yaw is not None:  # a tool with the reference's tilt
+        R_d = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
+        R_e = Rotation.from_rotvec(0.6 * np.array(yaw)).as_matrix() @ R_d
+        wrench[3:] = np.array(yaw) * (yaw @ wrench[3:])
     spin = np.cross(np.eye(3), twist[3:])
     y = Jet([ca.SX(y_t), ca.SX(twist[:3])])
     errors = manifold.virtual_output(

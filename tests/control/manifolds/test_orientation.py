@@ -6,10 +6,15 @@ import pytest
 from numpy.polynomial import Chebyshev
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.manifolds.orientation import orientation_error, quaternion_rotation
+from pfsc_drake.control.manifolds.orientation import (
+    orientation_error,
+    quaternion_rotation,
+    yaw_error,
+)
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import rotation_to_axis
+from pfsc_drake.geometry import rotation_to_axis, turn_about
 from pfsc_drake.jets import Jet
 
 AXES = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.3, -0.5, 0.2]]
@@ -101,8 +106,33 @@ def test_coordinates_of_an_axis(axis):
     manifold = PathManifold(3, oriented=True, tool_axis=7.0 * np.array(axis))
     assert [c.name for c in manifold.coordinates] == ["eta", "xi_1", "xi_2", "phi_z", "phi_y"]
     assert [c.force for c in manifold.coordinates[3:]] == ["tau_z", "tau_y"]
-    np.testing.assert_allclose(manifold.tool_axis, axis / np.linalg.norm(axis), atol=1e-15)
-    assert PathManifold(3, oriented=True).tool_axis is None
+    np.testing.assert_allclose(manifold.tool.tool_axis, axis / np.linalg.norm(axis), atol=1e-15)
+    assert PathManifold(3, oriented=True).tool.tool_axis is None
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_turn_about_an_axis_in_space_whatever_the_tools_tilt(axis):
+    """A tilt that comes first, about directions across the axis, has no part in it."""
+    a, rng = np.array(axis) / np.linalg.norm(axis), np.random.default_rng(3)
+    for turn in (-2.5, -0.4, 0.0, 1e-6, 1.0, 3.0):
+        R_d = Rotation.random(random_state=rng)
+        tilt = np.cross(a, rng.uniform(-1.5, 1.5, 3))
+        R_e = Rotation.from_rotvec(turn * a) * Rotation.from_rotvec(tilt) * R_d
+        q_d = 1.7 * np.roll(R_d.as_quat(), 1)
+        found = yaw_error(
+            Jet([ca.SX(R_e.as_matrix())]), quaternion_rotation(Jet([ca.SX(q_d)])), np.array(axis)
+        )
+        assert float(ca.evalf(found.coefficients[0])) == pytest.approx(turn, abs=1e-12)
+        numbers = turn_about(axis, R_e.as_matrix()[None], R_d.as_matrix()[None])
+        assert numbers == pytest.approx([turn], abs=1e-12)
+    assert [c.name for c in ToolOrientation(yaw_axis=axis).coordinates] == ["phi"]
+
+
+def test_one_axis_at_most():
+    with pytest.raises(InputError, match=r"yaw axis \[0, 0, 1\]: the path has no orientation"):
+        PathManifold(2, oriented=False, yaw_axis=[0, 0, 1])
+    with pytest.raises(InputError, match="one of them at most"):
+        PathManifold(2, oriented=True, tool_axis=[0, 0, 1], yaw_axis=[0, 0, 1])
 
 
 def test_an_axis_needs_an_orientation_and_a_direction():

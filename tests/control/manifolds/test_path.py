@@ -9,16 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, path_coordinates
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
     PiecewisePolynomialCurve,
     quaternion_to_matrix,
-    rotation_to_axis,
 )
 from pfsc_drake.jets import Jet
 from tests.control.manifolds.surfaces import path_on_cylinder
 from tests.control.manifolds.tool_motion import NODES, ORDER, ToolMotion, assert_derivatives
+
+WHOLE = ToolOrientation()
 
 
 def straight_piece():
@@ -58,7 +60,7 @@ def tool_motion(path, theta, offset, rng):
     return ToolMotion(start, 0.15 * tangent, angles, rng)
 
 
-def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
+def jets_of_outputs(path, theta, motion, order=ORDER, tool=WHOLE):
     """Return derivatives 0..order of the outputs, one row each."""
     evaluator = path.evaluator(order)
     point, layout = evaluator(motion.at(0.0)[0].tolist(), theta), evaluator.layout
@@ -68,7 +70,7 @@ def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
         ca.SX(point[layout.normal]),
         [ca.SX(row) for row in point[layout.position].reshape(-1, 3)],
         [ca.SX(row) for row in quaternion],
-        alignment,
+        tool,
         [ca.SX(x) for x in point[layout.turn]],
     )
     outputs = path_coordinates(motion.y.truncate(order), motion.R.truncate(order), geometry)
@@ -76,7 +78,7 @@ def jets_of_outputs(path, theta, motion, order=ORDER, alignment=None):
     return np.array(rows), point
 
 
-def outputs_over_time(path, point, motion, times, alignment=None):
+def outputs_over_time(path, point, motion, times, tool=WHOLE):
     """Return the outputs from root finding, quadrature and transport, one row per time."""
     curve, (theta, eta) = path.position, point[:2]
 
@@ -107,9 +109,12 @@ def outputs_over_time(path, point, motion, times, alignment=None):
         row = [eta + length, e_perp @ (y - sigma), np.cross(e_par, e_perp) @ (y - sigma)]
         if path.orientation is not None:
             R_d = quaternion_to_matrix(path.orientation.derivatives(s, 0)[0])
-            C = np.eye(3) if alignment is None else alignment
+            C = np.eye(3) if tool.alignment is None else tool.alignment
             angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX").tolist()
-            row += angles if alignment is None else angles[:2]
+            if tool.yaw_axis is not None:
+                *v, w = Rotation.from_matrix(R_e @ R_d.T).as_quat(canonical=True)
+                angles = [2.0 * np.arctan2(tool.yaw_axis @ v, w)]
+            row += angles[: len(tool.coordinates)]
         rows.append(row)
     return np.array(rows)
 
@@ -126,12 +131,21 @@ def test_jets_of_an_axis_are_derivatives_of_the_outputs(oriented_path, axis):
     motion = tool_motion(
         oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
     )
-    check_jets(oriented_path, 2.45, motion, rotation_to_axis(axis))
+    check_jets(oriented_path, 2.45, motion, ToolOrientation(tool_axis=axis))
 
 
-def check_jets(path, theta, motion, alignment=None):
-    jets, point = jets_of_outputs(path, theta, motion, alignment=alignment)
-    assert_derivatives(jets, outputs_over_time(path, point, motion, NODES, alignment))
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [0.2, -0.4, 0.3]])
+def test_jets_of_a_turn_about_an_axis_are_derivatives_of_the_outputs(oriented_path, axis):
+    """Of a tool that is tilted, too: the twist of the rotation between it and its reference."""
+    motion = tool_motion(
+        oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
+    )
+    check_jets(oriented_path, 2.45, motion, ToolOrientation(yaw_axis=axis))
+
+
+def check_jets(path, theta, motion, tool=WHOLE):
+    jets, point = jets_of_outputs(path, theta, motion, tool=tool)
+    assert_derivatives(jets, outputs_over_time(path, point, motion, NODES, tool))
 
 
 def test_the_situations_are_what_their_names_say(situation, request):

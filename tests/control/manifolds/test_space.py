@@ -16,6 +16,7 @@ KINDS = {
     "none": {},
     "all": {"quaternion": QUATERNION},
     "axis": {"quaternion": QUATERNION, "tool_axis": [0.3, -0.2, 1.0]},
+    "turn": {"quaternion": QUATERNION, "yaw_axis": [0.0, 0.0, 1.0]},
 }
 
 
@@ -35,6 +36,9 @@ def test_rates_are_difference_quotients_and_forces_their_power(kind):
         quaternion_to_matrix(QUATERNION[None])[0]
         @ Rotation.from_euler("ZYX", [0.3, -0.4, 0.2]).as_matrix()
     )
+    if kind == "turn":  # a tool with the reference's tilt
+        R_d = quaternion_to_matrix(QUATERNION[None])[0]
+        R_e = Rotation.from_rotvec([0.0, 0.0, 0.6]).as_matrix() @ R_d
     point, function = manifold.point(y_t), manifold_force_function(manifold)
     for _ in range(4):
         twist, wrench = rng.uniform(-0.4, 0.4, 6), rng.uniform(-20, 20, 6)
@@ -46,9 +50,11 @@ def test_rates_are_difference_quotients_and_forces_their_power(kind):
         acting = wrench.copy()
         if kind == "none":
             acting[3:] = 0.0
-        if manifold.tool_axis is not None:
-            about = R_e @ manifold.tool_axis
+        if manifold.tool.tool_axis is not None:
+            about = R_e @ manifold.tool.tool_axis
             acting[3:] -= about * (about @ wrench[3:])
+        if kind == "turn":
+            acting[3:5] = 0.0
         assert tau @ rates == pytest.approx(acting @ twist, abs=1e-10)
 
 

@@ -36,6 +36,7 @@ ORIENTATIONS = {
     "axis": {"orientation": "normal", "offset": OFFSET, "tool_axis": [0.0, 0.0, 1.0]},
     "given": {"orientation": "given"},
     "axis of a given one": {"orientation": "given", "tool_axis": [0.2, -0.4, 0.3]},
+    "turn": {"orientation": "normal", "yaw_axis": [0.0, 0.0, 1.0]},
 }
 ETA = (0.3, -0.2)
 
@@ -114,7 +115,7 @@ def test_coordinates_are_called_by_what_they_mean():
     assert kinds == [Kind.TANGENTIAL, Kind.TANGENTIAL, Kind.TRANSVERSAL]
     axis = SurfaceManifold(2, orientation="normal", tool_axis=[0, 0, 2.0])
     assert [c.force for c in axis.coordinates[3:]] == ["tau_z", "tau_y"]
-    assert np.allclose(axis.tool_axis, [0, 0, 1])
+    assert np.allclose(axis.tool.tool_axis, [0, 0, 1])
 
 
 @pytest.mark.parametrize(

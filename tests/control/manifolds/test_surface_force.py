@@ -26,6 +26,8 @@ ORIENTATIONS = {
     "given": {"orientation": "given"},
     "axis": {"orientation": "normal", "offset": DOWN, "tool_axis": [0.0, 0.0, 1.0]},
     "axis of a given one": {"orientation": "given", "tool_axis": [0.2, -0.4, 0.3]},
+    "turn": {"orientation": "normal", "offset": DOWN, "yaw_axis": [0.1, 0.2, 1.0]},
+    "turn of a given one": {"orientation": "given", "yaw_axis": [0.0, 0.0, 1.0]},
 }
 
 
@@ -38,6 +40,8 @@ def place(manifold, name, rng):
     if len(manifold.coordinates) > 3:
         R_d = reference_rotation(manifold, geometry, theta, given)
         R_e = R_d @ Rotation.from_euler("ZYX", rng.uniform(-0.5, 0.5, 3)).as_matrix()
+        if manifold.tool.yaw_axis is not None:  # the tilt is the reference's
+            R_e = Rotation.from_rotvec(0.7 * manifold.tool.yaw_axis).as_matrix() @ R_d
     return y_t, R_e, surface_point(manifold, geometry, y_t, theta, given=given)
 
 
@@ -66,9 +70,11 @@ def test_power_of_random_motions(name, orientation):
         rates = outputs(manifold, point, y_t, R_e, twist)[1]
         tau = force(manifold, wrench, point, still, with_turning=True)
         acting = wrench.copy()
-        if manifold.tool_axis is not None:
-            about = R_e @ manifold.tool_axis
+        if manifold.tool.tool_axis is not None:
+            about = R_e @ manifold.tool.tool_axis
             acting[3:] -= about * (about @ wrench[3:])
+        if manifold.tool.yaw_axis is not None:
+            acting[3:] = manifold.tool.yaw_axis * (manifold.tool.yaw_axis @ wrench[3:])
         if len(tau) == 3:
             acting[3:] = 0.0
         assert tau @ rates == pytest.approx(acting @ twist, abs=1e-11)
@@ -101,8 +107,8 @@ def test_virtual_work_with_the_jacobian_of_a_robot(load_robot, orientation):
     y_t, R_e, point = place(manifold, "paraboloid", rng)
     q = robot.reach(y_t, R_e)
     wrench = rng.uniform(-30, 30, 6)
-    if manifold.tool_axis is not None:
-        about = R_e @ manifold.tool_axis
+    if manifold.tool.tool_axis is not None:
+        about = R_e @ manifold.tool.tool_axis
         wrench[3:] -= about * (about @ wrench[3:])
     still = outputs(manifold, point, y_t, R_e, np.zeros(6))[0]
     tau = force(manifold, wrench, point, still, with_turning=True)

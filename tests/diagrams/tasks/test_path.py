@@ -16,6 +16,7 @@ from diagrams.scenario import (
     Waypoints,
 )
 from diagrams.tasks.path import make_path, require_orientation
+from diagrams.tasks.surface import followed_axes
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
@@ -324,7 +325,7 @@ def test_what_is_no_task_is_dropped(tmp_path):
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"task": "axis"}, "task = axis; allowed: full, tool_axis, none"),
+        ({"task": "axis"}, "task = axis; allowed: full, tool_axis, yaw, none"),
         ({"tool_axis": [0.0, 0.0, 0.0]}, "tool_axis = [0.0, 0.0, 0.0]; allowed: 3 numbers, not"),
         ({"tool_axis": [0.0, 1.0]}, "tool_axis = [0.0, 1.0]; allowed: 3 finite numbers"),
         ({"tool_axis": [0.0, 1.0, math.inf]}, "tool_axis = [0.0, 1.0, inf]"),
@@ -337,9 +338,13 @@ def test_tasks_of_the_orientation(keys, said):
 
 
 def test_the_axis_alone_is_told_where_it_alone_matters():
-    assert OrientationParameters(tool_axis=[1.0, 0.0, 0.0]).axis is None
-    axis = OrientationParameters(task="tool_axis", tool_axis=[0.0, -3e200, 4e200]).axis
-    np.testing.assert_allclose(axis, [0.0, -0.6, 0.8], rtol=1e-15)
+    axes = followed_axes(OrientationParameters(tool_axis=[1.0, 0.0, 0.0]))
+    assert axes == {"tool_axis": None, "yaw_axis": None}
+    for task, other in {"tool_axis": "yaw", "yaw": "tool_axis"}.items():
+        name, none = f"{task.removesuffix('_axis')}_axis", f"{other.removesuffix('_axis')}_axis"
+        axes = followed_axes(OrientationParameters(task=task, **{name: [0.0, -3e200, 4e200]}))
+        np.testing.assert_allclose(axes[name], [0.0, -0.6, 0.8], rtol=1e-15)
+        assert axes[none] is None
 
 
 def test_too_few_points_may_be_corners(tmp_path):
