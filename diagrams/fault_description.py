@@ -10,6 +10,7 @@ from diagrams.wording import coordinate_text, listed, posture_text
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.manifold import Kind, PlaceManifold, indices
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.singularity_name import singularity_name
@@ -202,7 +203,8 @@ def _singular(scene: FaultScene) -> str:
     distance = float(np.linalg.norm(_beside(scene)))
     beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""
     if _is_map_singular(A, posture):
-        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}"
+        bend = _bend(scene)
+        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}{bend}"
     name = None
     if isinstance(scene.robot, SerialChain):
         name = singularity_name(scene.robot, q, posture)
@@ -211,6 +213,22 @@ def _singular(scene: FaultScene) -> str:
         f"{name or 'robot'} singular {_place(scene)}: "
         f"{posture_text(scene.robot, q, posture.causing_joints)} "
         f"({free} can move without the tool){beside}"
+    )
+
+
+def _bend(scene: FaultScene) -> str:
+    """Return that the path bends too sharply for the tool's distance from it, if it does."""
+    if not isinstance(scene.place, PathManifold):
+        return ""
+    point, layout = scene.now.signals["manifold_point"], scene.place.layout
+    _, slope, second = point[layout.position][:9].reshape(3, 3)
+    turning = float(np.linalg.norm(np.cross(slope, second)))
+    radius = float(np.linalg.norm(slope)) ** 3 / turning if turning > 0.0 else np.inf
+    if radius > np.linalg.norm(_beside(scene)):
+        return ""
+    return (
+        f"; the path bends with a radius of {1e3 * radius:.3g} mm there, less than the tool is "
+        "beside it: look at the waypoints"
     )
 
 

@@ -25,6 +25,7 @@ from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.believed_delta import believed_delta
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.multibody import (
@@ -40,6 +41,7 @@ from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
 from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
+from pfsc_drake.yaml.reading import read_yaml
 
 TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
 
@@ -231,9 +233,18 @@ def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
         folder: Where relative file names start.
 
     Raises:
-        InputError: If its parameters cannot be read.
+        InputError: If its parameters cannot be read, or are Drake's model directives.
     """
-    return DeltaRobot(load_delta_parameters(folder / model if FilePath(model).suffix else model))
+    if model in SHIPPED_ROBOTS:
+        return DeltaRobot(load_delta_parameters(model))
+    file = folder / model
+    if "directives" in read_yaml(file):
+        raise InputError(
+            f"{file}: Drake's model directives are not read; allowed: the URDF, SDF or MJCF file "
+            "of one arm (robot.base, base_pose and fixed_joints say what the directives say), or "
+            "the parameters of a DELTA robot (*.yaml)"
+        )
+    return DeltaRobot(load_delta_parameters(file))
 
 
 def add_delta(
@@ -253,8 +264,8 @@ def add_delta(
     Raises:
         InputError: If the scenario asks for something that a DELTA robot does not have.
     """
-    _check(scenario)
     robot = load_delta_robot(scenario.robot.model, folder)
+    _check(scenario)
     belief = _believe(robot, scenario, folder)
     if workpiece is None:
         return FreeDelta(robot, belief, builder.AddNamedSystem("plant", DeltaPlant(robot)))

@@ -17,7 +17,7 @@ from diagrams.scenario import (
     Waypoints,
 )
 from diagrams.tasks.path_along_edge import make_edge
-from diagrams.tasks.path_warnings import far_waypoints
+from diagrams.tasks.path_warnings import far_waypoints, turning_back
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
 )
@@ -153,6 +153,9 @@ def _through_waypoints(
                 f"add waypoints to {shape.file}, or write path.shape.corner_distance (m) for "
                 "straight lines with rounded corners"
             )
+        # a path of straight lines says itself where it turns
+        if hint is None and not (shape.corner_distance or shape.tolerance):
+            hint = turning_back(table.positions)
         raise InputError("; ".join(filter(None, [str(error), hint]))) from None
     if not keyframes:
         return path

@@ -12,6 +12,10 @@ _LARGE, _SMALL = 20.0, 1e-4
 _SWING, _NARROW = 0.2, 0.6
 # from one waypoint to the next: change of the curvature beside the curvature, and rad
 _JUMP, _TURN, _FEWEST = 0.7, 0.002, 10
+# of the usual distance of two waypoints, which nobody means
+_CLOSE = 1e-2
+# rad, from half a turn
+_HAIRPIN = math.radians(2.0)
 # rad, beyond which a turn is a corner, unless turns to and fro follow each other
 _CORNER, _TO_AND_FRO = 0.3, -0.3
 # what tolerance to try, beside the noise
@@ -31,7 +35,8 @@ def path_warnings(path: Path, shape: ShapeReport) -> list[str]:
     if path.waypoints is not None:
         found += [far_waypoints(path.waypoints.positions), _nearly_closed(path, path.waypoints)]
         if path.waypoints.manner == "interpolated":
-            found += [_noise(path, shape) or _swing(shape) or _narrow_bend(path, shape)]
+            bends = _noise(path, shape) or _swing(shape) or _narrow_bend(path, shape)
+            found += [bends and (_close_waypoints(path.waypoints, shape) or bends)]
     return [sentence for sentence in found if sentence]
 
 
@@ -49,6 +54,27 @@ def closing_gap(path: Path) -> float | None:
     sides = np.linalg.norm(np.diff(points, axis=0), axis=1)
     near = gap <= 1.5 * max(sides[0], sides[-1]) and gap <= 0.1 * path.length
     return gap if near and len(points) > 3 else None
+
+
+def turning_back(positions: np.ndarray) -> str | None:
+    """Return what to say of waypoints of which a path turns back on itself, or None.
+
+    Args:
+        positions: Of the waypoints [m], shape (n, 3).
+    """
+    sides = np.diff(positions, axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    products = np.where(lengths[1:] * lengths[:-1] > 0.0, lengths[1:] * lengths[:-1], np.inf)
+    cosines = np.sum(sides[1:] * sides[:-1], axis=1) / products
+    if not len(cosines) or cosines.min() > -math.cos(_HAIRPIN):
+        return None
+    number = int(np.argmin(cosines)) + 2
+    angle = math.degrees(math.acos(max(float(cosines.min()), -1.0)))
+    return (
+        f"the path turns back on itself, by {angle:.4g} deg at waypoint {number}, where the tool "
+        "would have to stop: to go there and back end the path there and write "
+        "reference.points: [0, LENGTH, 0], or lead the waypoints round the turn"
+    )
 
 
 def far_waypoints(positions: np.ndarray) -> str | None:
@@ -112,6 +138,21 @@ def _swing(shape: ShapeReport) -> str | None:
         f"the path swings {_length(off)} beside the straight line between two waypoints "
         f"{_length(chord)} apart, at eta = {shape.distance_from_polygon_at:.4g} m: add waypoints "
         "there, or write path.shape.corner_distance (m) for straight lines with rounded corners"
+    )
+
+
+def _close_waypoints(waypoints: PathWaypoints, shape: ShapeReport) -> str | None:
+    """Two waypoints in nearly one place, whose direction is chance, as a cause of bends."""
+    lengths = np.linalg.norm(np.diff(waypoints.positions, axis=0), axis=1)
+    nearest = int(np.argmin(lengths))
+    usual = float(np.median(lengths))
+    if lengths[nearest] >= min(_CLOSE * usual, _SMALL):
+        return None
+    return (
+        f"waypoints {nearest + 1} and {nearest + 2} are {1e6 * lengths[nearest]:.3g} um apart, "
+        f"others {_length(usual)}: between them the path has a direction by chance, and bends with "
+        f"a radius of down to {1e6 * shape.smallest_radius:.3g} um: take one of the two out, or "
+        "write path.shape.tolerance (m)"
     )
 
 

@@ -6,6 +6,7 @@ and lets the rest through. Here each is refused in one line that names file, lin
 
 from dataclasses import dataclass, field
 
+from pfsc_drake.robot.models.mimic import Mimic, mimics_of
 from pfsc_drake.robot.models.model_parts import (
     DRIVE_NUMBERS,
     MOMENTS,
@@ -14,7 +15,6 @@ from pfsc_drake.robot.models.model_parts import (
     check_inertia,
     check_joint,
     refuse_loops,
-    refuse_mimic,
 )
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
@@ -29,7 +29,8 @@ class ModelFacts:
         effort_limits: Effort limits of URDF joints, by name [Nm or N].
         friction: Joints with dry friction.
         springs: Stiffness of the sprung joints of the model itself, by name.
-        mimics: Number of joints that follow others; all of them are fixed.
+        mimics: Joints that follow others, by name.
+        still: Joints of the type fixed.
     """
 
     without_inertia: dict[str, str] = field(default_factory=dict)
@@ -37,7 +38,8 @@ class ModelFacts:
     effort_limits: dict[str, float] = field(default_factory=dict)
     friction: list[str] = field(default_factory=list)
     springs: dict[str, float] = field(default_factory=dict)
-    mimics: int = 0
+    mimics: dict[str, Mimic] = field(default_factory=dict)
+    still: set[str] = field(default_factory=set)
 
 
 def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -> ModelFacts:
@@ -48,14 +50,15 @@ def inspect_model(models: list[ModelXml], fixed: frozenset[str] = frozenset()) -
         fixed: Joints that will not move, whatever the model says.
 
     Raises:
-        InputError: If a number is none or out of range, an inertia is not physical, joints close
-            a loop, or a joint mimics another; one line.
+        InputError: If a number is none or out of range, an inertia is not physical, or joints
+            close a loop; one line.
     """
     facts = ModelFacts()
     for model in models:
         inspect = _INSPECTORS.get(model.root.name)
         if inspect is not None:
             inspect(model, facts, fixed)
+            facts.mimics |= mimics_of(model)
     return facts
 
 
@@ -92,9 +95,8 @@ def _inspect_urdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             facts.effort_limits[joint.name] = numbers["effort"]
         if numbers.get("friction", 0.0) > 0.0:
             facts.friction.append(joint.name)
-        for mimic in element.all("mimic"):
-            refuse_mimic(joint, mimic.attributes.get("joint"), fixed, mimic)
-            facts.mimics += 1
+        if element.attributes.get("type") == "fixed":
+            facts.still.add(joint.name)
     refuse_loops(edges, {})
     for transmission in model.root.all("transmission"):
         for actuator in transmission.all("actuator"):
@@ -145,9 +147,8 @@ def _inspect_sdf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> N
             for key, allowed in DRIVE_NUMBERS.items():
                 for part in element.all(key):
                     joint.number(key, part.text, allowed, part)
-            for mimic in element.all("axis", "mimic"):
-                refuse_mimic(joint, mimic.attributes.get("joint"), fixed, mimic)
-                facts.mimics += 1
+            if element.attributes.get("type") == "fixed":
+                facts.still.add(joint.name)
         _check_poses(model, one)
         frames = {
             frame.attributes.get("name", ""): frame.attributes.get("attached_to", "")
@@ -185,6 +186,8 @@ def _inspect_mjcf(model: ModelXml, facts: ModelFacts, fixed: frozenset[str]) -> 
             )
     for equality in model.root.all("equality"):
         for constraint in equality.children:
+            if constraint.name == "joint":  # one follows the other
+                continue
             ModelPart(model, constraint, "equality").refuse(
                 "type", constraint.name, "an open chain without constraints", constraint
             )

@@ -19,7 +19,7 @@ _ONE_AXIS = ("revolute", "prismatic", "hinge", "slide")
 # far beyond any robot in any unit, and small enough to be squared and multiplied
 LARGEST = 1e12
 
-_ANY, _LIMIT, _NOT_NEGATIVE, _POSITIVE = (
+ANY, _LIMIT, _NOT_NEGATIVE, _POSITIVE = (
     f"a number of magnitude up to {LARGEST:g}",
     "a number",
     f"zero or a positive number up to {LARGEST:g}",
@@ -37,7 +37,7 @@ _JOINT_NUMBERS = {
     "friction": _NOT_NEGATIVE,
     "armature": _NOT_NEGATIVE,
     "spring_stiffness": _NOT_NEGATIVE,
-    "spring_reference": _ANY,
+    "spring_reference": ANY,
 }
 
 
@@ -77,7 +77,7 @@ class ModelPart:
         if _NUMBER.fullmatch(written) or _INFINITE.fullmatch(written):
             value = float(written)
         valid = {
-            _ANY: abs(value) <= LARGEST,
+            ANY: abs(value) <= LARGEST,
             _LIMIT: not np.isnan(value),
             _NOT_NEGATIVE: 0.0 <= value <= LARGEST,
             _NOT_SIGNED: value >= 0.0 and np.isfinite(value),
@@ -90,7 +90,7 @@ class ModelPart:
     def check_numbers(self, key: str, text: str | None, at: Element) -> None:
         """Refuse a vector if one of its words is no number; how many there are is not checked."""
         for word in (text or "").split():
-            self.number(key, word, _ANY, at)
+            self.number(key, word, ANY, at)
 
     def refuse(self, key: str, value: object, allowed: str, at: Element | None = None) -> None:
         """Raise the InputError of a value; for the arguments see :meth:`number`."""
@@ -125,7 +125,7 @@ def check_inertia(
         link.refuse(missing[0], "missing", "moments of inertia with the mass", at)
     written = dict.fromkeys(PRODUCTS, "0") | dict.fromkeys(MOMENTS, "1" if is_sdf else "0")
     written |= inertia
-    values = [link.number(key, written[key], _ANY, at) for key in (*MOMENTS, *PRODUCTS)]
+    values = [link.number(key, written[key], ANY, at) for key in (*MOMENTS, *PRODUCTS)]
     if mass == 0.0:
         if any(values):
             link.refuse("inertia", values, "zeros without mass; or a positive mass", at)
@@ -189,12 +189,6 @@ def check_joint(
                 values["lower"][1],
             )
     return numbers
-
-
-def refuse_mimic(joint: ModelPart, leader: str | None, fixed: frozenset[str], at: Element) -> None:
-    """Refuse a joint that follows another, unless it is fixed."""
-    if joint.name not in fixed:
-        joint.refuse("mimic", leader, "joints on their own; put it into fixed_joints", at)
 
 
 def refuse_loops(

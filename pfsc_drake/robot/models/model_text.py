@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
+from pfsc_drake.robot.models.mimic import mimic_elements
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
 
@@ -11,8 +12,9 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
     """Return a model in another text, or None if Drake can use the file as it is.
 
     ROS tools repeat a material wherever it is used, and let the colour differ; Drake refuses
-    that, so such materials are named apart. Springs can be left out, since Drake gives up no
-    joint of a plant with springs. Lines stay where they are. Relative file names become absolute,
+    that, so such materials are named apart. That joints follow others is left out: they are fixed
+    where these stand. Springs can be left out, since Drake gives up no joint of a plant with
+    springs. Lines stay where they are. Relative file names become absolute,
     since a text has no folder.
 
     Args:
@@ -20,6 +22,7 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
         without_springs: Whether to set the stiffness of its joints to zero.
     """
     edits = list(_distinct_materials(model)) if model.root.name == "robot" else []
+    edits += [(mimic, "") for _, mimic in mimic_elements(model)]
     if without_springs:
         edits += [
             (element, f"<{element.name}>0</{element.name}>")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ from pfsc_drake.robot.models.joint_edits import (
     moving_joints,
     sprung_joints,
 )
+from pfsc_drake.robot.models.mimic import with_followers
 from pfsc_drake.robot.models.model_text import usable_text
 from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
 from pfsc_drake.robot.models.packages import packages_for
@@ -111,6 +112,8 @@ def read_model(
     packages = packages_for(file, model.content, options.packages)
     models = read_with_inclusions(file, packages)
     facts = inspect_model(models, frozenset(options.fixed_joints))
+    followers = with_followers(facts.mimics, options.fixed_joints, facts.still)
+    options = replace(options, fixed_joints=followers)
     sprung = [name for name in options.fixed_joints if name in facts.springs]
     if sprung:
         raise InputError(f"fixed_joints: '{sprung[0]}' carries a spring; allowed: other joints")
@@ -139,7 +142,8 @@ def read_model(
             plant.Finalize()
             _require_regular_mass_matrix(plant, file)
     rubbing = [name for name in facts.friction if name not in options.fixed_joints]
-    said_below = ("joint friction", "mimic")  # or of no account, since all mimics are fixed
+    # or of no account, since all that follows others is fixed
+    said_below = ("joint friction", "mimic", "equality")
     warnings = [m for m in messages.warnings if not any(text in m for text in said_below)]
     if rubbing:
         warnings.append(
@@ -201,7 +205,7 @@ def _take_constraints(plant: MultibodyPlant, file: Path, facts: ModelFacts) -> N
         plant.get_force_element(ForceElementIndex(i)) for i in range(plant.num_force_elements())
     )
     others = [type(element).__name__ for element in elements if not isinstance(element, known)]
-    if others or len(constraints) > facts.mimics:
+    if others or len(constraints) > len(facts.mimics):
         raise InputError(
             f"{file}: {', '.join(others) or 'constraints'} between bodies; allowed: an open chain "
             "of joints"

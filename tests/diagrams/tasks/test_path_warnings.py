@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.tasks.path_warnings import closing_gap, path_warnings
+from diagrams.tasks.path_warnings import closing_gap, path_warnings, turning_back
 from pfsc_drake.geometry import (
     OrientationCurve,
     Path,
@@ -101,3 +101,29 @@ def test_orientation_that_turns_faster_than_was_asked_for():
     (sentence,) = path_warnings(path, shape_report(path))
     assert sentence.startswith("the orientation turns by")
     assert sentence.endswith("add orientations there")
+
+
+def test_waypoints_in_nearly_one_place():
+    """Their direction is chance, and so is the path's: the two are named, not what comes of it."""
+    points = np.array([[0.8 + 0.05 * k, 0.0, 0.9] for k in range(6)] + [[1.1, 0.1, 0.9]])
+    points[4] = points[3] - [1e-6, 0.0, 0.0]
+    (sentence,) = warnings(points, smoothness=5)
+    assert "waypoints 4 and 5 are 1 um apart, others 50 mm" in sentence
+    assert "take one of the two out, or write path.shape.tolerance" in sentence
+    tolerance = Tolerance(1e-3, 0.01)
+    assert "waypoints" not in "".join(warnings(points, smoothness=5, tolerance=tolerance))
+    # harmless where the path goes on
+    points = np.array([[0.8 + 0.05 * k, 0.0, 0.9] for k in range(6)])
+    points = np.insert(points, 3, points[3] - [1e-6, 0.0, 0.0], axis=0)
+    assert warnings(points, smoothness=5) == []
+
+
+def test_a_path_that_turns_back_on_itself():
+    points = np.array([[0.8, 0.0, 0.9], [0.9, 0.0, 0.9], [1.0, 0.0, 0.9], [0.9, 0.0, 0.9]])
+    sentence = turning_back(points)
+    assert "by 180 deg at waypoint 3" in sentence
+    assert "reference.points: [0, LENGTH, 0]" in sentence
+    assert turning_back(points[:3]) is None
+    assert turning_back(points[:2]) is None
+    assert turning_back(points + 0.01 * np.diag([0, 0, 0, 1])[:, [0, 3, 1]]) is None
+    assert turning_back(WAVE) is None

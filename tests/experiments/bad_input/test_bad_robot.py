@@ -150,3 +150,11 @@ def test_unreachable_start(refused, mine):
         "path.orientation.keyframes=[{angles_deg: [0, -90, 0]}]",
     ]
     refused(mine(SIX), "start", "pose", "unreachable", changes=changes)
+
+
+@pytest.mark.parametrize("name", ["cell.dmd.yaml", "cell.yaml"])
+def test_drakes_model_directives_are_no_delta_robot(refused, mine, tmp_path, name):
+    file = tmp_path / name
+    file.write_text("directives:\n- add_model: {name: arm, file: package://x/arm.sdf}\n")
+    parts = ("Drake's model directives", "URDF, SDF or MJCF", "robot.base")
+    refused(mine(), *parts, changes=[f"robot.model={name}"], file=file)

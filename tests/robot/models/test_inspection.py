@@ -72,7 +72,6 @@ def test_parts_of_an_inertial_that_are_missing(wrong, urdf_text, sdf_text):
         ('velocity="1.5"', 'velocity="nan"', "velocity = nan"),
         ("</joint>", '<dynamics damping="-1"/></joint>', "damping = -1"),
         ("</joint>", '<dynamics friction="x"/></joint>', "friction = x"),
-        ("</joint>", '<mimic joint="elbow"/></joint>', "mimic = elbow"),
     ],
 )
 def test_urdf_joints(wrong, urdf_text, old, new, part):
@@ -105,7 +104,6 @@ def test_urdf_drives(wrong, urdf_text, key, value):
         ("<spring_stiffness>0<", "<spring_stiffness>nan<", "spring_stiffness = nan"),
         ("<axis><xyz>", "<drake:gear_ratio>0</drake:gear_ratio><axis><xyz>", "gear_ratio = 0"),
         ("<axis><xyz>", "<drake:rotor_inertia>x</drake:rotor_inertia><axis><xyz>", "inertia = x"),
-        ("<axis><xyz>", "<axis><mimic joint='weld'/><xyz>", "mimic = weld"),
     ],
 )
 def test_sdf_joints(wrong, sdf_text, old, new, part):
@@ -136,7 +134,6 @@ def test_loops(write, refused, urdf_parts, sdf_text):
 
 def test_joints_that_are_fixed_anyway(write, urdf_text):
     text = urdf_text.replace('lower="-2"', 'lower="2"', 1)
-    text = text.replace("</joint>", '<mimic joint="elbow"/></joint>', 1)
     inspect_model([read_model_xml(write(text))], frozenset({"shoulder"}))
 
 

@@ -152,10 +152,89 @@ def test_mimic_joints(write, read, refused, urdf_parts):
         joint("finger_2", "tcp", "right", limit + '<mimic joint="finger_1"/>', "prismatic"),
     ]
     file = write(urdf(*fingers))
-    refused(lambda: read(file), file, "'finger_2'", "mimic", "fixed_joints")
-    plant, warnings = read(file, fixed_joints={"finger_1": 0.02, "finger_2": 0.02})
+    refused(lambda: read(file), file, "'finger_2'", "mimic", "fixed_joints: {finger_1: VALUE}")
+    for fixed in ({"finger_1": 0.02, "finger_2": 0.02}, {"finger_1": 0.02}):
+        plant, warnings = read(file, fixed_joints=fixed)
+        assert warnings == []
+        assert chain_of(plant)[0].gather("mass").tolist() == [2.0, 6.0]
+    # a leader that the model itself fixes, which Drake does not let others follow
+    fingers[2] = joint("finger_1", "tcp", "left", "", "fixed")
+    plant, warnings = read(write(urdf(*fingers)))
     assert warnings == []
     assert chain_of(plant)[0].gather("mass").tolist() == [2.0, 6.0]
+
+
+def place_of(plant, body):
+    """Return where a body stands in the flange, by Drake's kinematics."""
+    context = plant.CreateDefaultContext()
+    frames = [plant.GetFrameByName(name) for name in (body, "tcp")]
+    return frames[0].CalcPose(context, frames[1]).translation()
+
+
+def test_what_follows_a_fixed_joint_stands_where_that_puts_it(write, read, refused, urdf_parts):
+    """Slides along z from 0.3 m, one following the other, the last following that."""
+    urdf, link, joint = urdf_parts
+    limit = '<limit lower="-1" upper="1" effort="20" velocity="1"/>'
+    follows = '<mimic joint="{}" multiplier="{}" offset="{}"/>'
+
+    def fingers(third='<mimic joint="b" multiplier="0.5"/>'):
+        inside = ["", follows.format("a", -2, 0.05), third]
+        joints = [
+            joint(name, "tcp", f"link_{name}", limit + said, "prismatic")
+            for name, said in zip("abc", inside, strict=True)
+        ]
+        return urdf(*[link(f"link_{name}") for name in "abc"], *joints)
+
+    plant, warnings = read(write(fingers()), fixed_joints={"a": 0.1})
+    assert warnings == []
+    for name, slid in {"a": 0.1, "b": -0.15, "c": -0.075}.items():
+        np.testing.assert_allclose(place_of(plant, f"link_{name}"), [0, 0, 0.3 + slid], atol=1e-15)
+    plant, _ = read(write(fingers()), fixed_joints={"a": 0.1, "b": 0.2})
+    np.testing.assert_allclose(place_of(plant, "link_c"), [0, 0, 0.4], atol=1e-15)
+    file = write(fingers())
+    refused(lambda: read(file, fixed_joints={"a": 0.9}), "fixed_joints: b = -1.75 m", "-1 to 1 m")
+    file = write(fingers('<mimic joint="c"/>'))
+    refused(lambda: read(file, fixed_joints={"a": 0.1}), file, "'c'", "mimic = c")
+    file = write(fingers('<mimic joint="b" multiplier="x"/>'))
+    refused(lambda: read(file, fixed_joints={"a": 0.1}), "'c'", "mimic multiplier = x")
+
+
+def test_what_follows_in_the_other_formats(write, read, refused, sdf_text):
+    """SDF with a reference, and MJCF, where an equality ties two joints."""
+    finger = (
+        "<link name='f{0}'><inertial><mass>1</mass></inertial></link><joint name='j{0}' "
+        "type='prismatic'><parent>arm</parent><child>f{0}</child><axis><xyz>0 0 1</xyz>{1}</axis>"
+        "</joint>"
+    )
+    mimic = "<mimic joint='j1'><multiplier>3</multiplier><offset>0.1</offset>"
+    mimic += "<reference>0.02</reference></mimic>"
+    fingers = finger.format(1, "") + finger.format(2, mimic)
+    file = write(sdf_text.replace("</model>", f"{fingers}</model>"), "arm.sdf")
+    refused(lambda: read(file), "'j2'", "mimic = j1", "fixed_joints: {j1: VALUE}")
+    plant, _ = read(file, fixed_joints={"j1": 0.05})
+    context = plant.CreateDefaultContext()
+    between = plant.GetFrameByName("f2").CalcPose(context, plant.GetFrameByName("f1"))
+    assert between.translation() == pytest.approx([0, 0, 0.19 - 0.05], abs=1e-15)
+    body = "<body name='{0}'><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
+    body += "<joint name='j_{0}' type='{1}' axis='0 0 1' range='-1 1'/>"
+    text = (
+        "<mujoco model='arm'><compiler angle='radian'/><worldbody>"
+        + body.format("arm", "hinge")
+        + body.format("left", "slide")
+        + "</body>"
+        + body.format("right", "slide")
+        + "</body></body></worldbody><equality>{}</equality>"
+        + "<actuator><motor joint='j_arm'/></actuator></mujoco>"
+    )
+    tie = "<joint joint1='j_right' joint2='j_left' polycoef='0.1 -1 0 0 0'/>"
+    file = write(text.format(tie), "arm.xml")
+    refused(lambda: read(file), "'j_right'", "mimic = j_left", "fixed_joints: {j_left: VALUE}")
+    plant, _ = read(file, fixed_joints={"j_left": 0.3})
+    context = plant.CreateDefaultContext()
+    between = plant.GetFrameByName("right").CalcPose(context, plant.GetFrameByName("left"))
+    assert between.translation() == pytest.approx([0, 0, -0.2 - 0.3], abs=1e-15)
+    file = write(text.format("<weld body1='left' body2='right'/>"), "arm.xml")
+    refused(lambda: read(file, fixed_joints={"j_left": 0.3}), "an open chain without constraints")
 
 
 @pytest.mark.parametrize(
