@@ -8,7 +8,7 @@ written; 130 interrupted.
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -33,6 +33,9 @@ from identification.options import (
 )
 from reporting.commands import interruptible, run_app, show_page
 from reporting.fraction import fraction_display
+
+if TYPE_CHECKING:
+    from identification.model.subject import Subject
 
 app = typer.Typer(
     add_completion=False,
@@ -68,13 +71,12 @@ def excite_command(
     """Find a motion that shows all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
     from identification.excitation.search import search
-    from identification.model.subject import load_subject
     from identification.steps import RECORDING, save_excitation
 
     with interruptible():
         _quiet()
         console = Console()
-        subject = load_subject(robot, tool=tool)
+        subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_excitation"
         within = chosen_limits(
             subject,
@@ -129,13 +131,12 @@ def simulate_command(
 ) -> None:
     """Simulate the experiment: rotors, friction, servo, encoders, noise; five periods a run."""
     from identification.measurement.imperfections import shipped_imperfections
-    from identification.model.subject import load_subject
     from identification.steps import load_excitation, simulate_runs
 
     with interruptible():
         _quiet()
         console = Console()
-        subject = load_subject(robot, tool=tool)
+        subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_runs"
         trajectory = load_excitation(subject, excitation)
         faults = shipped_imperfections(subject.family)
@@ -171,7 +172,6 @@ def estimate_command(
     tool: Tool = False,
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
-    from identification.model.subject import load_subject
     from identification.pages import write_identification
     from identification.report.tables import parameter_table, torque_table
     from identification.steps import estimate_files
@@ -180,7 +180,7 @@ def estimate_command(
     with interruptible():
         _quiet()
         console = Console()
-        subject = load_subject(robot, tool=tool)
+        subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_identification"
         reading = read_reading(names, units, scales)
         with fraction_display(console, subject.name) as progress:
@@ -207,6 +207,8 @@ def estimate_command(
         )
         print_table(console, parameter_table(findings, words=False), most=12)
         print_table(console, torque_table(findings))
+        for note in findings.notes:
+            console.print(f"[yellow]note:[/] {note}", soft_wrap=True, highlight=False)
         raise typer.Exit(show_page("report", report))
 
 
@@ -235,7 +237,8 @@ def consistent_command(
 ) -> None:
     """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
     from identification.consistency.bounds import bounds_from_geometry
-    from identification.model.subject import load_subject
+    from identification.consistency.nearest import refuse_far
+    from identification.estimation.plausibility import refuse_implausible
     from identification.steps import (
         bounds_of,
         consistent_set,
@@ -246,14 +249,16 @@ def consistent_command(
     with interruptible():
         _quiet()
         console = Console()
-        subject = load_subject(robot, tool=tool)
+        subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_model"
         findings = stored_findings(subject, identification, None, simulated=False)
+        refuse_implausible(findings.estimate)
         if total_mass is None:
             known = bounds_of(subject, bounds)
         else:
             known = bounds_from_geometry(subject, read_range(total_mass, "--total-mass"), margin)
         found = consistent_set(findings, known, direct)
+        refuse_far(found, str(identification))
         written = write_consistent(subject, found, folder)
         console.print(
             f"chi squared {found.chi_squared:.4g} of {len(found.base_values)} base parameters",
@@ -275,12 +280,11 @@ def report_command(
     out: Annotated[Path | None, typer.Option(help="Default: FOLDER_report")] = None,
 ) -> None:
     """Write the page of an identification anew, with what else there is to see on it."""
-    from identification.model.subject import load_subject
     from identification.pages import write_stored
 
     with interruptible():
         _quiet()
-        subject = load_subject(robot, tool=tool)
+        subject = _load(robot, tool)
         target = out or folder.with_name(f"{folder.name}_report")
         report = write_stored(subject, folder, validation, bounds, excitation, simulated, target)
         raise typer.Exit(show_page("report", report))
@@ -299,6 +303,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status, see the module.
     """
     return run_app(app, "python -m identification", arguments)
+
+
+def _load(robot: str, tool: bool) -> "Subject":
+    """Return the robot, and say what of its model is taken otherwise than its file says."""
+    from identification.model.subject import load_subject
+
+    subject = load_subject(robot, tool=tool)
+    if subject.note:
+        Console().print(f"[yellow]note:[/] {subject.note}", soft_wrap=True, highlight=False)
+    return subject
 
 
 def _quiet() -> None:

@@ -28,12 +28,14 @@ class Findings:
         choice: How friction was chosen; None if it was not.
         prediction: Of a motion that was not used; None without one.
         truth: True base parameters, shape (n_b,); None for a real robot.
+        notes: What torques cannot tell about their units or make doubtful, one sentence each.
     """
 
     runs: Repetitions
     choice: FrictionChoice | None = None
     prediction: Prediction | None = None
     truth: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def estimate(self) -> Estimate:

@@ -113,7 +113,7 @@ def _consistent(
 
 def _warnings(findings: Findings) -> list[str]:
     """Return what may not be as it should, one sentence each."""
-    said = []
+    said = list(findings.notes)
     for run, estimate in enumerate(findings.runs.estimates, start=1):
         if not isinstance(estimate.motion, AveragedMotion):
             continue

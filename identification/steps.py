@@ -9,9 +9,11 @@ from identification.consistency.direct import estimate_consistent
 from identification.consistency.nearest import ConsistentParameters
 from identification.consistency.writing import WrittenModel, write_model
 from identification.estimation.bandwidth import choose_bandwidth
+from identification.estimation.plausibility import refuse_implausible
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
 from identification.estimation.validation import predict
+from identification.estimation.wiring import unchecked
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits
 from identification.excitation.recording import record_excitation
@@ -190,7 +192,9 @@ def estimate_files(
             bandwidth_hz = choose_bandwidth(
                 regressor, base, record, period, skip, lambda _, phase: progress(0.0, phase)
             ).bandwidth_hz
-        motions.append(prepare_motion(record, regressor, skip=skip, bandwidth_hz=bandwidth_hz))
+        motions.append(
+            prepare_motion(record, regressor, base, skip=skip, bandwidth_hz=bandwidth_hz)
+        )
     other = motions.pop() if validation is not None else None
     findings = find_parameters(
         regressor,
@@ -201,7 +205,10 @@ def estimate_files(
         truth=true_parameters(subject) if simulated else None,
         progress=lambda fraction, phase: progress(0.5 + 0.5 * fraction, phase),
     )
-    return findings, other
+    for result in findings.runs.estimates:
+        refuse_implausible(result)
+    notes = unchecked(regressor, base, motions[0], true_parameters(subject))
+    return replace(findings, notes=tuple(notes)), other
 
 
 def stored_findings(

@@ -12,6 +12,9 @@ from pfsc_drake.robot.parameter_checks import check_vector, require
 
 # of a covariance matrix scaled to ones on its diagonal; below, it is singular but for rounding
 _SINGULAR = 1e-13
+# chi squared of each base parameter above which no robot can be meant: ten standard deviations;
+# that of Tab. C.3 is 26
+_FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +128,32 @@ def nearest_consistent(
         base_values=base.projection @ rho,
         deviations=residual / np.linalg.norm(L, axis=1),
         prior_weight=prior_weight,
+    )
+
+
+def refuse_far(found: ConsistentParameters, source: str) -> None:
+    """Refuse a consistent set that is nowhere near to what was measured.
+
+    Args:
+        found: The set.
+        source: Of what was measured.
+
+    Raises:
+        InputError: If chi squared is far above the number of base parameters; names the parameters
+            that are furthest off.
+    """
+    count = len(found.base_values)
+    if found.chi_squared <= _FAR * count:
+        return
+    worst = np.argsort(-np.abs(found.deviations))[:3]
+    names = ", ".join(
+        f"{found.base_names[i].split()[0]} ({found.deviations[i]:+.3g} standard deviations)"
+        for i in worst
+    )
+    raise InputError(
+        f"{source}: the nearest robot that can be has chi squared {found.chi_squared:.3g} of "
+        f"{count} base parameters; allowed: {_FAR * count:.4g}; furthest off: {names}: signs, "
+        "order or units of the signals, the model's axes, or bounds of its bodies"
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from identification.estimation.friction import FrictionModel
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
+from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 
 # of a joint's largest velocity: below, whether it sticks or slips is not known
@@ -135,9 +136,7 @@ def information(
             f"{subject.name}: variance of the torque of {subject.joint_names[j]} = "
             f"{variance[j]:g}; must be positive and finite, as of measured torques"
         )
-    limit = np.where(np.isfinite(subject.velocity_limit), subject.velocity_limit, 1.0)
-    fastest = np.abs(motion.v).max(axis=0)
-    still = fastest <= _STILL * limit
+    fastest, still = np.abs(motion.v).max(axis=0), standing_still(subject, motion.v)
     v, a = np.where(still, 0.0, motion.v), np.where(still, 0.0, motion.a)
     matrix = base.reduce(regressor.matrix(motion.q, v, a))
     if friction is not None and friction.terms:
@@ -146,3 +145,14 @@ def information(
         base = friction.extended(base, subject.joint_units)
     used = (np.abs(v) >= slow * fastest) & ~still
     return Information(matrix, torques, used, variance, base, still)
+
+
+def standing_still(subject: Subject, v: np.ndarray) -> np.ndarray:
+    """Return which joints stand still throughout but for noise, shape (N,).
+
+    Args:
+        subject: The robot.
+        v: Joint velocities [rad/s or m/s], shape (K, N).
+    """
+    limit = np.where(np.isfinite(subject.velocity_limit), subject.velocity_limit, 1.0)
+    return np.asarray(np.abs(v).max(axis=0) <= _STILL * limit)

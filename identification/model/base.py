@@ -8,10 +8,11 @@ import numpy as np
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
-# least part of a column outside the span of others for it to be independent of them
-_INDEPENDENT = 1e-8
-# of the largest column; below, it is zero but for rounding
-_ZERO = 1e-11
+# least part of a column outside the span of others for it to be independent of them: models are
+# written to six digits, and what is below makes no torque that could be measured
+_INDEPENDENT = 3e-5
+# of the largest column of the same kind of parameter; below, it is zero but for such rounding
+_ZERO = 3e-5
 # relative error of a coefficient that is a whole number or zero
 _ROUNDING = 1e-9
 # postures that the columns are compared in, per parameter
@@ -114,6 +115,7 @@ def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
         InputError: If no parameter has an effect.
     """
     X = regressor.matrix(*random_motion(regressor, seed)).reshape(-1, regressor.size)
+    X[:, _without_effect(X, regressor.names)] = 0.0
     order = sorted(range(regressor.size), key=lambda i: _preference(regressor.names[i]))
     kept = np.sort(_independent(X, order))
     if kept.size == 0:
@@ -121,8 +123,9 @@ def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
     projection = np.linalg.lstsq(X[:, kept], X, rcond=None)[0]
     norms = np.linalg.norm(X, axis=0)
     share = np.abs(projection) * norms[kept, None]
-    projection[share <= _ROUNDING * norms] = 0.0
-    projection[:, norms <= _ZERO * norms.max()] = 0.0
+    # what is below the error of the combination is none of it
+    error = np.linalg.norm(X - X[:, kept] @ projection, axis=0)
+    projection[share <= np.maximum(_ROUNDING * norms, error)] = 0.0
     projection[:, kept] = np.eye(kept.size)
     return BaseParameters(kept, projection, list(regressor.names), list(regressor.units))
 
@@ -159,10 +162,18 @@ def combination(row: np.ndarray, names: Sequence[str], first: int | None = None)
         used = [first, *(i for i in used if i != first)]
     text = ""
     for i in used:
-        size = f"{abs(row[i]):.4g} " if abs(abs(row[i]) - 1.0) > _ROUNDING else ""
+        size = f"{abs(row[i]):.4g} "
+        size = "" if size == "1 " else size
         sign = ("-" if row[i] < 0.0 else "") if not text else (" - " if row[i] < 0.0 else " + ")
         text += f"{sign}{size}{names[i]}"
     return text
+
+
+def _without_effect(X: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Return which columns are zero beside those of the same kind of parameter, shape (n,)."""
+    norms, kinds = np.linalg.norm(X, axis=0), np.array([name.split(".")[1] for name in names])
+    largest = {kind: norms[kinds == kind].max() for kind in np.unique(kinds)}
+    return norms <= _ZERO * np.array([largest[kind] for kind in kinds])
 
 
 def _preference(name: str) -> int:
@@ -176,7 +187,7 @@ def _independent(X: np.ndarray, order: Sequence[int]) -> np.ndarray:
     directions = np.empty((0, X.shape[0]))
     kept = []
     for i in order:
-        if norms[i] <= _ZERO * norms.max():
+        if norms[i] == 0.0:
             continue
         rest = X[:, i] / norms[i]
         for _ in range(2):  # once more, against the rounding of the first time

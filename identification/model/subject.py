@@ -10,6 +10,7 @@ from pydrake.multibody.tree import BodyIndex, Frame
 from diagrams.robots.delta import is_delta, load_delta_robot
 from diagrams.robots.model import locate_model, read_robot, tool_frame
 from diagrams.scenario import RobotParameters as RobotBlock
+from identification.model.round_angles import with_round_angles
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.models.parameters import BodyParameters, RobotParameters, load_parameters
@@ -49,6 +50,7 @@ class Subject:
         block: Which model a serial robot was read from, as scenarios say it; None for others.
         folder: Where relative file names in ``block`` start.
         tool: Whether the tool of the parameter file belongs to the last link.
+        note: What of the model was taken otherwise than its file says, one line; empty if nothing.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Subject:
     block: RobotBlock | None = None
     folder: Path = Path()
     tool: bool = False
+    note: str = ""
 
     @property
     def robot(self) -> RobotModel:
@@ -147,7 +150,9 @@ def _delta_subject(name: str, robot: DeltaRobot) -> Subject:
 
 def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> Subject:
     plant, _ = read_robot(block, folder)
-    chain, _ = chain_from_plant(plant, tool_frame_of(plant, block))
+    from_file, _ = chain_from_plant(plant, tool_frame_of(plant, block))
+    rounded = with_round_angles(from_file)
+    chain = rounded.chain
     parameters = _parameter_file(locate_model(block, folder))
     if parameters is not None and not tool:
         chain = without_tool(chain, parameters)
@@ -173,6 +178,7 @@ def _serial_subject(name: str, block: RobotBlock, folder: Path, tool: bool) -> S
         block=block,
         folder=folder,
         tool=tool,
+        note=f"{name}: {rounded.note}" if rounded.note else "",
     )
 
 

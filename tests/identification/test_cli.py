@@ -78,6 +78,19 @@ def test_the_page_can_be_written_again_with_the_robot_moving(work):
     assert metrics(work / "again")["least_explained_not_used"] > 0.99
 
 
+def test_a_torque_with_the_wrong_sign_is_refused(work, tmp_path, capsys):
+    file = tmp_path / "turned.h5"
+    file.write_bytes((work / "runs" / "run_1.h5").read_bytes())
+    with h5py.File(file, "r+") as record:
+        record["tau"][:, 1] *= -1.0
+        name = record["tau"].attrs["labels"][1]
+    out = tmp_path / "found"
+    assert main(["estimate", ROBOT, str(file), "--plain", "--out", str(out)]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert f"turned.h5: tau of {name} has the wrong sign" in error
+    assert not out.exists()
+
+
 def test_an_excitation_is_found_and_written(tmp_path, capsys):
     out = tmp_path / "excitation"
     limits = ["--limit", "acceleration=30", "--harmonics", "1,2", "--period", "5"]

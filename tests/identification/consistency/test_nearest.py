@@ -1,9 +1,11 @@
 """Tab. C.3, and sets that are consistent from the start."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from identification.consistency.nearest import Prediction, nearest_consistent
+from identification.consistency.nearest import Prediction, nearest_consistent, refuse_far
 from identification.consistency.printed import nearest_to_printed
 from identification.consistency.pseudo_inertia import pseudo_inertia, spread
 from identification.excitation.fourier import FourierTrajectory
@@ -145,3 +147,14 @@ def test_measurements_of_any_certainty(relative, comau, comau_base, comau_bounds
     assert all(
         np.linalg.eigvalsh(pseudo_inertia(link))[0] > 0.0 for link in links(found.parameters)
     )
+
+
+def test_a_set_that_is_far_from_what_was_measured_is_refused(set_of_table):
+    """Tab. C.3 has 26 for each parameter, and passes."""
+    refuse_far(set_of_table, "found")
+    count = len(set_of_table.base_values)
+    worst = int(np.argmax(np.abs(set_of_table.deviations)))
+    name = set_of_table.base_names[worst].split()[0]
+    far = replace(set_of_table, chi_squared=100.1 * count)
+    with pytest.raises(InputError, match=rf"found: .* chi squared 5.*; furthest off: {name} \("):
+        refuse_far(far, "found")
