@@ -1,5 +1,6 @@
 """One builder of stations: a robot, a task and surroundings, each chosen independently."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path as FilePath
 
@@ -34,9 +35,11 @@ from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.make import make_task
 from diagrams.tasks.path_following import PathTask
+from diagrams.tasks.sensed_load import sensed_load_warnings
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import Workpiece
+from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
@@ -122,12 +125,22 @@ def build_station(
         + part.start_warnings(scenario.start, start_posture, start.target)
         + law_warnings(scenario, believed, law, link_state, rest())
         + stiff_regions(scenario)
-        + sensor_warnings(scenario),
+        + sensor_warnings(scenario)
+        + _load_warnings(scenario, part, law, rest),
         workpiece,
         operator,
         MODES if "mode" in signals else (),
         mounting,
     )
+
+
+def _load_warnings(
+    scenario: Scenario, part: RobotPart, law: FollowingLaw, rest: Callable[[], RestPosture]
+) -> list[str]:
+    if not scenario.needs_sensor:
+        return []
+    load = part.believed_load(scenario.sensor.joint)
+    return sensed_load_warnings(scenario, part.belief.robot, load, law, rest())
 
 
 def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:

@@ -1,6 +1,7 @@
 """Why a station stopped, and where: from what its log knows of that instant."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -103,7 +104,9 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         Fault.MEASUREMENT_IMPLAUSIBLE: _implausible,
         Fault.JOINT_LIMIT: _joint_limit,
         Fault.JOINT_SPEED: _joint_speed,
-        Fault.DRIVE_SATURATED: _saturated,
+        Fault.DRIVE_SATURATED: partial(_at_limit, Fault.DRIVE_SATURATED),
+        Fault.DRIVE_CHATTERS: partial(_at_limit, Fault.DRIVE_CHATTERS),
+        Fault.PRESS_FORCE_LOST: _press_lost,
         Fault.ORIENTATION_ERROR: _turned_away,
     }
     if fault in descriptions:
@@ -163,11 +166,21 @@ def _joint_speed(scene: FaultScene) -> str:
     return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}"
 
 
-def _saturated(scene: FaultScene) -> str:
+def _at_limit(fault: Fault, scene: FaultScene) -> str:
     before = scene.before or scene.now
     drive = np.abs(before.signals["law"][scene.law.layout.drive])
     axes = map(str, np.flatnonzero(drive >= scene.law.limits * (1.0 - 1e-9)) + 1)
-    return f"{Fault.DRIVE_SATURATED.explanation}: {listed(axes)} {_place(scene)}"
+    return f"{fault.explanation}: {listed(axes)} {_place(scene)}"
+
+
+def _press_lost(scene: FaultScene) -> str:
+    signals = scene.now.signals
+    across = indices(scene.law.linearization.manifold.coordinates, Kind.TRANSVERSAL)
+    measured, asked = signals["manifold_force"][across.start], signals["press"].item()
+    return (
+        f"{Fault.PRESS_FORCE_LOST.explanation}: {measured:.3g} N are measured, {asked:.3g} N asked "
+        f"for {_place(scene)}"
+    )
 
 
 def _turned_away(scene: FaultScene) -> str:

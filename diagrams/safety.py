@@ -42,5 +42,6 @@ def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
         filter_time=encoders.filter_time + late,
         joint_limits=faults.joint_limits,
         saturation_time=faults.saturation_time,
+        chatter_turns=faults.chatter_turns,
         overspeed=faults.overspeed,
     )

@@ -157,8 +157,8 @@ class Arm(RobotPart):
             forces: One system or more with the ports ``applied_spatial_force`` and ``tau_ext``.
         """
 
-    def _believed_load(self, joint: str) -> ToolLoad:
-        """Return what is believed to be behind a sensor."""
+    def believed_load(self, joint: str) -> ToolLoad:
+        """See :class:`RobotPart`."""
         return self.belief.tool_load(self.believed.tool_load(joint))
 
 
@@ -202,7 +202,7 @@ class MultibodyArm(Arm):
         """See :class:`RobotPart`."""
         return SensorMount(
             self.true.tool_load(joint),
-            self._believed_load(joint),
+            self.believed_load(joint),
             self.model.get_reaction_forces_output_port(),
             reaction_index(self.model, self.true.sensor_joint(joint)),
         )
@@ -249,7 +249,7 @@ class CoupledArm(Arm):
         load = self.true.tool_load(joint)
         acceleration = self.full.GetOutputPort("link_acceleration")
         reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
-        return SensorMount(load, self._believed_load(joint), reaction)
+        return SensorMount(load, self.believed_load(joint), reaction)
 
 
 def add_arm(

@@ -1,5 +1,6 @@
 """The DELTA robot in a diagram, whichever model moves it."""
 
+from abc import abstractmethod
 from dataclasses import asdict, dataclass
 from pathlib import Path as FilePath
 
@@ -77,6 +78,14 @@ class DeltaPart(RobotPart):
         inertia = np.full(self.robot.dimension, mass)
         return Drives(inertia, (friction.coulomb, friction.viscous), step)
 
+    def believed_load(self, joint: str) -> ToolLoad:
+        """See :class:`RobotPart`."""
+        return self.belief.tool_load(self._load(joint))
+
+    @abstractmethod
+    def _load(self, joint: str) -> ToolLoad:
+        """Return what is behind a sensor."""
+
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """See :class:`RobotPart`."""
         return self.robot.joint_coordinates(target.y_t, "start")
@@ -132,12 +141,15 @@ class FreeDelta(DeltaPart):
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """Return the sensor between end-effector and load, which is a point mass in E."""
+        load, acceleration = self._load(joint), self.analytic.GetOutputPort("acceleration")
+        reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
+        return SensorMount(load, self.believed_load(joint), reaction)
+
+    def _load(self, joint: str) -> ToolLoad:
+        """See :class:`DeltaPart`; a point mass in E."""
         _require_joint(joint)
         mass, gravity = self.robot.parameters.masses.load, self.robot.gravity
-        load = ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
-        acceleration = self.analytic.GetOutputPort("acceleration")
-        reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)
-        return SensorMount(load, self.belief.tool_load(load), reaction)
+        return ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
@@ -199,16 +211,19 @@ class TouchingDelta(DeltaPart):
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""
-        _require_joint(joint)
-        plant = self.multibody
-        mount = plant.GetJointByName(joint)
-        load = tool_load_from_plant(plant, mount, self.tool)
+        load, plant = self._load(joint), self.multibody
         return SensorMount(
             load,
-            self.belief.tool_load(load),
+            self.believed_load(joint),
             plant.get_reaction_forces_output_port(),
-            reaction_index(plant, mount),
+            reaction_index(plant, plant.GetJointByName(joint)),
         )
+
+    def _load(self, joint: str) -> ToolLoad:
+        """See :class:`DeltaPart`."""
+        _require_joint(joint)
+        mount = self.multibody.GetJointByName(joint)
+        return tool_load_from_plant(self.multibody, mount, self.tool)
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""

@@ -1,14 +1,18 @@
 """The force/torque sensor between robot and tool."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Demultiplexer
+from pydrake.systems.primitives import Demultiplexer, DiscreteTimeDelay
 
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
 from pfsc_drake.systems.physics.sensor_failure import SensorFailure
+
+# of a sampling interval
+_ROUNDING = 1e-6
 
 
 def add_sensor(
@@ -49,7 +53,7 @@ def add_sensor(
         ),
     )
     reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
-    reading = _fail(builder, reading, scenario)
+    reading = _delay(builder, _fail(builder, reading, scenario), scenario)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     whole = compensation.GetOutputPort("compensation")
@@ -77,6 +81,21 @@ def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> O
     return broken.GetOutputPort("delivered")
 
 
+def _delay(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> OutputPort:
+    """Return a sensor's reading when the controller has it."""
+    delay, period = scenario.sensor.delay, scenario.controller.sampling_time
+    ticks = round(delay / period)
+    whole = abs(ticks * period - delay) < _ROUNDING * period
+    require(whole, "sensor.delay", delay, f"a multiple of the sampling time {period:g} s")
+    if ticks == 0:
+        return reading
+    late = builder.AddNamedSystem(
+        "force_sensor_delay", DiscreteTimeDelay(period, ticks, reading.size())
+    )
+    builder.Connect(reading, late.get_input_port())
+    return late.get_output_port()
+
+
 def _split(
     builder: DiagramBuilder, name: str, port: OutputPort, sizes: list[int]
 ) -> list[OutputPort]:
@@ -88,17 +107,10 @@ def _split(
 
 
 def sensor_warnings(scenario: Scenario) -> list[str]:
-    """Return what may keep a scenario's sensor from being tared, or make it too late."""
+    """Return what may make the taring of a scenario's sensor too late."""
     if not scenario.compliance.needs_sensor:
         return []
     warnings, sensor, dwell = [], scenario.sensor, scenario.reference.dwell
-    if scenario.encoders.difference_quotient and sensor.inertia != "none":
-        warnings.append(
-            "the tool's inertial load comes from the second difference of encoder positions; if "
-            "that is noisier than sensor.taring_spread, the sensor is never tared and what would "
-            "yield rests: filter the velocities (encoders.filter_time) or take sensor.inertia "
-            "'none'"
-        )
     if dwell < sensor.taring_time:
         warnings.append(
             f"the reference sets off after reference.dwell = {dwell:g} s, before the sensor can "

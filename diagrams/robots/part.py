@@ -122,6 +122,17 @@ class RobotPart(ABC):
         """
 
     @abstractmethod
+    def believed_load(self, joint: str) -> ToolLoad:
+        """Return what is believed to be behind a sensor.
+
+        Args:
+            joint: Fixed joint of the model with the sensor in it.
+
+        Raises:
+            InputError: See :meth:`sensor_mount`.
+        """
+
+    @abstractmethod
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
         """Return joint coordinates that put the tool where it starts, shape (N,).
 

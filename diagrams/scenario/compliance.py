@@ -131,10 +131,14 @@ class SensorParameters:
         bias: Reading without load, shape (6,).
         noise: Standard deviation of one sample, shape (6,).
         bandwidth: Of the sensor's filter, and of the tool compensation's [Hz].
+        delay: Until the controller has what is measured [s], a multiple of its sampling time.
         seed: Of the noise.
         inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
+        unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
+            said before a run alone, see
+            :func:`~diagrams.tasks.sensed_load.sensed_load_warnings`.
         taring_time: Length of the quiet stretch whose mean becomes the bias [s].
-        taring_spread: Largest difference within it, shape (6,).
+        taring_spread: Largest difference of means over 10 ms within it, shape (6,).
         taring_bias: Largest bias that is believed, shape (6,).
         force_dead_band: [N].
         torque_dead_band: [Nm].
@@ -147,8 +151,10 @@ class SensorParameters:
     bias: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().bias)
     noise: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().noise)
     bandwidth: float = 200.0
+    delay: float = 0.0
     seed: int = 0
     inertia: str = "differentiated"
+    unknown_mass: float = 0.0
     taring_time: float = 0.05
     taring_spread: np.ndarray = dc.field(
         default_factory=lambda: ToolCompensationParameters().taring_spread
@@ -163,6 +169,8 @@ class SensorParameters:
         # accelerations are known to no component of the station
         known = self.inertia in ("differentiated", "none")
         require(known, "inertia", self.inertia, "differentiated, none")
+        require(0.0 <= self.delay <= 1.0, "delay", self.delay, "0 to 1 s")
+        require_not_negative("unknown_mass", self.unknown_mass)
         self.transducer()
         self.compensation()
 

@@ -39,6 +39,8 @@ class FaultParameters:
         overspeed: Share of its largest speed by which a joint may be faster until it is a fault;
             ``.inf`` if no speed is.
         saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+        chatter_turns: How many times a drive may turn from one limit to the other, fewer being
+            forgotten with 0.2 s; 0 for any number.
         hold_bandwidth: Of the position hold after a fault [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
         brakes: Holding brakes; none without the block or with ``brakes: null``.
@@ -48,6 +50,7 @@ class FaultParameters:
     joint_limits: bool = True
     overspeed: float = 0.1
     saturation_time: float = 0.0
+    chatter_turns: float = 6.0
     hold_bandwidth: float = 60.0
     effort_share: float = 0.7
     brakes: BrakeParameters | None = None
@@ -56,6 +59,7 @@ class FaultParameters:
         require_not_negative("plausibility", self.plausibility)
         require(self.overspeed >= 0.0, "overspeed", self.overspeed, "zero or a positive number")
         require_not_negative("saturation_time", self.saturation_time)
+        require_not_negative("chatter_turns", self.chatter_turns)
         require_positive("hold_bandwidth", self.hold_bandwidth)
         good = 0.0 < self.effort_share <= 1.0
         require(good, "effort_share", self.effort_share, "above 0, at most 1")

@@ -85,7 +85,8 @@ def add_compliance(
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
         a force reference ``press``, with an operator ``impedance`` and ``tank``, else where it
         varies ``damping`` of every coordinate;
-        ``compliance_status``, an :class:`ImpedanceStatus`.
+        ``compliance_status``, an :class:`ImpedanceStatus`, and with a force reference
+        ``press_lost``, whether the force is too far from it.
 
     Raises:
         InputError: If the compliance does not suit the law.
@@ -182,7 +183,7 @@ def _add_press(
     ready: OutputPort,
     end: float,
 ) -> dict[str, OutputPort]:
-    """Return ``press`` and ``pressed_force``, see :class:`Pressing`, if there is a reference."""
+    """Return what :class:`Pressing` gives, if there is a force reference."""
     press, coordinates = scenario.compliance.press, linearization.manifold.coordinates
     if press is None:
         return {}
@@ -198,8 +199,10 @@ def _add_press(
         across.start,
         len(coordinates),
         scenario.controller.sampling_time,
+        press.allowed_difference,
     )
     system = builder.AddNamedSystem("pressing", pressing)
     builder.Connect(force, system.GetInputPort("manifold_force"))
     builder.Connect(ready, system.GetInputPort("ready"))
-    return {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}
+    signals = {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}
+    return signals | {"press_lost": system.GetOutputPort("lost")}

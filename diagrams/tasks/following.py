@@ -196,7 +196,7 @@ def add_law(
             task.motion.domain[1],
             task.length,
         )
-    _connect_alarms(builder, controller, forces, made.pop("compliance_status", None))
+    _connect_alarms(builder, controller, forces, made)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(signals[name], controller.GetInputPort(name))
@@ -246,13 +246,17 @@ def _connect_alarms(
     builder: DiagramBuilder,
     controller: FollowingController,
     forces: dict[str, OutputPort],
-    compliance_status: OutputPort | None,
+    made: dict[str, OutputPort],
 ) -> None:
-    """Let the robot stop for faults of the force sensor and of the compliance, if there are any."""
-    ports = [forces.get("sensor_fault"), forces.get("tared"), compliance_status]
-    if ports == [None] * 3:
+    """Let the robot stop for faults of the force sensor and of the compliance, if there are any.
+
+    What compliance alone tells is taken out of what is made.
+    """
+    ports = [forces.get("sensor_fault"), forces.get("tared")]
+    ports += [made.pop(name, None) for name in ("compliance_status", "press_lost")]
+    if ports == [None] * len(ports):
         return
-    alarms = builder.AddNamedSystem("alarms", Multiplexer([1, 1, 1]))
+    alarms = builder.AddNamedSystem("alarms", Multiplexer([1] * len(ports)))
     for i, port in enumerate(ports):
         if port is None:
             port = builder.AddSystem(ConstantVectorSource([0.0])).get_output_port()

@@ -206,21 +206,18 @@ def _observed_forces(
     compliance, linearization = scenario.compliance, law.linearization
     if compliance.source != "observed" or not compliance.is_given:
         return []
-    n, rate, impedance = robot.dimension, compliance.observed.rate, compliance.impedance()
-    state = np.concatenate([rest.q_J, np.zeros(n), rest.q_J, np.zeros(n)])
-    no_torque = np.zeros(n * (linearization.relative_degree - 1))
-    A = np.array(linearization.function(state, no_torque, rest.point)[1])
+    rate, impedance = compliance.observed.rate, compliance.impedance()
     kinds = [impedance.of(coordinate.kind) for coordinate in linearization.manifold.coordinates]
     bearable = np.array(
         [
             bearable_inertia_error(
-                _least(kind.mass), _least(kind.damping), _most(kind.stiffness), rate
+                least_of(kind.mass), least_of(kind.damping), _most(kind.stiffness), rate
             )
             for kind in kinds
         ]
     )
     inertia = ca.evalf(robot.mass_matrix(ca.SX(rest.q_J))).full()
-    borne = bearable_mass_error(inertia, A, bearable)
+    borne = bearable_mass_error(inertia, slope_at_rest(law, rest), bearable)
     if borne >= _BORNE_ERROR:
         return []
     return [
@@ -230,7 +227,25 @@ def _observed_forces(
     ]
 
 
-def _least(profile: Profile | SlowEnds) -> float:
+def slope_at_rest(law: FollowingLaw, rest: RestPosture) -> np.ndarray:
+    """Return ``A = d yhat / dq`` at the start, shape (m, N).
+
+    Args:
+        law: The law.
+        rest: The start, and the manifold's point there.
+    """
+    n, linearization = law.robot.dimension, law.linearization
+    state = np.concatenate([rest.q_J, np.zeros(n), rest.q_J, np.zeros(n)])
+    no_torque = np.zeros(n * (linearization.relative_degree - 1))
+    return np.array(linearization.function(state, no_torque, rest.point)[1])
+
+
+def least_of(profile: Profile | SlowEnds) -> float:
+    """Return the least value that a profile has.
+
+    Args:
+        profile: The profile.
+    """
     if isinstance(profile, SlowEnds):
         return profile.least
     return min(profile.values, default=profile.value)

@@ -244,6 +244,8 @@ def path_following_metrics(
         metrics.add("max_tangential_force", max_tangential_force(log), "N")
     if "wrench_ext" in log:
         metrics.add("max_external_force", max_external_force(log), "N")
+    if "wrench_ext" in log and "tared" in log:
+        metrics.add("max_unanswered_force", max_unanswered_force(log), "N")
     if "notch_position" in log:
         farthest = max_distance_from_notch_axis(log)
         metrics.add("max_distance_from_notch_axis", farthest, "m")
@@ -283,8 +285,23 @@ def metric_names(num_joints: int, signals: Collection[str]) -> list[str]:
         "saturated_share",
         *given["manifold_force"],
         *given["wrench_ext"],
+        *(["max_unanswered_force"] if {"wrench_ext", "tared"} <= set(signals) else []),
         *given["notch_position"],
     ]
+
+
+def max_unanswered_force(log: RunLog) -> float:
+    """Largest force on the tool while what yields waits for a sensor that is not tared.
+
+    Args:
+        log: With ``wrench_ext`` and ``tared``.
+
+    Returns:
+        N; zero if it was tared all the time.
+    """
+    waiting = log["tared"].values[:, 0] == 0.0
+    forces = np.linalg.norm(log["wrench_ext"].values[waiting, :3], axis=1)
+    return float(forces.max(initial=0.0))
 
 
 def _tared_forces(log: RunLog) -> FloatArray:

@@ -12,7 +12,7 @@ from reporting.metrics import Metric, Metrics
 from reporting.units import format_quantity
 
 # held at every instant, so that also a run that was cut short is judged by them
-_ALWAYS = ("deepest_violation",)
+_ALWAYS = ("deepest_violation", "max_unanswered_force")
 
 
 def set_promises(metrics: Metrics, settings: Scenario) -> None:
@@ -25,6 +25,10 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     if settings.fixtures is not None and "deepest_violation" in metrics:
         bound = f"<= {settings.fixtures.bound:g}"
         metrics.set_target("deepest_violation", bound, "fixtures.bound")
+    if settings.compliance.needs_sensor and "max_unanswered_force" in metrics:
+        # what is less would be taken for a bias
+        bound = f"<= {settings.sensor.taring_spread[:3].max():g}"
+        metrics.set_target("max_unanswered_force", bound, "sensor.taring_spread")
     for name, target in settings.targets.get(settings.controller.law, {}).items():
         # what another choice of the controller would tell has been checked, and is no metric here
         if name in metrics:

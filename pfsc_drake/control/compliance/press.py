@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pfsc_drake.control.law.transition import Transition
 from pfsc_drake.errors import InputError
 
+# of the largest reference, by which the force may differ from it
+_ALLOWED = 1.5
+
 
 @dataclass
 class PressParameters:
@@ -27,6 +30,9 @@ class PressParameters:
             must reach it.
         retreat_time: How long before the end of the reference it is taken off [s].
         ramp: Time of every change, which is C^4 [s].
+        limit: By how much the measured force may differ from its reference, either way, before
+            that is a fault [N]; 0 for one and a half times the largest reference. While the tool
+            moves free it differs by the reference itself.
     """
 
     force: float = 20.0
@@ -36,6 +42,7 @@ class PressParameters:
     touching: float = 3.0
     retreat_time: float = 0.5
     ramp: float = 0.1
+    limit: float = 0.0
 
     def __post_init__(self) -> None:
         for key in ("force", "approach", "retreat", "begin", "retreat_time"):
@@ -45,6 +52,19 @@ class PressParameters:
             reached = 0.0 < self.touching < self.approach
             allowed = f"a positive number below approach = {self.approach:g} N"
             self._require("touching", reached, allowed)
+        wide = self.limit == 0.0 or self._largest < self.limit <= 1e6
+        allowed = f"0, or more than the largest reference of {self._largest:g} N"
+        self._require("limit", wide, allowed)
+
+    @property
+    def _largest(self) -> float:
+        """Largest magnitude of the reference [N]."""
+        return max(self.force, self.approach, self.retreat)
+
+    @property
+    def allowed_difference(self) -> float:
+        """By how much the measured force may differ from its reference [N]."""
+        return self.limit or _ALLOWED * self._largest
 
     def _require(self, key: str, good: bool, allowed: str) -> None:
         if not good:

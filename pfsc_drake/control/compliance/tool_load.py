@@ -18,6 +18,8 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 _INERTIA = ("none", "differentiated", "given")
 _SMALLEST_NORM = 1e-300
+# s, over whose means a sensor is judged to be quiet
+TARING_BLOCK = 0.01
 
 
 class SensorFault(IntEnum):
@@ -166,31 +168,52 @@ def joint_torque_function(robot: RobotModel) -> ca.Function:
 class Taring:
     """The sensor's bias as the mean of a quiet stretch of residuals.
 
-    A *window*, shape (19,), is ``[count, sum (6), lowest (6), highest (6)]``; it starts
-    anew whenever the residual moves too much, so that taring goes on until it is quiet.
+    Quiet is judged by means over blocks of samples. Noise does not matter then, and neither do the
+    strokes of drives that creep against their friction: an arm that holds a load which nobody
+    told it of does so for seconds, at rest but for the last increments of its encoders, and what
+    the tool's inertia is believed to do at every one of them is a spike of a sample or two. What
+    pushes or moves the tool lasts longer than a block.
+
+    A *window*, shape (25,), is ``[count, sum (6), lowest (6), highest (6), block (6)]``: lowest
+    and highest mean of a block, and the sum of the block that is not full. It starts anew, with the
+    last block, whenever the means differ too much, so that taring goes on until it is quiet.
 
     Args:
         samples: Number of samples in a stretch.
-        largest_spread: Largest difference in it, shape (6,) [N, Nm].
+        largest_spread: Largest difference of means in it, shape (6,) [N, Nm].
         largest_bias: Largest mean that is believed, shape (6,) [N, Nm].
+        block: Number of samples in a block; a stretch is made of whole ones.
     """
 
-    def __init__(self, samples: int, largest_spread: np.ndarray, largest_bias: np.ndarray) -> None:
-        self._samples = samples
+    size = 25
+
+    def __init__(
+        self,
+        samples: int,
+        largest_spread: np.ndarray,
+        largest_bias: np.ndarray,
+        block: int = 1,
+    ) -> None:
+        self._block = min(block, samples)
+        self._samples = -(-samples // self._block) * self._block
         self._largest_spread, self._largest_bias = largest_spread, largest_bias
 
     @staticmethod
     def empty() -> np.ndarray:
         """Return the window without samples."""
-        return np.concatenate([np.zeros(7), np.full(6, np.inf), np.full(6, -np.inf)])
+        return np.concatenate([np.zeros(7), np.full(6, np.inf), np.full(6, -np.inf), np.zeros(6)])
 
     def extend(self, window: np.ndarray, residual: np.ndarray) -> np.ndarray:
-        """Return the window with one more residual, or an empty one if that moved too much."""
-        lowest = np.minimum(window[7:13], residual)
-        highest = np.maximum(window[13:], residual)
-        if np.any(highest - lowest > self._largest_spread):
-            return self.empty()
-        return np.concatenate([[window[0] + 1.0], window[1:7] + residual, lowest, highest])
+        """Return the window with one more residual; only its last block if that differs."""
+        count, lowest, highest = window[0] + 1.0, window[7:13], window[13:19]
+        total, block = window[1:7] + residual, window[19:] + residual
+        if count % self._block == 0.0:
+            mean = block / self._block
+            lowest, highest = np.minimum(lowest, mean), np.maximum(highest, mean)
+            if np.any(highest - lowest > self._largest_spread):
+                count, total, lowest, highest = float(self._block), block, mean, mean
+            block = np.zeros(6)
+        return np.concatenate([[count], total, lowest, highest, block])
 
     def bias(self, window: np.ndarray) -> np.ndarray | None:
         """Return the bias, shape (6,), or None as long as the window is not full.
@@ -213,7 +236,8 @@ class ToolCompensationParameters:
             ``none``: only the weight.
         bandwidth: Of the filter for the joints' motion [Hz]; that of the sensor.
         taring_time: Length of the window whose mean becomes the bias [s].
-        taring_spread: Largest difference within the window, shape (6,) [N, Nm].
+        taring_spread: Largest difference of means over 10 ms within the window, shape (6,)
+            [N, Nm].
         taring_bias: Largest bias that is believed, shape (6,) [N, Nm]; a hand that rests
             on the tool, or another tool, must not become a bias.
         force_dead_band: [N].
@@ -223,7 +247,7 @@ class ToolCompensationParameters:
     inertia: str = "differentiated"
     bandwidth: float = 200.0
     taring_time: float = 0.05
-    taring_spread: np.ndarray = field(default_factory=lambda: np.repeat([3.0, 0.1], 3))
+    taring_spread: np.ndarray = field(default_factory=lambda: np.repeat([1.0, 0.05], 3))
     taring_bias: np.ndarray = field(default_factory=lambda: np.repeat([50.0, 2.0], 3))
     force_dead_band: float = 0.0
     torque_dead_band: float = 0.0

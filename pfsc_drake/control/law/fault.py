@@ -20,6 +20,8 @@ class Fault(enum.IntEnum):
     COMPLIANCE_INVALID = 11
     BUS_LOST = 12
     JOINT_SPEED = 13
+    DRIVE_CHATTERS = 14
+    PRESS_FORCE_LOST = 15
 
     @property
     def explanation(self) -> str:
@@ -42,4 +44,6 @@ _EXPLANATIONS = {
     Fault.COMPLIANCE_INVALID: "force, impedance or reference of the compliance is not valid",
     Fault.BUS_LOST: "no reference has come over the bus for too long",
     Fault.JOINT_SPEED: "a joint is faster than its limit",
+    Fault.DRIVE_CHATTERS: "a drive jumps between its limits",
+    Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
 }

@@ -31,6 +31,8 @@ class SupervisionParameters:
             joint makes in that time at its fastest.
         joint_limits: Whether a joint at its limit is a fault.
         saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+        chatter_turns: How many turns from one limit to the other are chatter, see
+            :class:`~pfsc_drake.control.law.chatter.Chatter`; 0 for none.
         overspeed: Share of its largest speed by which a joint may be faster; infinite if no speed
             is a fault.
     """
@@ -40,10 +42,11 @@ class SupervisionParameters:
     filter_time: float = 0.0
     joint_limits: bool = True
     saturation_time: float = 0.0
+    chatter_turns: float = 6.0
     overspeed: float = 0.1
 
     def __post_init__(self) -> None:
-        for key in ("tolerance", "filter_time", "saturation_time"):
+        for key in ("tolerance", "filter_time", "saturation_time", "chatter_turns"):
             value = getattr(self, key)
             if not 0.0 <= value < np.inf:
                 raise InputError(f"{key} = {value}; must be zero or a positive number")

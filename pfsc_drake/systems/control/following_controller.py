@@ -16,6 +16,7 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.control.compliance.tool_load import SensorFault
+from pfsc_drake.control.law.chatter import Chatter
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
@@ -50,10 +51,11 @@ class FollowingController(LeafSystem):
             [Nm or N], shape (N,); zero if not connected, and in the safe state. Only for r > 1.
         posture_reference (input): Derivatives 0..r of the posture reference by rows, shape
             ((r + 1) N,); only of a law for more joints than outputs.
-        alarms (input, optional): What the robot is to stop for, shape (3,): a
+        alarms (input, optional): What the robot is to stop for, shape (4,): a
             :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
-            tared, before which its range does not matter, and an
-            :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`.
+            tared, before which its range does not matter, an
+            :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`, and whether the
+            force with which it presses is lost.
         drive_torque (output): Drive torques within their limits [Nm or N], shape (N,).
             For velocity servos (r = 1) it is called velocity_reference instead [rad/s or
             m/s]; the attribute ``drive_port`` holds the name.
@@ -74,7 +76,7 @@ class FollowingController(LeafSystem):
         the hold, shape (N,); ``joint_state`` of the last tick, shape (4N,); virtual output of
         the last tick, shape (m,); memory of the safe stop, and of the supervision; for how many
         ticks each drive has been at its limit, shape (N,); the reference velocity, if the law
-        tells it.
+        tells it; memory of :class:`Chatter`, shape (2N,).
 
     Args:
         law: The law.
@@ -102,12 +104,15 @@ class FollowingController(LeafSystem):
             effort = law.limits if r > 1 else law.robot.gather("effort_limit")
             self._supervision = Supervision(law.robot, effort, supervision, period)
         watched = self._supervision.size if self._supervision else 0
+        turns = supervision.chatter_turns if supervision is not None else 0
+        self._chatter = Chatter(n, turns or math.inf, period)
         told = self.layout.reference_velocity
-        sizes = [n, 4 * n, m, self._safe_stop.size, watched, n, told.stop - told.start]
+        told_size, chatter = told.stop - told.start, self._chatter.size
+        sizes = [n, 4 * n, m, self._safe_stop.size, watched, n, told_size, chatter]
         widths = np.cumsum([m + 2, *sizes]).tolist()
         parts = [slice(*ends) for ends in itertools.pairwise(widths)]
         self._held, self._last, self._output_before, self._stop, *parts = parts
-        self._watch, self._saturated, self._velocity = parts
+        self._watch, self._saturated, self._velocity, self._turns = parts
         memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state: InputPort = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._manifold_point: InputPort = self.DeclareVectorInputPort(
@@ -122,7 +127,7 @@ class FollowingController(LeafSystem):
             self._reference.ticket(),
             self.discrete_state_ticket(memory),
         }
-        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", 3)
+        self._alarms: InputPort = self.DeclareVectorInputPort("alarms", 4)
         sources.add(self._alarms.ticket())
         self._posture: InputPort | None = None
         if law.posture is not None:
@@ -239,14 +244,18 @@ class FollowingController(LeafSystem):
             ticks = self._supervision.saturated_ticks
             if ticks < math.inf and memory[self._saturated].max() >= ticks:
                 return float(Fault.DRIVE_SATURATED)
+            if self._chatter.chattering(memory[self._turns]).any():
+                return float(Fault.DRIVE_CHATTERS)
         if self._alarms.HasValue(context):
-            sensor, tared, compliance = self._alarms.Eval(context).tolist()
+            sensor, tared, compliance, press = self._alarms.Eval(context).tolist()
             if sensor == _LOST:
                 return float(Fault.FORCE_SENSOR_LOST)
             if sensor == _SATURATED and tared:
                 return float(Fault.FORCE_SENSOR_SATURATED)
             if compliance:
                 return float(Fault.COMPLIANCE_INVALID)
+            if press:
+                return float(Fault.PRESS_FORCE_LOST)
         return of_law
 
     def _suspects(self, evaluation: np.ndarray) -> np.ndarray:
@@ -292,6 +301,10 @@ class FollowingController(LeafSystem):
         if saturated or before[self._saturated].any():
             at_limit = np.abs(result[self.layout.drive]) >= self._law.limits
             memory[self._saturated] = np.where(at_limit, before[self._saturated] + 1.0, 0.0)
+        if saturated or before[self._turns].any():
+            memory[self._turns] = self._chatter.advance(
+                before[self._turns], result[self.layout.drive], self._law.limits
+            )
         if self._law.stabilization.has_integral_part and not saturated:
             error = self._law.error(result, self._reference.Eval(context))
             memory[self._integral] += self.period * error

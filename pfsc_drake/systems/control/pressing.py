@@ -12,12 +12,18 @@ class Pressing(LeafSystem):
     It remembers when the tool first met the workpiece: the first tick at which the force along the
     coordinate is measured, tared, and at least ``touching``.
 
+    It watches the force, too: a loop that bounces, a sensor that is late or whose bias jumps, and
+    a workpiece that is not where it was taught show in the difference of what is measured and
+    what is asked for.
+
     Ports:
         manifold_force (input): Forces along the coordinates, shape (m,) [N, Nm].
         ready (input): Whether these are to be trusted, shape (1,): 1 once the sensor is tared.
         press (output): The force with which the tool is to press against the coordinate,
             shape (1,) [N].
         pressed_force (output): The input less ``press`` in its coordinate, shape (m,).
+        lost (output): Whether that is more than is allowed, either way, 1 or 0, shape (1,); 0 until
+            the forces are to be trusted.
 
     Args:
         press: Force over time and time of touch-down [s], which is infinite before -> [N].
@@ -25,6 +31,7 @@ class Pressing(LeafSystem):
         coordinate: Which coordinate it acts along.
         num_outputs: m.
         period: Between looks at the force [s].
+        allowed: Difference of measured force and reference that is allowed [N].
     """
 
     def __init__(
@@ -34,9 +41,11 @@ class Pressing(LeafSystem):
         coordinate: int,
         num_outputs: int,
         period: float,
+        allowed: float = math.inf,
     ) -> None:
         super().__init__()
         self._press, self._touching, self._coordinate = press, touching, coordinate
+        self._allowed = allowed
         self._force = self.DeclareVectorInputPort("manifold_force", num_outputs)
         self._ready = self.DeclareVectorInputPort("ready", 1)
         self.DeclareDiscreteState([math.inf])
@@ -48,6 +57,12 @@ class Pressing(LeafSystem):
             num_outputs,
             self._calc_pressed_force,
             prerequisites_of_calc=reference | {self._force.ticket()},
+        )
+        self.DeclareVectorOutputPort(
+            "lost",
+            1,
+            self._calc_lost,
+            prerequisites_of_calc=reference | {self._force.ticket(), self._ready.ticket()},
         )
 
     def _look(self, context: Context, memory: DiscreteValues) -> None:
@@ -68,3 +83,8 @@ class Pressing(LeafSystem):
         force = self._force.Eval(context).copy()
         force[self._coordinate] -= self._pressed(context)
         output.SetFromVector(force)
+
+    def _calc_lost(self, context: Context, output: BasicVector) -> None:
+        difference = self._force.Eval(context)[self._coordinate] - self._pressed(context)
+        trusted = self._ready.Eval(context)[0] > 0.5
+        output.SetFromVector([float(trusted and abs(difference) > self._allowed)])

@@ -8,6 +8,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.compliance.force_sensing import guarded_compensation
 from pfsc_drake.control.compliance.tool_load import (
+    TARING_BLOCK,
     SensorFault,
     Taring,
     ToolCompensationParameters,
@@ -23,7 +24,8 @@ from pfsc_drake.systems.can_fail import is_tick
 # parts of the output
 _WRENCH, _TARED, _FAULT, _RESIDUAL, _NEXT = slice(0, 6), 6, 7, slice(8, 14), slice(14, None)
 # parts of the state; tared and fault stand where they stand in the output
-_BIAS, _KNOWN, _WINDOW, _FILTER = slice(0, 6), 8, slice(9, 28), slice(28, None)
+_BIAS, _KNOWN, _WINDOW = slice(0, 6), 8, slice(9, 9 + Taring.size)
+_FILTER = slice(_WINDOW.stop, None)
 _MEMORY = {
     "bias": _BIAS,
     "tared": slice(_TARED, _TARED + 1),
@@ -68,7 +70,7 @@ class ToolCompensation(LeafSystem):
 
     State:
         Discrete: bias, shape (6,); tared, fault, whether the filter's state is known, shape
-        (1,) each; taring window, shape (19,); state of the filter of the joints' motion,
+        (1,) each; taring window, shape (25,); state of the filter of the joints' motion,
         see :func:`compensation_function`, shape (2N,) or (3N,).
 
     Args:
@@ -93,7 +95,8 @@ class ToolCompensation(LeafSystem):
         super().__init__()
         n, self._period = robot.dimension, period
         samples = max(1, round(parameters.taring_time / period))
-        self._taring = Taring(samples, parameters.taring_spread, parameters.taring_bias)
+        block = max(1, round(TARING_BLOCK / period))
+        self._taring = Taring(samples, parameters.taring_spread, parameters.taring_bias, block)
         function = compensation_function(
             robot,
             load,

@@ -50,3 +50,12 @@ def test_it_is_smooth(touch_down):
 def test_refused(change, words):
     with pytest.raises(InputError, match=words):
         PressParameters(**change)
+
+
+def test_the_force_may_differ_by_more_than_a_free_motion_makes_it():
+    """Moving free it measures nothing."""
+    assert PressParameters().allowed_difference == 30.0
+    assert PressParameters(force=5.0, approach=8.0).allowed_difference == 12.0
+    assert PressParameters(limit=21.0).allowed_difference == 21.0
+    with pytest.raises(InputError, match=r"limit = 20.0: must be 0, or more than .* of 20 N"):
+        PressParameters(limit=20.0)

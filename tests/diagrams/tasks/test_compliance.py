@@ -150,6 +150,9 @@ def test_a_sensor_in_the_wrong_place(settings, joint, part):
 def test_differentiated_encoders_are_warned_of(settings):
     assert build_station(settings, Path()).warnings == []
     settings.encoders.difference_quotient = True
+    # exact, the difference is none
+    assert build_station(settings, Path()).warnings == []
+    settings.encoders.link_increments = settings.encoders.motor_increments = [50000]
     (warning,) = build_station(settings, Path()).warnings
     assert "tared" in warning
     settings.sensor.inertia = "none"

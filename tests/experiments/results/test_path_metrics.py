@@ -14,6 +14,7 @@ from experiments.results.path_metrics import (
     max_path_deviation_after,
     max_path_deviation_while_moving,
     max_tangential_force,
+    max_unanswered_force,
     metric_names,
     path_distance,
     path_following_metrics,
@@ -143,6 +144,15 @@ def test_forces_count_once_the_sensor_is_tared():
     log.add("tared", np.zeros(4), "1")
     assert math.isnan(max_manifold_force(log))
     assert math.isnan(max_tangential_force(log))
+
+
+def test_forces_before_the_sensor_is_tared_are_answered_by_nobody():
+    log = RunLog(np.arange(3.0))
+    log.add("wrench_ext", [[3, 4, 0, 9, 9, 9], [0, 2, 0, 0, 0, 0], [90, 0, 0, 0, 0, 0]], "N, Nm")
+    log.add("tared", [0, 0, 1], "1")
+    assert max_unanswered_force(log) == 5.0
+    log.add("tared", np.ones(3), "1")
+    assert max_unanswered_force(log) == 0.0
 
 
 def test_external_force():

@@ -29,6 +29,21 @@ def test_a_scenario_may_promise_more_than_every_run_does():
     assert found["deepest_violation"].passed is False
 
 
+def test_a_force_that_nobody_answers_is_a_promise_broken():
+    """What is smaller is what taring may take for a bias."""
+    scenario, found = Scenario(), Metrics()
+    scenario.compliance.transversal.stiffness.value = 2000.0
+    found.add("max_unanswered_force", 60.0, "N")
+    set_promises(found, scenario)
+    (broken,) = broken_promises(found, whole=False)
+    assert broken.startswith("max_unanswered_force = 60")
+    scenario.compliance.source = "observed"
+    free = Metrics()
+    free.add("max_unanswered_force", 60.0, "N")
+    set_promises(free, scenario)
+    assert not broken_promises(free, whole=True)
+
+
 def test_a_run_cut_short_is_judged_by_what_holds_at_every_instant():
     found = metrics(deepest_violation=1.3e-3, max_path_deviation=2e-3, settling_time=math.nan)
     found.set_target("deepest_violation", "<= 0.5e-3")

@@ -12,7 +12,7 @@ from experiments.cli import main
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.reading import read_model
 
-FORCE, APPROACH, DAMPING = 20.0, 6.0, 300.0  # N, N, N s/m, of the scenario
+FORCE, APPROACH, DAMPING = 20.0, 10.0, 500.0  # N, N, N s/m, of the scenario
 
 
 @pytest.fixture(name="out", scope="module")
@@ -83,3 +83,13 @@ def test_position_control_presses_harder_and_takes_no_notice(tmp_path):
     assert "max_force_error" not in metrics
     with h5py.File(tmp_path / "log.h5") as file:
         assert abs(file["xi"][-1, 0]) < 1e-4
+
+
+def test_a_sensor_whose_bias_jumps_ends_the_run(tmp_path, capsys):
+    """It would be pressed on the workpiece by as much more as the sensor reads less."""
+    failure = "simulation.force_sensor_failure={time: 0.3, component: 2, kind: jump, size: -127}"
+    bare = ("--no-figures", "--no-recording", "--duration", "0.4", "--set", failure)
+    assert main(["run", "sfc_polish", "--out", str(tmp_path), *bare]) == 3
+    said = capsys.readouterr().err
+    assert "the force on the workpiece is far from its reference" in said
+    assert "t = 0.300 s" in said

@@ -149,11 +149,12 @@ def test_a_fault_without_measurement_bears_the_weight(bench, arm):
 @pytest.mark.parametrize(
     ("alarms", "fault"),
     [
-        ([0, 1, 0], Fault.NONE),
-        ([SensorFault.NOT_FINITE, 0, 0], Fault.FORCE_SENSOR_LOST),
-        ([SensorFault.SATURATED, 1, 0], Fault.FORCE_SENSOR_SATURATED),
-        ([SensorFault.SATURATED, 0, 0], Fault.NONE),
-        ([0, 1, ImpedanceStatus.FORCE_NOT_FINITE], Fault.COMPLIANCE_INVALID),
+        ([0, 1, 0, 0], Fault.NONE),
+        ([SensorFault.NOT_FINITE, 0, 0, 0], Fault.FORCE_SENSOR_LOST),
+        ([SensorFault.SATURATED, 1, 0, 0], Fault.FORCE_SENSOR_SATURATED),
+        ([SensorFault.SATURATED, 0, 0, 0], Fault.NONE),
+        ([0, 1, ImpedanceStatus.FORCE_NOT_FINITE, 0], Fault.COMPLIANCE_INVALID),
+        ([0, 1, 0, 1], Fault.PRESS_FORCE_LOST),
     ],
 )
 def test_faults_of_others(bench, alarms, fault):
@@ -161,7 +162,7 @@ def test_faults_of_others(bench, alarms, fault):
     bench.system.GetInputPort("alarms").FixValue(bench.context, np.array(alarms, dtype=float))
     assert bench.system.fault(bench.context) == fault
     bench.tick()
-    bench.system.GetInputPort("alarms").FixValue(bench.context, np.zeros(3))
+    bench.system.GetInputPort("alarms").FixValue(bench.context, np.zeros(4))
     assert bench.system.fault(bench.context) == fault
 
 

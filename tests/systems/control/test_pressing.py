@@ -52,3 +52,15 @@ def test_it_keeps_the_time_of_touch_down():
 def test_the_reference_needs_no_force():
     system = Pressing(_force, 3.0, coordinate=0, num_outputs=1, period=1e-3)
     assert not system.HasDirectFeedthrough(0, system.GetOutputPort("press").get_index())
+
+
+@pytest.mark.parametrize(("measured", "lost"), [(-14.9, 0), (-15.1, 1), (24.9, 0), (25.1, 1)])
+def test_a_force_far_from_its_reference_is_lost_either_way(measured, lost):
+    """5 N are asked for; nothing is lost before the sensor is tared."""
+    system = Pressing(lambda time, touch_down: 5.0, 3.0, 1, 2, 1e-3, allowed=20.0)
+    context = system.CreateDefaultContext()
+    system.GetInputPort("manifold_force").FixValue(context, [1e3, measured])
+    ready = system.GetInputPort("ready").FixValue(context, [1.0])
+    assert system.GetOutputPort("lost").Eval(context) == [lost]
+    ready.GetMutableData().set_value(BasicVector([0.0]))
+    assert system.GetOutputPort("lost").Eval(context) == [0.0]

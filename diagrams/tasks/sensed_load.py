@@ -1,0 +1,116 @@
+"""What a load below the force sensor will do to the sensor, and to a compliance that answers."""
+
+import numpy as np
+
+from diagrams.scenario import Scenario
+from diagrams.tasks.law_warnings import least_of, slope_at_rest
+from pfsc_drake.control.compliance.carried_inertia import (
+    bearable_share,
+    carried_share,
+    load_inertia,
+)
+from pfsc_drake.control.compliance.tool_load import TARING_BLOCK, ToolLoad
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.physics.joint_encoders import encoder_resolution
+
+# of the inertia below the sensor at which the loop becomes unstable, up to which it is robust
+_ROBUST = 0.5
+# sampling intervals that a loop over the sensor loses: the hold and the filter of the impedance
+_LOST_TICKS = 1.5
+
+
+def sensed_load_warnings(
+    scenario: Scenario,
+    robot: RobotModel,
+    load: ToolLoad,
+    law: FollowingLaw,
+    rest: RestPosture,
+) -> list[str]:
+    """Return what a load below the sensor will do, one sentence each.
+
+    Args:
+        scenario: The scenario.
+        robot: The robot, as it is believed.
+        load: What is believed to hang below the sensor.
+        law: The law behind the compliance.
+        rest: The start, and the manifold's point there.
+    """
+    if not scenario.compliance.needs_sensor:
+        return []
+    return [
+        *_heavy_load(scenario, robot, load, law, rest),
+        *_noisy_inertia(scenario, robot, load, rest),
+    ]
+
+
+def _heavy_load(
+    scenario: Scenario,
+    robot: RobotModel,
+    load: ToolLoad,
+    law: FollowingLaw,
+    rest: RestPosture,
+) -> list[str]:
+    """Warn of an inertia that is felt and not taken off, too much for the virtual masses."""
+    sensor, coordinates = scenario.sensor, law.linearization.manifold.coordinates
+    impedance = scenario.compliance.impedance()
+    kinds = [impedance.of(coordinate.kind) for coordinate in coordinates]
+    # without a stiffness of its own a coordinate yields, too
+    yields = [bool(kind.stiffness.at) or np.isfinite(kind.stiffness.value) for kind in kinds]
+    masses = np.where(yields, [least_of(kind.mass) for kind in kinds], np.inf)
+    felt = load_inertia(robot, load, rest.q_J, sensor.unknown_mass)
+    mass = load.mass + sensor.unknown_mass
+    if sensor.inertia != "none":
+        felt -= load_inertia(robot, load, rest.q_J)
+        mass = sensor.unknown_mass
+    share, worst = carried_share(felt, slope_at_rest(law, rest), masses)
+    bearable = bearable_share(*_lag(scenario))
+    if share <= _ROBUST * bearable:
+        return []
+    unit = "kg m^2" if coordinates[worst].kind is Kind.ROTATIONAL else "kg"
+    needed = masses[worst] * share / (_ROBUST * bearable)
+    kind = coordinates[worst].kind.value
+    block = {"eta": "tangential", "xi": "transversal", "phi": "rotational"}.get(kind, kind)
+    cure = f"compliance.{block}.mass of {needed:.2g} {unit} or more"
+    if sensor.inertia == "none" and load.mass > sensor.unknown_mass:
+        cure = f"sensor.inertia: differentiated, which takes off the {load.mass:.3g} kg, or {cure}"
+    verb = "chatters" if share > bearable else "may chatter where a little more hangs there"
+    return [
+        f"the sensor feels the inertia of {mass:.3g} kg below it, which is not taken off, and the "
+        f"compliance answers: {share / bearable:.2g} times what the mass of {masses[worst]:g} "
+        f"{unit} in {coordinates[worst].name} bears, and with more than {_ROBUST:g} it {verb}: "
+        f"{cure}"
+    ]
+
+
+def _lag(scenario: Scenario) -> tuple[float, float]:
+    """Return the delay in a loop over the sensor [s], and the bandwidth of its servos [rad/s]."""
+    period, sensor = scenario.controller.sampling_time, scenario.sensor
+    delay = _LOST_TICKS * period + sensor.delay + 1.0 / (2.0 * np.pi * sensor.bandwidth)
+    if scenario.controller.law != "velocity_servo":
+        return delay, np.inf
+    return delay + scenario.servo.bus_delay, scenario.servo.bandwidth
+
+
+def _noisy_inertia(
+    scenario: Scenario, robot: RobotModel, load: ToolLoad, rest: RestPosture
+) -> list[str]:
+    """Warn of encoders too coarse for what the tool's inertia is computed from."""
+    sensor, encoders = scenario.sensor, scenario.encoders
+    if not encoders.difference_quotient or sensor.inertia == "none":
+        return []
+    # one increment within a block changes its mean acceleration by so much
+    link, _ = encoder_resolution(robot, encoders)
+    change = link / (scenario.controller.sampling_time * TARING_BLOCK)
+    levers = np.sqrt(load.mass * np.diag(load_inertia(robot, load, rest.q_J)))
+    noise, allowed = float(np.linalg.norm(levers * change)), float(sensor.taring_spread[:3].min())
+    if noise <= allowed:
+        return []
+    return [
+        "the tool's inertial load comes from the second difference of encoder positions, where "
+        f"one increment is {noise:.2g} N; with more than sensor.taring_spread = {allowed:g} N it "
+        "may never be tared, and what would yield rests: filter the velocities "
+        "(encoders.filter_time) or take sensor.inertia 'none'"
+    ]
