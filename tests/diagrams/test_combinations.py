@@ -91,7 +91,7 @@ def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_bo
     simulator.AdvanceTo(0.06)
     times, log = station.log.read(root)
     lost = times > 0.0505
-    np.testing.assert_array_equal(log["sensor_fault"][:, 0] == SensorFault.NOT_FINITE, lost)
+    np.testing.assert_array_equal(log["sensor_fault"][:, 0] == SensorFault.LOST, lost)
     assert not log["wrench_measured"][lost].any()
     sensor = station.diagram.GetSubsystemByName("force_torque_sensor")
     load = sensor.GetOutputPort("load").Eval(sensor.GetMyContextFromRoot(root))

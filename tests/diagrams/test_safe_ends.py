@@ -152,6 +152,16 @@ def test_a_force_sensor(six_axes, kind):
     check_rest(station, result, times, log)
 
 
+def test_a_component_of_a_force_sensor_that_stands_still(six_axes):
+    failure = six_axes.simulation.force_sensor_failure
+    six_axes.forces = [ForcePulse(begin=0.2, end=9.0, ramp=0.05, frame="world", force=[0, 20, 0])]
+    failure.time, failure.kind, failure.component = 0.45, "frozen", 1
+    station, result, times, log = go_on(six_axes, 1.0)
+    assert result.fault.startswith("the force/torque sensor is lost at eta = ")
+    assert result.fault_time == pytest.approx(0.5, abs=2e-3)
+    check_rest(station, result, times, log)
+
+
 def test_a_sensor_that_is_not_tared_may_be_at_the_end_of_its_range(six_axes):
     six_axes.sensor.measurement_range = np.full(6, 1.0)
     station, result, *_ = go_on(six_axes, 0.2)

@@ -26,7 +26,7 @@ class SensorFault(IntEnum):
     """Why a compensated wrench is not to be trusted."""
 
     NONE = 0
-    NOT_FINITE = 1
+    LOST = 1  # no finite number, or a component that stands still
     SATURATED = 2
 
 

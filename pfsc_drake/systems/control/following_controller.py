@@ -25,7 +25,7 @@ from pfsc_drake.systems.can_fail import is_tick
 from pfsc_drake.systems.optional_input import value_or_none
 
 # attributes of an enumeration are looked up slowly, and numpy's numbers compared slowly with them
-_LOST, _SATURATED = float(SensorFault.NOT_FINITE), float(SensorFault.SATURATED)
+_LOST, _SATURATED = float(SensorFault.LOST), float(SensorFault.SATURATED)
 _NOT_FINITE = float(Fault.INPUT_NOT_FINITE)
 
 

@@ -7,6 +7,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.compliance.force_sensing import guarded_compensation
+from pfsc_drake.control.compliance.still_components import STILL_TIME, memory_size
 from pfsc_drake.control.compliance.tool_load import (
     TARING_BLOCK,
     SensorFault,
@@ -35,7 +36,7 @@ _MEMORY = {
 }
 
 # attributes of an enumeration are looked up slowly
-_NOT_FINITE = float(SensorFault.NOT_FINITE)
+_LOST = float(SensorFault.LOST)
 
 
 class ToolCompensation(LeafSystem):
@@ -52,7 +53,8 @@ class ToolCompensation(LeafSystem):
     The joints' motion goes through the same filter as the sensor's signal, so that load
     and measurement are of the same age.
 
-    A measurement or joint state that is not finite makes the output zero, and a fault
+    A measurement or joint state that is not finite, or a component of the measurement that
+    stands still while others move, makes the output zero, and a fault
     that only :meth:`tare` or a new initialization clears. A saturated sensor is reported
     while it lasts; its output is the clipped one.
 
@@ -71,7 +73,8 @@ class ToolCompensation(LeafSystem):
     State:
         Discrete: bias, shape (6,); tared, fault, whether the filter's state is known, shape
         (1,) each; taring window, shape (25,); state of the filter of the joints' motion,
-        see :func:`compensation_function`, shape (2N,) or (3N,).
+        see :func:`compensation_function`, shape (2N,) or (3N,); what is remembered of the
+        measurement, shape (18,).
 
     Args:
         robot: The robot with the tool.
@@ -105,13 +108,16 @@ class ToolCompensation(LeafSystem):
             (parameters.force_dead_band, parameters.torque_dead_band),
         )
         self._num_samples, size = function.numel_in("motion"), function.numel_in("state")
+        size += memory_size(6)
         blank = np.zeros(_FILTER.start + size)
         blank[_WINDOW] = self._taring.empty()
         self.DeclareDiscreteState(blank)
         # the function reads the state where one copy puts it
         self._memory = blank.copy()
         step = BoundFunction(
-            guarded_compensation(function, np.asarray(measurement_range)),
+            guarded_compensation(
+                function, np.asarray(measurement_range), max(10, round(STILL_TIME / period))
+            ),
             **{name: self._memory[part] for name, part in _MEMORY.items()},
         )
         self._evaluate, self._result = step.evaluate, step.results["result"]
@@ -157,6 +163,7 @@ class ToolCompensation(LeafSystem):
         memory = context.get_mutable_discrete_state_vector().get_mutable_value()
         memory[_TARED], memory[_FAULT], memory[_KNOWN] = 0.0, SensorFault.NONE, 0.0
         memory[_WINDOW] = self._taring.empty()
+        memory[-memory_size(6) :] = 0.0
 
     def bias(self, context: Context) -> np.ndarray:
         """Return the bias in use, in the sensor frame, shape (6,) [N, Nm]."""
@@ -178,8 +185,8 @@ class ToolCompensation(LeafSystem):
     def _update(self, context: Context, state: DiscreteValues) -> None:
         result = self._output.Eval(context)
         memory = state.get_mutable_value()
-        if result[_FAULT] == _NOT_FINITE:
-            memory[_FAULT] = _NOT_FINITE
+        if result[_FAULT] == _LOST:
+            memory[_FAULT] = _LOST
             return
         memory[_FILTER] = result[_NEXT]
         memory[_KNOWN] = 1.0

@@ -12,6 +12,7 @@ from pfsc_drake.physics.transducer import transducer_function
 
 RANGE = np.array([10.0, 20.0, 30.0, 1.0, 2.0, 3.0])
 BIAS = np.array([0.5, -0.5, 0.0, 0.1, 0.0, -0.1])
+STILL = 20  # samples
 
 
 @pytest.fixture(name="transducer")
@@ -81,13 +82,14 @@ def compensation():
 
 
 @pytest.mark.parametrize("tared", [0.0, 1.0])
-@pytest.mark.parametrize("latched", [SensorFault.NONE, SensorFault.NOT_FINITE])
+@pytest.mark.parametrize("latched", [SensorFault.NONE, SensorFault.LOST])
 @pytest.mark.parametrize("case", ["good", "saturated", "negative", "lost motion", "lost sensor"])
 def test_guard(tared, latched, case):
-    function = BoundFunction(guarded_compensation(compensation(), RANGE))
+    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL))
     x, rng = function.arguments, np.random.default_rng(3)
-    for name in ("motion", "measured", "bias", "state"):
+    for name in ("motion", "measured", "bias"):
         x[name][:] = rng.uniform(-0.9, 0.9, 6)
+    x["state"][:6] = rng.uniform(-0.9, 0.9, 6)
     x["known"][:], x["tared"][:], x["fault"][:] = 1.0, tared, latched
     if case == "saturated":
         x["measured"][1] = RANGE[1]
@@ -100,14 +102,56 @@ def test_guard(tared, latched, case):
     function.evaluate()
     result = function.results["result"]
     residual = x["measured"] - x["motion"]
-    wrench, after = residual - x["bias"] + x["state"], 2.0 * x["motion"]
+    wrench = residual - x["bias"] + x["state"][:6]
+    after = np.concatenate([2.0 * x["motion"], x["measured"], np.zeros(6), np.ones(6)])
     fault = SensorFault.SATURATED if case in ("saturated", "negative") else SensorFault.NONE
     if latched or "lost" in case:
         wrench, residual, after = np.zeros(6), np.zeros(6), x["state"]
-        fault = SensorFault.NOT_FINITE
+        fault = SensorFault.LOST
     if not tared:
         wrench = np.zeros(6)
     np.testing.assert_allclose(result[:6], wrench, rtol=0, atol=1e-15)
     assert (result[6], result[7]) == (tared, fault)
     np.testing.assert_allclose(result[8:14], residual, rtol=0, atol=1e-15)
     np.testing.assert_allclose(result[14:], after, rtol=0, atol=1e-15)
+
+
+def watch(readings):
+    """Return the fault at each reading of a sensor, shape (samples,)."""
+    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL))
+    x, faults = function.arguments, []
+    for reading in readings:
+        x["measured"][:] = reading
+        function.evaluate()
+        result = function.results["result"]
+        x["state"][:], faults = result[14:], [*faults, result[7]]
+    return np.array(faults)
+
+
+@pytest.mark.parametrize("component", range(6))
+def test_a_component_that_stands_still_is_lost(component):
+    readings = np.random.default_rng(component).normal(0.0, 0.1, (120, 6))
+    assert not watch(readings).any()
+    readings[60:, component] = readings[59, component]
+    assert np.flatnonzero(watch(readings))[0] == 59 + STILL
+
+
+def test_what_stands_still_without_being_broken_is_not_lost():
+    rng = np.random.default_rng(1)
+    noise = rng.normal(0.0, 0.1, (400, 6))
+    # a component without noise is always the same
+    without = noise.copy()
+    without[:, 2] = 0.25
+    assert not watch(without).any()
+    # all rest at the same time
+    resting = noise.copy()
+    resting[200:] = resting[199]
+    assert not watch(resting).any()
+    # a sensor with steps as large as its noise, which first moved
+    coarse = noise.copy()
+    coarse[100:] = np.round(coarse[100:] / 0.1) * 0.1
+    assert not watch(coarse).any()
+    # the end of its range, which is said as such
+    clipped = noise.copy()
+    clipped[200:, 3] = RANGE[3]
+    assert set(watch(clipped)[200:]) == {SensorFault.SATURATED}

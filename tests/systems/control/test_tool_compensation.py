@@ -276,7 +276,7 @@ def test_a_sensor_that_fails_gives_zero_and_a_fault_until_it_is_tared_again():
     alone = Alone(measured)
     data = alone.data(0.05)
     assert np.linalg.norm(data[25, :3]) == pytest.approx(30.0)
-    assert np.all(data[30:, 7] == SensorFault.NOT_FINITE)
+    assert np.all(data[30:, 7] == SensorFault.LOST)
     assert not np.any(data[30:, :6])
     assert np.all(np.isfinite(data)) and data[29, 7] == SensorFault.NONE
     alone.system.tare(alone.context)
@@ -291,7 +291,7 @@ def test_a_joint_state_that_is_not_finite_is_a_fault_too():
         return np.where((np.arange(24) == 2) & (t > 0.0205), np.nan, RESTING)
 
     data = Alone(lambda t: np.zeros(6), state=state).data(0.03)
-    assert np.all(data[21:, 7] == SensorFault.NOT_FINITE)
+    assert np.all(data[21:, 7] == SensorFault.LOST)
     assert not np.any(data[21:, :6])
 
 
