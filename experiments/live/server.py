@@ -3,8 +3,10 @@
 import hmac
 import json
 import secrets
+import socket
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -14,6 +16,8 @@ from pfsc_drake.errors import InputError
 
 HOST = "127.0.0.1"
 _LONGEST = 8192  # bytes of a message
+# who still sends when it has its answer is heard out as far, and as long, so that it gets there
+_MOST_READ, _HEARD_OUT = 1 << 20, 0.5  # bytes, s
 _PATIENCE = 10.0  # s, until a connection on which nothing comes is closed
 _POLL = 0.05  # s, in which it notices that it is to stop
 _PAGE = Path(__file__).with_name("page.html")
@@ -159,6 +163,14 @@ def _handler(
             self.close_connection = True
             self._answer(HTTPStatus.FORBIDDEN, text="open the address that the session has printed")
             return True
+
+        def finish(self) -> None:
+            with suppress(OSError, ValueError):
+                self.wfile.flush()
+                self.connection.shutdown(socket.SHUT_WR)
+                self.connection.settimeout(_HEARD_OUT)
+                self.rfile.read(_MOST_READ)
+            super().finish()
 
         def _answer(
             self, status: HTTPStatus, kind: str = "text/plain; charset=utf-8", text: str = ""

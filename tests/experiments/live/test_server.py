@@ -137,6 +137,11 @@ def test_nonsense_gets_an_answer(server, pages, body, said):
     assert post(server, GOOD)[0] == 204
 
 
+def test_a_message_that_is_too_long_gets_an_answer(server):
+    assert post(server, b" " * 500_000)[0] == 413
+    assert post(server, GOOD)[0] == 204
+
+
 @pytest.mark.parametrize(
     ("length", "expected"),
     [("9" * 400, 413), ("9" * 5000, 413), ("8193", 413), ("-1", 411), ("x", 411), ("", 411)],

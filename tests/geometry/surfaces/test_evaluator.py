@@ -275,3 +275,20 @@ def test_beyond_both_centres_of_curvature_no_maximum_is_taken():
     )
     np.testing.assert_allclose(row[6:9], surface.partials(theta, 0)[0], atol=1e-12)
     assert row[4] == pytest.approx(0.75)
+
+
+def test_eta_over_a_far_jump():
+    """The integral of Sigma along the straight line of the parameters, by other quadrature."""
+    surface = CASES["paraboloid"][0]
+    begin, end = np.array([-0.28, -0.2]), np.array([0.25, 0.27])
+    point = _above(surface, end, 0.01)
+    row = SurfaceEvaluator(surface, 2)(point.tolist(), begin.tolist(), (0.1, 0.2))
+    np.testing.assert_allclose(row[:2], end, atol=1e-11)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    places = begin + (nodes[:, None] + 1.0) / 2.0 * (end - begin)
+    _, first, second = np.moveaxis(surface.partials(places, 1), -2, 0)
+    E, F, G = ((a * b).sum(axis=-1) for a, b in ((first, first), (first, second), (second, second)))
+    d1, d2 = end - begin
+    lengths = [np.sqrt(E) * d1 + F / np.sqrt(E) * d2, np.sqrt(G - F**2 / E) * d2]
+    expected = [0.1, 0.2] + np.array(lengths) @ weights / 2.0
+    np.testing.assert_allclose(row[2:4], expected, atol=1e-6)
