@@ -180,3 +180,23 @@ def test_of_two_plates_the_one_that_is_pressed_is_taken():
 def test_wrong_numbers_are_refused(changes, part):
     with pytest.raises(InputError, match=part):
         SuctionParameters(**changes)
+
+
+def test_a_quaternion_of_any_length_is_an_orientation():
+    """An integrator does not keep its length."""
+    state, plate_state, _, _ = held_and_moved()
+    longer = plate_state.copy()
+    longer[:4] *= 1.3
+    for one, other in zip(
+        evaluate(state, tool(), plate_state), evaluate(state, tool(), longer), strict=True
+    ):
+        np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("beside", [[0.06, 0.0], [0.0, 0.06]])
+def test_only_cups_over_the_plate_touch_it(beside):
+    """The plate is longer than wide: two cups of four are beyond its end, or beyond its side."""
+    depth, state = 3e-4, pressed(3e-4, beside)
+    wrench, _, _ = evaluate(free_cups(4), tool(), state, OFF)
+    expected = -2.0 * CUPS.stiffness * depth * DOWN.as_matrix()[:, 2]
+    np.testing.assert_allclose(wrench[:3], expected, atol=1e-9)
