@@ -1,11 +1,14 @@
 """Pieces of boundaries: their bounds hold, and the search misses no foot."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from pfsc_drake.geometry import interpolate, surface_through_grid, torus
 from pfsc_drake.geometry.regions import profile, surface_region
+from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
 
 
@@ -32,7 +35,15 @@ def _within(edges, count):
     return edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, count)
 
 
-@pytest.mark.parametrize("surface", [torus(0.3, 0.1), _rough(3, 0.02)], ids=["torus", "rough"])
+def _saddle():
+    """Z = x y: its second derivatives along the parameters are zero, it only twists."""
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.3, 0.3, 7), indexing="ij")
+    return surface_through_grid(np.stack([x, y, x * y], axis=-1), smoothness=2)
+
+
+@pytest.mark.parametrize(
+    "surface", [torus(0.3, 0.1), _rough(3, 0.02), _saddle()], ids=["torus", "rough", "saddle"]
+)
 def test_pieces_of_a_surface_are_within_their_bounds(surface):
     edges = surface_region._edges(surface)
     first, second = (_within(values, 6) for values in edges)
@@ -50,6 +61,37 @@ def test_pieces_of_a_profile_are_within_their_bounds():
     edges = profile._edges(curve)
     points = curve.derivatives(_within(edges, 20), 0)[:, None, :, 0]
     _assert_bounded(profile._pieces(curve, edges), points)
+
+
+class _PlaceFoot(NamedTuple):
+    distance: float
+    piece: tuple[int, int] | None
+    below: bool = False
+
+
+@pytest.mark.parametrize("bulging", range(32))
+def test_a_piece_may_bulge_far_from_its_disc(bulging):
+    """32 points in a row, one of which belongs to a piece whose sag is half of their distance.
+
+    The place beside the query is on that piece, however far its centre is.
+    """
+    count = 32
+    centre = np.zeros((count, 1, 3))
+    centre[:, 0, 0] = np.arange(count)
+    normal = np.tile([0.0, 0.0, 1.0], (count, 1, 1))
+    sag = np.zeros((count, 1))
+    sag[bulging] = 3.0
+    pieces = Pieces(
+        centre, normal, np.zeros((count, 1)), sag, np.zeros((2, count, 1)), (False,) * 2
+    )
+    places = centre[:, 0].copy()
+    places[bulging, 2] = 3.0
+
+    def project(x, y, z, row, column):
+        return _PlaceFoot(float(np.linalg.norm(places[row] - (x, y, z))), None)
+
+    query = (float(bulging), 0.0, 2.9)
+    assert NearestFoot(pieces, project)(*query).distance == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(("seed", "height"), [(0, 0.01), (1, 0.04)])
