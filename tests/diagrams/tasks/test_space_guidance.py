@@ -7,6 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
+from diagrams.scenario.region import RegionParameters, Shift, Swinging
+from diagrams.scenario.surface_shapes import Plane
+from diagrams.tasks.guidance import make_guidance
 from diagrams.tasks.make import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_file
@@ -34,3 +37,29 @@ def test_regions_need_a_tool_that_is_led(scenario):
     scenario.controller.manifold = "path"
     with pytest.raises(InputError, match=r"fixtures.regions = 2 given; .* = path; only a tool led"):
         make_task(scenario, SCENARIOS)
+
+
+def test_distances_are_those_of_the_time_and_speeds_those_near_the_start(scenario):
+    """A floor that swings, along its normal and about an axis 0.3 m beside the start."""
+    plane = scenario.fixtures.regions[0]
+    plane.motion = Shift([0, 0, 1], Swinging(amplitude=0.01, frequency=0.5, begin=0.0, ramp=0.01))
+    task = make_task(scenario, SCENARIOS)
+    clock = np.array([1.5, 2.0, 2.5])
+    places = np.tile([0.9, 0.0, 0.83], (3, 1))
+    expected = 0.03 - 0.01 * np.sin(np.pi * clock)
+    np.testing.assert_allclose(task.distances(places, clock)[:, 0], expected, atol=1e-12)
+    assert task.region_speeds[0] >= 0.01 * np.pi
+    assert task.region_speeds[1] == 0.0
+
+
+@pytest.mark.parametrize("looks", [0, 2])
+def test_as_many_distances_are_computed_as_the_scenario_has_it(scenario, looks):
+    """Five floors under the tool, all of them due at every tick."""
+    scenario.fixtures.regions = [
+        RegionParameters(shape=Plane(origin=[0.95, 0.0, 0.8 - 1e-4 * i])) for i in range(5)
+    ]
+    scenario.fixtures.looks = looks
+    x, y, z = scenario.start.position = [0.95, 0.0, 0.801]
+    guidance = make_guidance(scenario, make_task(scenario, SCENARIOS))
+    step = guidance.step(guidance.start((x, y, z)), (x, y, z), (0, 0, 0), (0.0, 0.0, 0.0))
+    assert len(step.evaluated) == (looks or 5)

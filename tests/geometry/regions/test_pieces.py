@@ -69,29 +69,48 @@ class _PlaceFoot(NamedTuple):
     below: bool = False
 
 
-@pytest.mark.parametrize("bulging", range(32))
+@pytest.mark.parametrize("bulging", range(0, 32, 3))
 def test_a_piece_may_bulge_far_from_its_disc(bulging):
-    """32 points in a row, one of which belongs to a piece whose sag is half of their distance.
-
-    The place beside the query is on that piece, however far its centre is.
-    """
+    """32 pieces in a row, a metre apart; one reaches 16 m to a place beside another's middle."""
     count = 32
-    centre = np.zeros((count, 1, 3))
+    centre, normal = np.zeros((count, 1, 3)), np.tile([0.0, 0.0, 1.0], (count, 1, 1))
     centre[:, 0, 0] = np.arange(count)
-    normal = np.tile([0.0, 0.0, 1.0], (count, 1, 1))
-    sag = np.zeros((count, 1))
-    sag[bulging] = 3.0
-    pieces = Pieces(
-        centre, normal, np.zeros((count, 1)), sag, np.zeros((2, count, 1)), (False,) * 2
-    )
     places = centre[:, 0].copy()
-    places[bulging, 2] = 3.0
+    places[bulging] = ((bulging + 16) % count, 0.0, 0.03)
+    sag = np.zeros((count, 1))
+    sag[bulging] = 16.1
+    radius, bends = np.zeros((count, 1)), np.zeros((2, count, 1))
 
     def project(x, y, z, row, column):
         return _PlaceFoot(float(np.linalg.norm(places[row] - (x, y, z))), None)
 
-    query = (float(bulging), 0.0, 2.9)
-    assert NearestFoot(pieces, project)(*query).distance == pytest.approx(0.1)
+    nearest = NearestFoot(Pieces(centre, normal, radius, sag, bends, (False, False)), project)
+    x, y, z = places[bulging] - [0.0, 0.0, 0.01]
+    assert nearest(x, y, z).distance == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("below", [False, True])
+def test_a_foot_hides_its_neighbours_only_where_the_boundary_bends_away(below):
+    """A trough from above: from beyond its centres of curvature another foot may be beside one.
+
+    From below, where it bends away, there is none, and none is looked for.
+    """
+    count = 32
+    centre, normal = np.zeros((count, 1, 3)), np.tile([0.0, 0.0, 1.0], (count, 1, 1))
+    centre[:, 0, 0] = 0.1 * np.arange(count)
+    bends = np.stack([np.full((count, 1), 2.0), np.full((count, 1), -2.0)])
+    radius, sag = np.full((count, 1), 0.05), np.full((count, 1), 2.0)
+    tried = []
+
+    def project(x, y, z, row, column):
+        tried.append(row)
+        return _PlaceFoot(0.5 if row == 11 and not below else 1.0, (row, 0), below)
+
+    nearest = NearestFoot(Pieces(centre, normal, radius, sag, bends, (False, False)), project)
+    foot = nearest(1.02, 0.0, -1.0 if below else 1.0)
+    assert tried[0] == 10
+    assert foot.distance == (1.0 if below else 0.5)
+    assert not below or not {8, 9, 11, 12} & set(tried)
 
 
 @pytest.mark.parametrize(("seed", "height"), [(0, 0.01), (1, 0.04)])
