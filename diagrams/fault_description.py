@@ -1,5 +1,6 @@
 """Why a station stopped, and where: from what its log knows of that instant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -96,7 +97,7 @@ def describe(fault: Fault, scene: FaultScene) -> str:
         fault: The fault.
         scene: Where it happened.
     """
-    descriptions = {
+    descriptions: dict[Fault, Callable[[FaultScene], str]] = {
         Fault.INPUT_NOT_FINITE: _not_finite,
         Fault.PROJECTION_FAILED: _projection_failed,
         Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD: _outside,

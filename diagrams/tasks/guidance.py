@@ -94,7 +94,8 @@ def _robot_limits(
         parameters.limits,
         start,
         oriented=place.is_oriented,
-        tool_axis=place.tool_axis,
+        tool_axis=place.tool.tool_axis,
+        yaw_axis=place.tool.yaw_axis,
         fastest=parameters.guidance.largest_speed + max(task.region_speeds, default=0.0),
     )
 

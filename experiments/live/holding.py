@@ -54,8 +54,10 @@ def posture_text(station: Station, q: np.ndarray) -> str:
         station: The station.
         q: Joint coordinates, shape (N,).
     """
-    robot, place = station.part.belief.robot, station.task.place
+    robot, place, tool = station.part.belief.robot, station.task.place, station.task.place.tool
     if not isinstance(robot, SerialChain):
         return _NO_NAME
-    posture = singular_posture(robot, q, oriented=place.is_oriented, tool_axis=place.tool_axis)
+    posture = singular_posture(
+        robot, q, oriented=place.is_oriented, tool_axis=tool.tool_axis, yaw_axis=tool.yaw_axis
+    )
     return _NEAR_SINGULAR.get(singularity_name(robot, q, posture) or "", _NO_NAME)
