@@ -29,7 +29,7 @@ from experiments.results.path_metrics import path_following_metrics
 from experiments.results.plan_metrics import plan_metrics
 from experiments.results.posture_metrics import posture_metrics
 from experiments.results.press_metrics import press_metrics
-from experiments.results.promises import broken_promises, set_promises
+from experiments.results.promises import broken_promises, set_promises, unpromised_distance
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
@@ -223,6 +223,7 @@ def _measure(
         *saturation_warnings(log),
         *_sensor_warnings(log),
         *guidance_warnings(log, settings),
+        *unpromised_distance(metrics, settings.controller.law),
     ]
     broken = broken_promises(metrics, whole=lasted and result.fault is None)
     return _Measured(log, motion, metrics, warnings, result.fault, broken, end)

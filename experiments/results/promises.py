@@ -13,6 +13,10 @@ from reporting.units import format_quantity
 
 # held at every instant, so that also a run that was cut short is judged by them
 _ALWAYS = ("deepest_violation", "max_unanswered_force")
+# how far a tool is from where it should be, the first of them that a run has, and from when on
+# that is worth a word [m]
+_DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
+_WORTH_A_WORD = 1e-3
 
 
 def set_promises(metrics: Metrics, settings: Scenario) -> None:
@@ -47,6 +51,24 @@ def broken_promises(metrics: Metrics, *, whole: bool) -> list[str]:
         _phrase(name, metric)
         for name, metric in metrics.items()
         if metric.passed is False and (whole or name in _ALWAYS)
+    ]
+
+
+def unpromised_distance(metrics: Metrics, law: str) -> list[str]:
+    """Return what there is to say of a tool that was far from where no target wants it nearer.
+
+    Args:
+        metrics: With their targets.
+        law: That moved the tool.
+    """
+    name = next((name for name in _DISTANCES if name in metrics), None)
+    if name is None or metrics[name].target is not None or not metrics[name].value > _WORTH_A_WORD:
+        return []
+    far = format_quantity(metrics[name].value, "m")
+    return [
+        f"the tool was up to {far} from where it should be ({name}), and no target says whether "
+        f"that is too far: with targets: {{{law}: {{{name}: {{bound: '< 1e-3'}}}}}} such a run "
+        "ends with status 3"
     ]
 
 
