@@ -169,8 +169,9 @@ def _joint_speed(scene: FaultScene) -> str:
 
 def _at_limit(fault: Fault, scene: FaultScene) -> str:
     before = scene.before or scene.now
-    drive = np.abs(before.signals["law"][scene.law.layout.drive])
-    axes = map(str, np.flatnonzero(drive >= scene.law.limits * (1.0 - 1e-9)) + 1)
+    share = np.abs(before.signals["law"][scene.law.layout.drive]) / scene.law.limits
+    # one that goes from limit to limit may be between them now
+    axes = map(str, np.flatnonzero(share >= min(1.0, float(share.max())) * (1.0 - 1e-9)) + 1)
     return f"{fault.explanation}: {listed(axes)} {_place(scene)}"
 
 

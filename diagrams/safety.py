@@ -3,10 +3,14 @@
 import numpy as np
 
 from diagrams.scenario import ControllerParameters, FaultParameters, Scenario
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.physics.joint_encoders import encoder_resolution
+
+# s; a start beside the path takes a drive to its limit for some hundredths
+_SATURATION_TIME = 0.2
 
 
 def safe_state(
@@ -41,7 +45,15 @@ def supervision(scenario: Scenario, robot: RobotModel) -> SupervisionParameters:
         resolution=np.maximum(*encoder_resolution(robot, encoders)),
         filter_time=encoders.filter_time + late,
         joint_limits=faults.joint_limits,
-        saturation_time=faults.saturation_time,
+        saturation_time=_saturation_time(scenario),
         chatter_turns=faults.chatter_turns,
         overspeed=faults.overspeed,
     )
+
+
+def _saturation_time(scenario: Scenario) -> float:
+    """Return how long a drive may be at its limit [s]; 0 for ever."""
+    given = scenario.faults.saturation_time
+    if given is not None:
+        return given
+    return 0.0 if RELATIVE_DEGREE[scenario.controller.law] == 1 else _SATURATION_TIME

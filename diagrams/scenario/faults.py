@@ -38,7 +38,9 @@ class FaultParameters:
         joint_limits: Whether a joint at its limit is a fault.
         overspeed: Share of its largest speed by which a joint may be faster until it is a fault;
             ``.inf`` if no speed is.
-        saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+        saturation_time: How long a drive may be at its limit [s], half of the time that it is not
+            being taken off; 0 for ever, null for 0.2 s where the law commands torques, and for
+            ever where it commands velocities.
         chatter_turns: How many times a drive may turn from one limit to the other, fewer being
             forgotten with 0.2 s; 0 for any number.
         hold_bandwidth: Of the position hold after a fault [rad/s].
@@ -49,7 +51,7 @@ class FaultParameters:
     plausibility: float = 2e-3
     joint_limits: bool = True
     overspeed: float = 0.1
-    saturation_time: float = 0.0
+    saturation_time: float | None = None
     chatter_turns: float = 6.0
     hold_bandwidth: float = 60.0
     effort_share: float = 0.7
@@ -58,7 +60,8 @@ class FaultParameters:
     def __post_init__(self) -> None:
         require_not_negative("plausibility", self.plausibility)
         require(self.overspeed >= 0.0, "overspeed", self.overspeed, "zero or a positive number")
-        require_not_negative("saturation_time", self.saturation_time)
+        if self.saturation_time is not None:
+            require_not_negative("saturation_time", self.saturation_time)
         require_not_negative("chatter_turns", self.chatter_turns)
         require_positive("hold_bandwidth", self.hold_bandwidth)
         good = 0.0 < self.effort_share <= 1.0

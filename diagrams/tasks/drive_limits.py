@@ -19,12 +19,14 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import largest_speeds
 
-# s, between the samples of a course: while it is checked, and while it is slowed
-_CHECKED, _SLOWED, _FINEST = 4e-3, 1e-3, 2.5e-4
+# s, between the samples of a course: at a glance, while it is checked, and while it is slowed
+_GLANCED, _CHECKED, _SLOWED, _FINEST = 16e-3, 4e-3, 1e-3, 2.5e-4
+# of what may be asked, up to which a glance is enough
+_AT_A_GLANCE = 0.65
 # s, of motions that are planned; and the most samples of one
 _LONGEST, _MOST = 1000.0, 100_000
-# of the smallest radius, the way from sample to sample
-_OF_RADIUS = 1.0 / 12.0
+# of the smallest radius, and of a change of speed, from sample to sample; at a glance a few times
+_OF_RADIUS, _OF_RAMP = 1.0 / 12.0, 1.0 / 6.0
 # s of the asked time, over which a change of pace is smoothed
 _SMOOTHING = 0.04
 # s, between the knots of a slowed reference, and its degree
@@ -81,10 +83,11 @@ def plan_drives(
         return None
     planner = _Planner(scenario, task, law, start, friction)
     try:
-        step, course = planner.course(_CHECKED)
-        fits = planner.fits(course)
-        if not fits:
-            step, course = planner.course(_SLOWED)
+        for longest, share in ((_GLANCED, _AT_A_GLANCE), (_CHECKED, 1.0), (_SLOWED, 1.0)):
+            step, course = planner.course(longest)
+            fits = planner.fits(course, share)
+            if fits:
+                break
         demand = planner.demand.of(course)
     except InputError as error:
         return _unknown(task, planner, str(error))
@@ -143,7 +146,8 @@ class _Planner:
         asked = task.motion.derivatives(times, order)
         reference = np.zeros((len(times), order + 1, len(task.place.coordinates)))
         reference[:, :, : asked.shape[2]] = asked
-        course = self._finder.find(self._start, reference, times)
+        still = longest > _CHECKED
+        course = self._finder.find(self._start, reference, times, still=still)
         while course.shape[1] <= self.demand.derivatives:
             further = np.gradient(course[:, -1:], times[1], axis=0)
             course = np.concatenate([course, further], axis=1)
@@ -151,11 +155,16 @@ class _Planner:
 
     def _step(self, longest: float) -> float:
         """Return how far samples may be apart [s]: narrow bends need more of them."""
+        reference, glance = self._scenario.reference, longest > _CHECKED
+        coarser = 1.0 / (3.0 * _OF_RADIUS) if glance else 1.0
         radius = getattr(self._task.shape, "smallest_radius", np.inf)
-        fastest = self._scenario.reference.velocity
-        if self._law.posture is not None:  # it moves as fast as a sampled law lets it
+        bend = coarser * _OF_RADIUS * radius / reference.velocity
+        ramp = _OF_RAMP * reference.velocity / reference.acceleration
+        ramp = max(ramp, 2.0 * _SLOWED if glance else _SLOWED)
+        if self._law.posture is not None and not glance:
+            # it moves as fast as a sampled law lets it
             longest = min(longest, self._scenario.controller.sampling_time)
-        step = np.clip(_OF_RADIUS * radius / fastest, min(_FINEST, longest), longest)
+        step = min(max(bend, min(_FINEST, longest)), ramp, longest)
         return max(float(step), self._task.motion.domain[1] / _MOST)
 
     def allowed(self, course: np.ndarray) -> np.ndarray:
@@ -163,9 +172,9 @@ class _Planner:
         at_rest = self.demand.of(with_pace(course, np.zeros((len(course), 4))))
         return allowed_demand(at_rest, self.limits, self._reserve)
 
-    def fits(self, course: np.ndarray) -> bool:
-        """Return whether a course asks for no more than it may."""
-        return bool(np.all(np.abs(self.demand.of(course)) <= self.allowed(course)))
+    def fits(self, course: np.ndarray, share: float) -> bool:
+        """Return whether a course asks for no more than a share of what it may."""
+        return bool(np.all(np.abs(self.demand.of(course)) <= share * self.allowed(course)))
 
     def slowed(self, asked: DrivePlan, course: np.ndarray, step: float) -> DrivePlan:
         """Return a plan that waits where the drives need it."""

@@ -30,7 +30,8 @@ class SupervisionParameters:
         filter_time: By which measured velocities are late [s]; widens it by twice the way that a
             joint makes in that time at its fastest.
         joint_limits: Whether a joint at its limit is a fault.
-        saturation_time: How long a drive may be at its limit [s]; 0 for ever.
+        saturation_time: How long a drive may be at its limit [s], half of the time that it is not
+            being taken off; 0 for ever.
         chatter_turns: How many turns from one limit to the other are chatter, see
             :class:`~pfsc_drake.control.law.chatter.Chatter`; 0 for none.
         overspeed: Share of its largest speed by which a joint may be faster; infinite if no speed
@@ -84,7 +85,7 @@ class Supervision:
 
     Attributes:
         size: Length of the memory, which belongs to the caller; zeros at the start.
-        saturated_ticks: How many ticks in a row a drive may be at its limit, infinite for ever.
+        saturated_ticks: How many ticks a drive may be at its limit, infinite for ever.
 
     Raises:
         InputError: If the resolution fits another number of joints.

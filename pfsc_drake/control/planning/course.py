@@ -70,7 +70,9 @@ class CourseFinder:
         if posture is not None:
             self._wish = BoundFunction(_wish_function(robot, posture, self._order))
 
-    def find(self, start: CourseStart, reference: np.ndarray, times: np.ndarray) -> np.ndarray:
+    def find(
+        self, start: CourseStart, reference: np.ndarray, times: np.ndarray, *, still: bool = False
+    ) -> np.ndarray:
         """Return the joints' coordinates and derivatives 0..r, shape (samples, r + 1, N).
 
         Args:
@@ -78,6 +80,8 @@ class CourseFinder:
             reference: Derivatives 0..r of the virtual output's reference, shape (samples, r + 1,
                 m).
             times: Of the samples [s], shape (samples,).
+            still: Whether joints beyond the outputs only move with them, as little as they can.
+                The posture's own motion needs samples as close as those of the law.
 
         Raises:
             InputError: If a place cannot be found, or is singular.
@@ -89,12 +93,14 @@ class CourseFinder:
         for i, step in enumerate(steps):
             if i == 0 or not _rests(q, reference[i - 1 : i + 1]):
                 q = _advanced(q, step)
-                memory = self._correct(q, q_0, reference[i], memory)
+                if still:
+                    q[1:] = 0.0
+                memory = self._correct(q, None if still else q_0, reference[i], memory)
             course[i] = q
         return course
 
     def _correct(
-        self, q: np.ndarray, q_0: np.ndarray, wanted: np.ndarray, memory: np.ndarray
+        self, q: np.ndarray, q_0: np.ndarray | None, wanted: np.ndarray, memory: np.ndarray
     ) -> np.ndarray:
         """Correct the derivatives in their place, and return the memory of the place found."""
         derivatives = self._output.arguments["derivatives"]
@@ -128,7 +134,7 @@ class CourseFinder:
             spare = Spare(still, scale)
             if k == self._order:
                 q[k] = 0.0
-                if self._wish is not None:
+                if q_0 is not None and self._wish is not None:
                     spare = self._spare(q, q_0, scale)
             derivatives[:] = q.ravel()
             self._output.evaluate()

@@ -27,6 +27,8 @@ from pfsc_drake.systems.optional_input import value_or_none
 # attributes of an enumeration are looked up slowly, and numpy's numbers compared slowly with them
 _LOST, _SATURATED = float(SensorFault.LOST), float(SensorFault.SATURATED)
 _NOT_FINITE = float(Fault.INPUT_NOT_FINITE)
+# ticks at a limit that one tick within the limits makes up for
+_FORGIVEN = 0.5
 
 
 class FollowingController(LeafSystem):
@@ -75,8 +77,8 @@ class FollowingController(LeafSystem):
         the next is known, shape (1,); part of the drive input that is extrapolated over
         the hold, shape (N,); ``joint_state`` of the last tick, shape (4N,); virtual output of
         the last tick, shape (m,); memory of the safe stop, and of the supervision; for how many
-        ticks each drive has been at its limit, shape (N,); the reference velocity, if the law
-        tells it; memory of :class:`Chatter`, shape (2N,).
+        ticks each drive has been at its limit, less half of those since at which it was not, shape
+        (N,); the reference velocity, if the law tells it; memory of :class:`Chatter`, shape (2N,).
 
     Args:
         law: The law.
@@ -258,6 +260,14 @@ class FollowingController(LeafSystem):
                 return float(Fault.PRESS_FORCE_LOST)
         return of_law
 
+    @staticmethod
+    def _counted(before: np.ndarray, at_limit: np.ndarray) -> np.ndarray:
+        """Count ticks at a limit, and down by half a tick at others.
+
+        So drives that go from limit to limit and back are found as well.
+        """
+        return np.where(at_limit, before + 1.0, np.maximum(before - _FORGIVEN, 0.0))
+
     def _suspects(self, evaluation: np.ndarray) -> np.ndarray:
         """Return which measured values are implausible, nonzero if so, shape (4N,)."""
         if self._supervision is None:
@@ -300,7 +310,7 @@ class FollowingController(LeafSystem):
         saturated = result[self.layout.status.stop - 1]
         if saturated or before[self._saturated].any():
             at_limit = np.abs(result[self.layout.drive]) >= self._law.limits
-            memory[self._saturated] = np.where(at_limit, before[self._saturated] + 1.0, 0.0)
+            memory[self._saturated] = self._counted(before[self._saturated], at_limit)
         if saturated or before[self._turns].any():
             memory[self._turns] = self._chatter.advance(
                 before[self._turns], result[self.layout.drive], self._law.limits

@@ -7,6 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
+from diagrams.scenario import GainParameters, LawGains
 from diagrams.tasks.make import make_task
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -113,3 +114,17 @@ def test_other_robots_laws_and_surfaces_wait_too(name, load_exact_scenario):
     assert planned < min(asked, 0.75)
     waited = np.trapezoid(1.0 - plan.pace, plan.times)
     assert plan.waiting_time == pytest.approx(waited) and waited > 0.0
+
+
+def test_velocity_servos_keep_a_reserve_of_speed(settings):
+    """On the same path the joints' speeds, not torques, are what is scarce."""
+    given = settings(velocity=3.0, acceleration=20.0)
+    given.controller.law, given.controller.effort_scale = "velocity_servo", 5.0
+    poles = GainParameters(poles=[-20.0])
+    given.controller.gains = {"velocity_servo": LawGains(eta=poles, xi=poles, phi=poles)}
+    plan = build_station(given, Path()).task.drive_plan
+    asked, planned = (
+        np.max(np.abs(demand[:, 3:]) / plan.limits[3:]) for demand in (plan.asked, plan.demand)
+    )
+    assert asked > 0.75 and 0.5 < planned <= 0.7
+    assert "% of the speed of axis" in plan.said[0]

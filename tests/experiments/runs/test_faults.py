@@ -144,6 +144,7 @@ def test_leaving_the_feasible_neighbourhood_on_the_way(fault):
         f"reference.points=[{top}, 0.2]",
         "start.offset=[0, 0]",
         "controller.effort_scale=0.03",
+        "faults.saturation_time=0",
     )
     np.testing.assert_allclose(log["limits"], [54.0, 54.0, 27.0])
     last_good = np.flatnonzero(log["fault"] == "none")[-1]
@@ -211,6 +212,7 @@ def test_a_tool_that_is_turned_away(fault):
         "controller.friction={}",
         "faults.joint_limits=false",
         "faults.overspeed=.inf",
+        "faults.saturation_time=0",
         "forces=[{begin: 0.1, end: 3.0, ramp: 0.05, torque: [400, 0, 0]}]",
         name="pfc_compliant_6r",
     )

@@ -16,6 +16,7 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
+from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -30,9 +31,9 @@ THETA = 0.6
 class Bench:
     """A controller in a context, its inputs beside the path."""
 
-    def __init__(self, arm, path, law):
+    def __init__(self, arm, path, law, supervision=None):
         self.law = law
-        self.system = FollowingController(law, PERIOD)
+        self.system = FollowingController(law, PERIOD, supervision)
         self.context = self.system.CreateDefaultContext()
         sigma = path.position.derivatives(THETA, 0)[0]
         q = arm.reach(sigma + np.array([0.004, -0.006, 0.005]))
@@ -110,6 +111,33 @@ def test_the_integral_does_not_wind_up_while_a_drive_is_at_its_limit(arm, path, 
     # drives that are free again take it up
     bench.tick(10)
     assert np.abs(bench.output("virtual_input") - before).min() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("cycle", "stops"),
+    [((1, 1, 1, 1), True), ((1, 1, 0, -1, -1, 0), True), ((1, 0, 0), False), ((0, 0), False)],
+)
+def test_drives_at_their_limits_from_one_to_the_other(cycle, stops, arm, path, make_law):
+    """Ticks at either limit count; a third of them, or less, is forgiven."""
+    watched = SupervisionParameters(
+        tolerance=0.0, joint_limits=False, saturation_time=0.02, overspeed=np.inf
+    )
+    bench = Bench(arm, path, make_law(), watched)
+    bench.start()
+    m, faults = 3, []
+    for k in range(120):
+        reference = bench.reference.copy()
+        reference[-m:] = 1e7 * cycle[k % len(cycle)]
+        bench.fix(reference=reference)
+        at_limit = bool(bench.output("status")[2])
+        faults.append(bench.system.fault(bench.context))
+        assert at_limit == (cycle[k % len(cycle)] != 0) or faults[-1]
+        bench.tick()
+    assert (Fault.DRIVE_SATURATED in faults) == stops
+    if stops:
+        # up by one, and down by a half where it is not at its limit
+        rate = np.mean([1.0 if c else -0.5 for c in cycle])
+        assert faults.index(Fault.DRIVE_SATURATED) == pytest.approx(20.0 / rate, abs=3.0)
 
 
 def test_without_integral_part_nothing_accumulates(bench):
