@@ -120,7 +120,7 @@ def test_the_integral_does_not_wind_up_while_a_drive_is_at_its_limit(arm, path, 
 def test_drives_at_their_limits_from_one_to_the_other(cycle, stops, arm, path, make_law):
     """Ticks at either limit count; a third of them, or less, is forgiven."""
     watched = SupervisionParameters(
-        tolerance=0.0, joint_limits=False, saturation_time=0.02, overspeed=np.inf
+        tolerance=0.0, joint_limits=False, saturation_time=0.02, overspeed=np.inf, chatter_turns=0.0
     )
     bench = Bench(arm, path, make_law(), watched)
     bench.start()
