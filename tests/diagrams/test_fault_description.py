@@ -100,6 +100,7 @@ def test_out_of_the_neighbourhood(load_scenario):
     settings.path.shape = Circle(radius=0.05)
     settings.reference.points, settings.start.offset = [0.0, 0.1], [0.0, 0.0]
     settings.forces = [ForcePulse(begin=0.0, end=2.0, ramp=0.01, force=[0.0, -4e3, 0.0])]
+    settings.faults.overspeed = np.inf
     station, root = run(settings, 1.0)
     sentence = station.fault(root)
     now, before = first_instant(station.log, root, "law", station.law.layout.status.start)
