@@ -1,8 +1,8 @@
 """The command line: ``excite`` a robot, ``simulate`` the experiment, ``estimate`` from files.
 
 ``consistent`` writes a model, ``report`` draws the page anew, ``elastic`` tells about elastic
-joints. Exit status: 0 done; 2 the input is wrong, one line on stderr; 4 results could not be
-written; 130 interrupted.
+joints, ``information`` about motions; ``printed`` goes from Tab. C.3 to a model. Exit status: 0
+done; 2 the input is wrong, one line on stderr; 4 results could not be written; 130 interrupted.
 """
 
 import logging
@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from identification.consistency.command import printed_command
 from identification.elastic.command import elastic_command
+from identification.excitation.command import information_command
 from identification.options import (
     Bounds,
     Excitation,
@@ -31,11 +33,15 @@ from identification.options import (
     read_range,
     read_reading,
 )
+from identification.output import check_folder
 from reporting.commands import interruptible, run_app, show_page
 from reporting.fraction import fraction_display
 
 if TYPE_CHECKING:
     from identification.model.subject import Subject
+
+# of an excitation's search, and of an experiment
+MOST_STARTS, MOST_RUNS = 1000, 1000
 
 app = typer.Typer(
     add_completion=False,
@@ -54,7 +60,9 @@ def excite_command(
     harmonics: Annotated[str, typer.Option(help="Of the fundamental frequency.")] = "1,3,5",
     period: Annotated[float, typer.Option(help="Of the motion [s].")] = 10.0,
     periods: Annotated[int, typer.Option(min=1, help="How often it is to be run.")] = 5,
-    starts: Annotated[int, typer.Option(min=1, help="Random motions to start from.")] = 16,
+    starts: Annotated[
+        int, typer.Option(min=1, max=MOST_STARTS, help="Random motions to start from.")
+    ] = 16,
     seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
     limits: Annotated[
         list[str] | None,
@@ -71,13 +79,15 @@ def excite_command(
     """Find a motion that shows all parameters within all limits."""
     from identification.excitation.limits import chosen_limits
     from identification.excitation.search import search
-    from identification.steps import RECORDING, save_excitation
+    from identification.steps import RECORDING, check_duration, save_excitation
 
     with interruptible():
         _quiet()
         console = Console()
+        check_duration(period, periods)
         subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_excitation"
+        check_folder(folder)
         within = chosen_limits(
             subject,
             {
@@ -121,7 +131,7 @@ def simulate_command(
     excitation: Annotated[
         Path | None, typer.Option(help="excitation.yaml. Default: the one that is shipped")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, help="How often.")] = 7,
+    runs: Annotated[int, typer.Option(min=1, max=MOST_RUNS, help="How often.")] = 7,
     seed: Annotated[int, typer.Option(help="Of the first run.")] = 1,
     realistic: Annotated[
         bool,
@@ -138,6 +148,7 @@ def simulate_command(
         console = Console()
         subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_runs"
+        check_folder(folder)
         trajectory = load_excitation(subject, excitation)
         faults = shipped_imperfections(subject.family)
         faults = faults.realistic() if realistic else faults
@@ -182,6 +193,7 @@ def estimate_command(
         console = Console()
         subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_identification"
+        check_folder(folder)
         reading = read_reading(names, units, scales)
         with fraction_display(console, subject.name) as progress:
             findings, other = estimate_files(
@@ -251,6 +263,7 @@ def consistent_command(
         console = Console()
         subject = _load(robot, tool)
         folder = out or Path("out") / f"{subject.name}_model"
+        check_folder(folder)
         findings = stored_findings(subject, identification, None, simulated=False)
         refuse_implausible(findings.estimate)
         if total_mass is None:
@@ -291,6 +304,8 @@ def report_command(
 
 
 app.command("elastic")(elastic_command)
+app.command("printed")(printed_command)
+app.command("information")(information_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

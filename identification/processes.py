@@ -37,7 +37,7 @@ class SideBySide(Protocol):
 
         Args:
             function: Of a module, to be called with ``common`` and each task.
-            common: Sent to every process once.
+            common: Sent with each of them.
             tasks: What to do.
         """
 
@@ -60,16 +60,22 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
         yield lambda function, common, tasks: (function(common, task) for task in tasks)
         return
     with _processes(workers, most) as client:
-        from distributed import as_completed
+        from distributed import KilledWorker, as_completed
 
         def run(
             function: Callable[[Common, Task], Result], common: Common, tasks: Iterable[Task]
         ) -> Iterator[Result]:
-            # of its own name: what is common to two batches is gone with the first one
-            shared = client.scatter(common, broadcast=True, hash=False)
-            futures = [client.submit(function, shared, task, pure=False) for task in tasks]
+            # sent with each task: data that are scattered are gone with the process that has them,
+            # and one that ends meanwhile is waited for for ever
+            futures = [client.submit(function, common, task, pure=False) for task in tasks]
             for future in as_completed(futures, loop=client.loop):
-                yield future.result()
+                try:
+                    yield future.result()
+                except KilledWorker:
+                    raise InputError(
+                        "a process ended in the middle of its work, again and again: killed, "
+                        "crashed, or out of memory; allowed: fewer of them, or less to do"
+                    ) from None
 
         yield run
 

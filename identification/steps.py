@@ -39,6 +39,7 @@ from pfsc_drake.robot.models.files import models_directory
 
 EXCITATION, RUN, RECORDING = "excitation.yaml", "excitation.csv", "excitation.html"
 _RATE = 1000.0  # Hz, of the motion for a robot's controller
+LONGEST_RUN = 3600.0  # s, of an excitation with all its periods
 
 
 def save_excitation(
@@ -68,6 +69,23 @@ def save_excitation(
     return record_excitation(subject, trajectory, folder / RECORDING, cell_of(subject, None))
 
 
+def check_duration(period: float, periods: int) -> None:
+    """Refuse a run that is longer than anybody lets a robot move.
+
+    Args:
+        period: Of the motion [s].
+        periods: How often it is run.
+
+    Raises:
+        InputError: If it is longer than LONGEST_RUN.
+    """
+    if not period * periods <= LONGEST_RUN:
+        raise InputError(
+            f"--periods {periods} of {period:g} s: {period * periods:.4g} s; allowed: a run of up "
+            f"to {LONGEST_RUN:g} s"
+        )
+
+
 def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
     """Return the excitation of a file, or the best one that is shipped with the robot.
 
@@ -76,13 +94,22 @@ def load_excitation(subject: Subject, file: Path | None) -> FourierTrajectory:
     """
     if file is not None:
         return FourierTrajectory.load(file)
-    shipped = models_directory() / subject.family / "excitation_optimal.yaml"
-    if not shipped.is_file():
+    return FourierTrajectory.load(shipped_excitations(subject)[-1])
+
+
+def shipped_excitations(subject: Subject) -> list[Path]:
+    """Return the files of motions that are shipped with a robot, the best one last.
+
+    Raises:
+        InputError: If there is none.
+    """
+    files = sorted((models_directory() / subject.family).glob("excitation*.yaml"))
+    if not files or files[-1].name != "excitation_optimal.yaml":
         raise InputError(
             f"--excitation: none is shipped for {subject.name}; make one with: "
             f"python -m identification excite {subject.name}"
         )
-    return FourierTrajectory.load(shipped)
+    return files
 
 
 @dataclass(frozen=True)

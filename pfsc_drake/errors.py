@@ -17,6 +17,10 @@ class InputError(ValueError):
         super().__init__(shortened(message, MAX_MESSAGE))
 
 
+class WriteError(InputError):
+    """What was asked for is done, but could not be written: a full disk, or a broken one."""
+
+
 def shortened(text: str, length: int = 60) -> str:
     """Returns a text, without its middle if it is longer than ``length`` characters."""
     if len(text) <= length:

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, WriteError
 from reporting.interruption import INTERRUPTED, raised_interruption
 from reporting.terminal import one_line, print_error
 
@@ -36,6 +36,9 @@ def run_app(app: typer.Typer, program: str, arguments: Sequence[str] | None = No
             prog_name=program,
             standalone_mode=False,
         )
+    except WriteError as error:
+        print_error(f"error: {error}")
+        return NOT_WRITTEN
     except InputError as error:
         return fail(str(error))
     except usage_error as error:

@@ -4,21 +4,61 @@ import numpy as np
 
 from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.nearest import ConsistentParameters, Prediction, nearest_consistent
+from identification.consistency.program import PRIOR_WEIGHT
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.analytic_base import analytic_base
 from identification.model.comau_base import load_printed_identification
 from identification.model.regressor import Regressor
-from identification.model.subject import Subject
+from identification.model.subject import Subject, load_subject
 from pfsc_drake.robot.models.files import models_directory
 
 # for how many measurements the motion of Tab. C.2 counts: its torques then are nearer to those of
 # Tab. C.3 by a quarter to a half, for 1 % more of chi squared
 TORQUE_WEIGHT = 100.0
 _RATE = 100.0  # Hz, of the torques
+# bounds that are hardly any [kg], [m], [m], and a prior's weight
+_ANY_MASS, _ANY_EXTENT, _ANYWHERE, _HARDLY_ANY = (0.01, 1e3), 1e-4, 1.0, 1e-6
+
+
+def printed_subject() -> Subject:
+    """Return the robot of Tab. C.3, without tool."""
+    return load_subject(load_printed_identification().name)
+
+
+def chi_squared_of_printed(subject: Subject, parameters: np.ndarray) -> float:
+    """Return chi squared of parameters to Tab. C.3, in units of the printed standard deviations.
+
+    Args:
+        subject: The Comau Racer 1.4 without tool.
+        parameters: All of them, shape (n,).
+    """
+    table = load_printed_identification().base_parameters
+    values = analytic_base(subject).values(parameters)
+    return float(np.sum(((values - table.mean) / table.standard_deviation) ** 2))
+
+
+def least_to_printed(subject: Subject) -> ConsistentParameters:
+    """Return a consistent set with the least chi squared to Tab. C.3 that bodies can have.
+
+    Bounds are so wide that masses and centres of mass are anywhere; it is no robot that anybody
+    would believe, but tells how much of chi squared is due to the table.
+
+    Args:
+        subject: The Comau Racer 1.4 without tool.
+    """
+    bounds = load_bounds(load_printed_identification().name)
+    for link in bounds.links:
+        link.mass[:], link.least_extent = _ANY_MASS, _ANY_EXTENT
+        link.center_of_mass.lower[:], link.center_of_mass.upper[:] = -_ANYWHERE, _ANYWHERE
+    bounds.rotor_inertia.clear()
+    return nearest_to_printed(subject, bounds, 0.0, _HARDLY_ANY)
 
 
 def nearest_to_printed(
-    subject: Subject, bounds: PhysicalBounds | None = None, torque_weight: float = TORQUE_WEIGHT
+    subject: Subject,
+    bounds: PhysicalBounds | None = None,
+    torque_weight: float = TORQUE_WEIGHT,
+    prior_weight: float = PRIOR_WEIGHT,
 ) -> ConsistentParameters:
     """Return the consistent parameters nearest to Tab. C.3.
 
@@ -29,6 +69,7 @@ def nearest_to_printed(
         bounds: What is known of its bodies; by default the shipped assumptions.
         torque_weight: For how many measurements the torques on the motion of Tab. C.2 count, in
             units of the noise of Tab. C.4; 0 for chi squared alone.
+        prior_weight: Weight of the distance from the middle of the bounds beside chi squared.
 
     Raises:
         InputError: If the robot is another one.
@@ -46,5 +87,6 @@ def nearest_to_printed(
         table.mean,
         np.diag(table.standard_deviation**2),
         bounds or load_bounds(printed.name),
+        prior_weight=prior_weight,
         prediction=prediction,
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.elastic.joint_estimate import JointEstimate
-from pfsc_drake.errors import InputError
+from identification.output import write_text
 from reporting.page import Table
 
 COLUMNS = ("joint", "parameter", "value", "standard_deviation", "relative_percent", "unit")
@@ -73,10 +73,7 @@ def write_table(path: str | Path, estimates: Sequence[JointEstimate]) -> None:
         relative = 100.0 * deviation / abs(value) if value else np.inf
         numbers = (f"{value:.6g}", f"{deviation:.3g}", f"{relative:.3g}")
         writer.writerow((joint, name, *numbers, unit))
-    try:
-        Path(path).write_text(text.getvalue(), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; must be writable") from None
+    write_text(Path(path), text.getvalue())
 
 
 def elasticity_block(estimates: Sequence[JointEstimate], source: str) -> dict[str, object]:

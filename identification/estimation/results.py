@@ -37,6 +37,7 @@ from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
 from identification.measurement.units import si_unit
 from identification.model.base import BaseParameters
+from identification.output import write_bytes
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.regular_file import read_regular_file
 
@@ -94,11 +95,7 @@ def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None
             group = file.create_group("repetitions")
             group["base_parameters"] = runs.values
             group["covariance"] = np.array([run.covariance for run in runs.estimates])
-    try:
-        Path(path).write_bytes(content.getvalue())
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "no name of a file"
-        raise InputError(f"{path}: cannot be written: {reason}") from None
+    write_bytes(Path(path), content.getvalue())
 
 
 def load_estimate(path: str | Path) -> StoredIdentification:

@@ -15,6 +15,7 @@ and ``q_motor``, with their units:
 
 import re
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from identification.measurement.columns import RawSignal, Reading, make_record, 
 from identification.measurement.record import SIGNALS, MeasuredRobot, Record
 from identification.measurement.synchronization import check_velocities
 from identification.measurement.units import si_unit
+from identification.output import write_bytes
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers
 from pfsc_drake.geometry.files.regular_file import read_regular_file, unreadable
@@ -89,25 +91,25 @@ def write_record(path: str | Path, record: Record, robot: MeasuredRobot) -> None
         robot: Whose it is.
 
     Raises:
-        InputError: If the suffix is of no known kind, or the file cannot be written.
+        InputError: If the suffix is of no known kind, or there can be no such file.
+        WriteError: If the disk takes no more.
     """
     kind = _kind(path)
     signals = {s: getattr(record, s) for s in SIGNALS if getattr(record, s) is not None}
     units = {s: [si_unit(s, unit) for unit in robot.joint_units] for s in signals}
-    try:
-        if kind == "csv":
-            _write_csv(Path(path), record, signals, units)
-        elif kind == "hdf5":
-            _write_hdf5(Path(path), record, signals, units)
-        else:
-            content: dict[str, Any] = {"t": record.t, **signals}
-            content["units"] = {"t": "s"} | {s: np.array(u, object) for s, u in units.items()}
-            content["joint_names"] = np.array(record.joint_names, object)
-            if record.period is not None:
-                content["period"] = record.period
-            savemat(path, content, oned_as="column")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; must be writable") from None
+    file = BytesIO()  # HDF5 has words of its own for a full disk
+    if kind == "csv":
+        _write_csv(file, record, signals, units)
+    elif kind == "hdf5":
+        _write_hdf5(file, record, signals, units)
+    else:
+        content: dict[str, Any] = {"t": record.t, **signals}
+        content["units"] = {"t": "s"} | {s: np.array(u, object) for s, u in units.items()}
+        content["joint_names"] = np.array(record.joint_names, object)
+        if record.period is not None:
+            content["period"] = record.period
+        savemat(file, content, oned_as="column")
+    write_bytes(Path(path), file.getvalue())
 
 
 def _kind(path: str | Path) -> str:
@@ -215,7 +217,7 @@ def _words(value: Any) -> list[str]:
 
 
 def _write_csv(
-    path: Path, record: Record, signals: dict[str, np.ndarray], units: dict[str, list[str]]
+    file: BytesIO, record: Record, signals: dict[str, np.ndarray], units: dict[str, list[str]]
 ) -> None:
     names = ["t [s]"]
     for signal in signals:
@@ -223,17 +225,17 @@ def _write_csv(
     head = "" if record.period is None else f"# period [s] = {record.period!r}\n"
     rows = np.column_stack([record.t, *signals.values()])
     header = head + ", ".join(names)
-    np.savetxt(path, rows, fmt="%.12g", delimiter=", ", header=header, comments="")
+    np.savetxt(file, rows, fmt="%.12g", delimiter=", ", header=header, comments="")
 
 
 def _write_hdf5(
-    path: Path, record: Record, signals: dict[str, np.ndarray], units: dict[str, list[str]]
+    file: BytesIO, record: Record, signals: dict[str, np.ndarray], units: dict[str, list[str]]
 ) -> None:
-    with h5py.File(path, "w") as file:
-        file.create_dataset("t", data=record.t).attrs["unit"] = "s"
+    with h5py.File(file, "w") as content:
+        content.create_dataset("t", data=record.t).attrs["unit"] = "s"
         for signal, values in signals.items():
-            dataset = file.create_dataset(signal, data=values)
+            dataset = content.create_dataset(signal, data=values)
             dataset.attrs["unit"] = units[signal]
             dataset.attrs["labels"] = list(record.joint_names)
         if record.period is not None:
-            file.attrs["period"] = record.period
+            content.attrs["period"] = record.period

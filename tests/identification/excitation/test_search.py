@@ -1,6 +1,10 @@
 """Searches for excitations of small robots, and what cannot be searched for."""
 
+import os
+import signal
+
 import numpy as np
+import psutil
 import pytest
 
 from identification.excitation.cell import Cell, Obstacle
@@ -162,7 +166,20 @@ def add(common, task):
     return common + task
 
 
-def test_processes():
+def add_at_last(common, task):
+    """End the process that is first to come here."""
+    first = common / "first"
+    if not first.exists():
+        first.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task
+
+
+def test_processes(tmp_path):
+    """They are replaced where they are killed: with nothing to do, and in the middle of work."""
     with side_by_side(2, 3) as run:
+        idle = psutil.Process().children(recursive=True)
+        next(process for process in idle if "spawn_main" in " ".join(process.cmdline())).kill()
         assert sorted(run(add, 10, [1, 2, 3])) == [11, 12, 13]
         assert list(run(add, 20, [1])) == [21]
+        assert sorted(run(add_at_last, tmp_path, [1, 2, 3])) == [1, 2, 3]
