@@ -57,3 +57,23 @@ def test_of_a_closed_chain():
     tau_ext = np.array(ca.DM(robot.jacobian(ca.SX(q)))).T @ push
     told = np.array(function(state)[1]).ravel() + force + model.known_weight * tau_ext
     np.testing.assert_allclose(derivative(function, state, rates), told, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("momentum", [drive_momentum, link_momentum])
+def test_old_velocities_take_back_the_positions_of_links_and_motors(drake_arm, momentum):
+    """The springs turn between the two ages, by ``delay (v_M - v_J)``."""
+    arm, delay = drake_arm("elastic"), 2e-3
+    model, state = momentum(arm.chain), arm.state()
+    q_J, v_J, q_M, v_M = np.split(state, 4)
+    assert np.abs(v_M - v_J).min() > 1e-3
+    then = np.concatenate([q_J - delay * v_J, v_J, q_M - delay * v_M, v_M])
+    expected = [np.array(part).ravel() for part in model.function()(then)]
+    late = model.with_delay(delay)
+    found = [np.array(part).ravel() for part in late.function()(state)]
+    assert late.delay == delay
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-13)
+    np.testing.assert_allclose(found[1], expected[1], rtol=1e-11, atol=1e-9)
+    if momentum is drive_momentum:
+        now = np.array(model.function()(state)[1]).ravel()
+        springs = arm.chain.K_s * delay * (v_M - v_J)
+        np.testing.assert_allclose(found[1] - now, springs, rtol=1e-9)

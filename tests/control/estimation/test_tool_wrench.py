@@ -60,3 +60,11 @@ def test_refused(load_robot):
     four = type(chain)(chain.links[:4])
     with pytest.raises(InputError, match="torques in 4 joints"):
         tool_wrench_function(four)
+
+
+def test_force_and_torque_have_dead_bands_of_their_own(load_robot):
+    function = tool_wrench_function(load_robot("comau_racer_1_4").chain, dead_bands=(10.0, 0.5))
+    found = np.array(function(Q, torques(load_robot("comau_racer_1_4"), Q, WRENCH))).ravel()
+    for part, width in ((slice(0, 3), 10.0), (slice(3, 6), 0.5)):
+        size = np.linalg.norm(WRENCH[part])
+        np.testing.assert_allclose(found[part], WRENCH[part] * (size - width) / size, atol=1e-9)

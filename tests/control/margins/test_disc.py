@@ -100,3 +100,18 @@ def test_an_unstable_loop_has_no_margin():
     unstable = first_order(-0.4)
     assert disc_margins(BrokenLoop(unstable, np.array([1]), T)) == [NO_MARGIN]
     assert common_disc_margin(BrokenLoop(unstable, np.array([1]), T)) == NO_MARGIN
+
+
+def test_a_resonance_between_two_frequencies_of_the_grid_is_seen():
+    """A mode with a damping ratio of 1e-7 is far narrower than the grid's steps."""
+    angle, damping, gain = 0.31415, 1e-7, -2e-8
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    A, B, K = np.exp(-damping * angle) * turn, np.array([[0.0], [1.0]]), np.array([[0.0, gain]])
+    loop = BrokenLoop(np.block([[A, B], [-K @ A, -K @ B]]), np.array([2]), T)
+    margin = disc_margins(loop)[0]
+    near = angle / T * (1.0 + np.linspace(-30.0 * damping, 30.0 * damping, 4001))
+    narrow = 2.0 / np.abs(loop(near)[:, 0, 0]).max()
+    apart = loop.frequencies[np.abs(loop.frequencies - angle / T) > 1e-3]
+    # the resonance is what limits, and no other frequency tells
+    assert narrow < 0.9 * 2.0 / np.abs(loop(apart)[:, 0, 0]).max()
+    assert margin.alpha == pytest.approx(narrow, rel=2e-2)

@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import JointFrictionParameters
+from diagrams.tasks.friction import velocity_delay
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import FrictionDrift
@@ -168,3 +169,13 @@ def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
         assert "friction_estimate" not in station.log.rows
         said = any("controller.friction is not used" in line for line in station.warnings)
         assert said == (source != "none" or watched)
+
+
+def test_a_difference_quotient_is_the_velocity_half_an_interval_ago(load_scenario):
+    settings = load_scenario("pfc_elastic_3r")
+    assert velocity_delay(settings) == 0.0
+    settings.encoders.difference_quotient = True
+    T, t, delay = settings.controller.sampling_time, 0.7, velocity_delay(settings)
+    # exactly so of a motion with constant acceleration
+    q = [3.0 * time**2 - time for time in (t, t - T)]
+    assert (q[0] - q[1]) / T == pytest.approx(6.0 * (t - delay) - 1.0, rel=1e-9)

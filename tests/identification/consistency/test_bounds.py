@@ -128,3 +128,11 @@ def test_unknown_robots(delta, panda):
         bounds_from_geometry(panda, (1.0, 2.0), 0.0)
     with pytest.raises(InputError, match=r"total_mass = .* both positive"):
         bounds_from_geometry(panda, (3.0, 2.0), 0.1)
+
+
+def test_bounds_from_geometry_share_the_mass(comau):
+    """A link weighs a tenth of an even share at least, and ten of them at most, but no more."""
+    for total in ((50.0, 90.0), (100.0, 100.0)):
+        for link in bounds_from_geometry(comau, total, 0.1).links:
+            np.testing.assert_allclose(link.mass, [total[0] / 60.0, total[1]], rtol=1e-12)
+            assert link.least_extent == pytest.approx(0.01)

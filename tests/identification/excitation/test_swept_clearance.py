@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from identification.excitation import swept_clearance as swept_clearance_module
 from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.scene import RobotScene
@@ -58,3 +59,23 @@ def test_robot_with_nothing_to_touch(arm, printed):
     motion = FourierTrajectory(np.zeros(3), np.ones((3, 1)), np.ones((3, 1)), 5.0, (1,))
     swept = swept_clearance(arm.chain, scene, motion, 0.02)
     assert (swept.least, swept.guaranteed, swept.pair) == (np.inf, np.inf, "")
+
+
+def test_finds_what_happens_between_instants_of_rest(arm, monkeypatch):
+    """The arm rests at all instants that are looked at first, on either side of the sheet."""
+    monkeypatch.setattr(swept_clearance_module, "_INSTANTS", 2)
+    wall = Obstacle(
+        name="sheet", kind="box", center=np.array([1.6, 0.0, 1.0]), size=np.array([1.6, 1e-4, 4.0])
+    )
+    scene = RobotScene(arm, Cell([wall], self_collision=False))
+    q_0 = arm.position_limits.mean(axis=1)
+    b = np.zeros((3, 1))
+    b[0] = 1.2
+    motion = FourierTrajectory(q_0, np.zeros((3, 1)), b, 2.0 * np.pi, (1,))
+    rest = np.array([0.0, np.pi])
+    assert np.abs(motion.motion(rest)[1]).max() < 1e-12
+    assert scene.clearance(motion.motion(rest)[0]).least > 0.2
+    swept = swept_clearance(arm.chain, scene, motion, 0.02)
+    dense = scene.clearance(motion.motion(np.linspace(0.0, 2.0 * np.pi, 500))[0]).least
+    assert swept.guaranteed <= dense + 1e-9
+    assert swept.least < 0.02 and "sheet" in swept.pair
