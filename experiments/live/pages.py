@@ -96,7 +96,7 @@ class Pages:
     def _take(self, message: Message) -> bool:
         now = self._clock()
         is_new = message.client != self._leader
-        if is_new and message.lead != TAKE and (message.lead == LEAVE or not self._is_free(now)):
+        if is_new and message.lead != TAKE and not self._is_free(now):
             return False
         if is_new or message.lead == LEAVE:
             self._settings.clear()
