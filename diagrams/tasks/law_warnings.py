@@ -6,7 +6,7 @@ import numpy as np
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.gains import sampled_robot
 from diagrams.tasks.posture import warn_unused
-from diagrams.tasks.untold_forces import untold_forces
+from diagrams.tasks.untold_forces import untold_forces, untold_friction
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.compliance.observed_inertia import (
     bearable_inertia_error,
@@ -61,6 +61,7 @@ def law_warnings(
         *(causes or _fragile_gains(parameters, robot, law, rest)),
         *_fast_servo(scenario, robot, link_state),
         *untold_forces(scenario, robot, law, rest),
+        *untold_friction(scenario, law),
         *_observed_forces(scenario, robot, law, rest),
         *_friction_behind_servos(parameters),
         *warn_unused(parameters, law),

@@ -60,6 +60,24 @@ def _tell(sources: str) -> str:
     return f"choose controller.external_torque.source {sources} or 'known'"
 
 
+def untold_friction(scenario: Scenario, law: FollowingLaw) -> list[str]:
+    """Return what friction will do to a tool among hard regions, if the law does not know of it.
+
+    Args:
+        scenario: The scenario.
+        law: Its law.
+    """
+    compensated = scenario.controller.friction.source != "none" or not scenario.friction.is_given
+    led = scenario.controller.manifold == "space" and np.isfinite(_bearable(scenario))
+    if compensated or not led or law.linearization.relative_degree == 1:
+        return []
+    return [
+        f"the law '{scenario.controller.law}' does not compensate friction, and by what it gives "
+        "way to that the tool enters hard regions: choose controller.friction.source 'observer' "
+        "or 'model'"
+    ]
+
+
 def largest_force(scenario: Scenario) -> float:
     """Return the largest force that may act on a scenario's tool from outside [N].
 

@@ -41,6 +41,20 @@ def test_a_law_that_is_told_or_a_servo_or_soft_regions_need_no_word(scenario):
     assert said(scenario) == []
 
 
+def test_friction_that_is_not_compensated_takes_a_tool_into_hard_regions(scenario):
+    """1.3 mm untold of the hand, 0.85 mm told; servos and soft regions need no word."""
+
+    def friction():
+        return [x for x in build_station(scenario, SCENARIOS).warnings if "compensate fric" in x]
+
+    assert friction() == []
+    scenario.friction.file = "comau_racer_1_4"
+    (line,) = friction()
+    assert "controller.friction.source 'observer'" in line
+    scenario.controller.friction.source = "observer"
+    assert friction() == []
+
+
 def test_pulses_that_overlap_add_up_and_those_on_links_do_not_count():
     scenario = Scenario(
         forces=[
