@@ -157,6 +157,12 @@ class Arm(RobotPart):
             forces: One system or more with the ports ``applied_spatial_force`` and ``tau_ext``.
         """
 
+    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
+        """See :class:`RobotPart`."""
+        belief, source = believe_arm(self.true, scenario, folder)
+        if scenario.needs_sensor:
+            belief.tool_load(source.tool_load(scenario.sensor.joint))
+
     def believed_load(self, joint: str) -> ToolLoad:
         """See :class:`RobotPart`."""
         return self.belief.tool_load(self.believed.tool_load(joint))

@@ -13,6 +13,7 @@ from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters, Scenario
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
@@ -44,11 +45,14 @@ class ArmModel:
         """Return the joint with the force/torque sensor in it.
 
         Args:
-            name: Its name.
+            name: Its name; empty for the first fixed joint behind the last moving link, on the way
+                to the tool frame.
 
         Raises:
-            InputError: If there is none of that name.
+            InputError: If there is none of that name, or none at all.
         """
+        if not name:
+            return self._flange()
         if not self.plant.HasJointNamed(name):
             joints = [self.plant.get_joint(i).name() for i in self.plant.GetJointIndices()]
             raise InputError(
@@ -56,14 +60,30 @@ class ArmModel:
             )
         return self.plant.GetJointByName(name)
 
+    def _flange(self) -> Joint:
+        """Return the joint that fixes what is not the last link's own to it."""
+        link = link_frames(self.plant, self.coordinates)[-1].body()
+        inboard = inboard_joints(self.plant)
+        body, flange = self.tool.body(), None
+        while body.index() != link.index():
+            flange = inboard[body.index()]
+            body = flange.parent_body()
+        if flange is None:
+            raise InputError(
+                f"sensor.joint: the tool frame '{self.tool.name()}' belongs to the last moving "
+                f"link, '{link.name()}'; allowed: a tool frame on a link that is fixed to it, so "
+                "that there is a joint for the sensor"
+            )
+        return flange
+
     def tool_load(self, joint: str) -> ToolLoad:
         """Return everything behind a sensor.
 
         Args:
-            joint: Name of the joint with the sensor in it.
+            joint: Name of the joint with the sensor in it, or empty, see :meth:`sensor_joint`.
 
         Raises:
-            InputError: If there is no such joint, or no tool behind it.
+            InputError: If there is no such joint, or the tool frame is not behind it.
         """
         return tool_load_from_plant(self.plant, self.sensor_joint(joint), self.tool)
 
@@ -72,10 +92,10 @@ class ArmModel:
         body, link = self.tool.body(), link_frames(self.plant, self.coordinates)[-1]
         context = self.plant.CreateDefaultContext()
         if body.index() == link.body().index():
-            return ToolMass(0.0, self.chain.p_LT)
+            return ToolMass(0.0, self.chain.p_LT, body.name())
         center = body.CalcCenterOfMassInBodyFrame(context)
         X_LB = self.plant.CalcRelativeTransform(context, link, body.body_frame())
-        return ToolMass(body.get_mass(context), X_LB @ center)
+        return ToolMass(body.get_mass(context), X_LB @ center, body.name())
 
 
 def read_arm(

@@ -38,14 +38,16 @@ class Belief:
             load: The load without error.
 
         Raises:
-            InputError: If nothing would be left of it.
+            InputError: If less than nothing would be left of it.
         """
         error = self.error
         mass = load.mass * error.mass[-1] + error.tool_mass
-        if not mass > 0.0:
+        if not (mass > 0.0 or error.tool_mass == 0.0):
+            carried = f"more than {-load.mass * error.mass[-1]:g} kg, what the sensor carries"
+            nothing = "0 kg or more; what is behind the sensor has no mass"
             raise InputError(
-                f"model_error.tool_mass = {error.tool_mass:g} kg; allowed: more than "
-                f"{-load.mass * error.mass[-1]:g} kg, what the sensor carries"
+                f"model_error.tool_mass = {error.tool_mass:g} kg; allowed: "
+                f"{carried if load.mass > 0.0 else nothing}"
             )
         return replace(
             load,

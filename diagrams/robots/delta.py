@@ -61,6 +61,10 @@ class DeltaPart(RobotPart):
     robot: DeltaRobot
     belief: Belief
 
+    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
+        """See :class:`RobotPart`."""
+        _believe(self.robot, scenario, folder)
+
     @property
     def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
         """Slides and drives are one."""
@@ -216,13 +220,13 @@ class TouchingDelta(DeltaPart):
             load,
             self.believed_load(joint),
             plant.get_reaction_forces_output_port(),
-            reaction_index(plant, plant.GetJointByName(joint)),
+            reaction_index(plant, plant.GetJointByName(SENSOR_JOINT)),
         )
 
     def _load(self, joint: str) -> ToolLoad:
         """See :class:`DeltaPart`."""
         _require_joint(joint)
-        mount = self.multibody.GetJointByName(joint)
+        mount = self.multibody.GetJointByName(SENSOR_JOINT)
         return tool_load_from_plant(self.multibody, mount, self.tool)
 
     def place(self, context: Context, state: np.ndarray) -> None:
@@ -232,7 +236,7 @@ class TouchingDelta(DeltaPart):
 
 def _require_joint(joint: str) -> None:
     """Refuse another joint for the sensor than that between end-effector and load."""
-    require(joint == SENSOR_JOINT, "sensor.joint", joint, f"{SENSOR_JOINT} on a DELTA robot")
+    require(joint in ("", SENSOR_JOINT), "sensor.joint", joint, f"{SENSOR_JOINT} on a DELTA robot")
 
 
 def is_delta(model: str) -> bool:

@@ -2,12 +2,13 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
 from diagrams.robots.belief import Belief
-from diagrams.scenario import StartParameters
+from diagrams.scenario import Scenario, StartParameters
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
@@ -113,7 +114,7 @@ class RobotPart(ABC):
 
         Args:
             builder: Builder of the diagram.
-            joint: Fixed joint of the model with the sensor in it.
+            joint: Fixed joint of the model with the sensor in it; empty for that at the flange.
             ports: ``true_joint_state``, and ``wrench_ext`` on the tool point, world axes, shape
                 (6,), if anything acts there.
 
@@ -126,10 +127,22 @@ class RobotPart(ABC):
         """Return what is believed to be behind a sensor.
 
         Args:
-            joint: Fixed joint of the model with the sensor in it.
+            joint: Fixed joint of the model with the sensor in it; empty for that at the flange.
 
         Raises:
             InputError: See :meth:`sensor_mount`.
+        """
+
+    @abstractmethod
+    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
+        """Refuse what no controller could believe of this robot; nothing is built.
+
+        Args:
+            scenario: A scenario for the same robot.
+            folder: Where its relative file names start.
+
+        Raises:
+            InputError: If what is to be believed makes no robot, or no tool.
         """
 
     @abstractmethod

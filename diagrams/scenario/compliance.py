@@ -126,7 +126,8 @@ class SensorParameters:
     In arrays of six, the first three entries are forces [N], the others torques [Nm].
 
     Attributes:
-        joint: Fixed joint of the model with the sensor in it; its child side is the tool.
+        joint: Fixed joint of the model with the sensor in it; its child side is the tool. By
+            default the first one behind the last moving link, on the way to the tool frame.
         measurement_range: Largest magnitude that is measured, shape (6,).
         bias: Reading without load, shape (6,).
         noise: Standard deviation of one sample, shape (6,).
@@ -144,7 +145,7 @@ class SensorParameters:
         torque_dead_band: [Nm].
     """
 
-    joint: str = "weld_tool"
+    joint: str = ""
     measurement_range: np.ndarray = dc.field(
         default_factory=lambda: ForceTorqueParameters().measurement_range
     )

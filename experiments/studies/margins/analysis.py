@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.systems.framework import Context
 
+from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
@@ -189,6 +190,8 @@ def analyse(
     station = true_loop.station
     duration = settings.duration or station.reference_duration
     progress.expect(duration)
+    remarks: list[str] = []
+    singles, wrong_together = _believable(box, smoothed, station.part, folder, remarks)
     way = walk(
         true_loop,
         duration,
@@ -209,24 +212,53 @@ def analyse(
         box=box,
         nominal=nominal,
         drives_are_servos=own.drives_are_servos,
-        remarks=_remarks(removed, way, station.workpiece is not None),
+        remarks=_remarks(removed, way, station.workpiece is not None) + remarks,
     )
     for instant, loop in zip(way.instants, loops, strict=True):
         progress(instant.time, "margins of the drives")
         if loop is not None:
             analysis.margins.append(_drive_margins(instant, loop, own.map.period))
-    elastic = not station.robot.is_rigid
-    for key, error in single_errors(box, elastic):
+    for key, error in singles:
         with _saying(key, analysis.remarks):
             case, _ = study.case(study.build(error), error, way.instants)
             analysis.singles.append(Case(error, key, case.places))
     weak = _weakest_instants(analysis)
     known = {case.key for case in analysis.singles}
-    for error in () if only_start else corners(box, elastic):
+    for error in () if only_start else wrong_together:
         if all(key in known for key, _ in error.parts):
             analysis.corners.append(study.case(study.build(error), error, weak)[0])
     progress(duration, "done")
     return analysis
+
+
+def _believable(
+    box: Box, settings: Scenario, part: RobotPart, folder: Path, remarks: list[str]
+) -> tuple[list[tuple[str, Error]], list[Error]]:
+    """Return the box's errors, single and together, but what no robot could be.
+
+    Args:
+        box: The box.
+        settings: The scenario.
+        part: The robot in it.
+        folder: Where relative file names start.
+        remarks: Told what is left out, and why.
+    """
+    elastic, singles = not part.robot.is_rigid, []
+    for key, error in single_errors(box, elastic):
+        try:
+            part.check_belief(error.applied_to(settings), folder)
+        except InputError as refusal:
+            remarks.append(f"{error}: left out, {refusal}")
+        else:
+            singles.append((key, error))
+    known = [one for _, error in singles for one in error.parts]
+    together = []
+    for error in corners(box, elastic):
+        with contextlib.suppress(InputError):
+            if all(one in known for one in error.parts):
+                part.check_belief(error.applied_to(settings), folder)
+                together.append(error)
+    return singles, together
 
 
 @dataclass

@@ -21,10 +21,12 @@ class ToolMass:
     Attributes:
         mass: [kg]; 0 where the last link is the tool.
         p_LC: Its centre of mass in the last link frame [m], shape (3,).
+        name: Of its body, for messages.
     """
 
     mass: float
     p_LC: np.ndarray
+    name: str = "tool"
 
 
 def believed_chain(chain: SerialChain, error: ModelError, tool: ToolMass) -> SerialChain:
@@ -77,6 +79,8 @@ def _with_other_tool(
     if error.tool_mass == 0.0 and not np.any(error.tool_center * mass):
         return link
     allowed = f"more than {-mass:.4g} kg, the tool's mass"
+    if mass == 0.0:
+        allowed = f"0 kg or more; '{tool.name}', which carries the tool frame, has no mass to lose"
     if not mass + error.tool_mass > 0.0:
         raise InputError(f"tool_mass = {error.tool_mass:g} kg; allowed: {allowed}")
     # moments of mass of order 0, 1, 2 about the link's origin add up

@@ -214,8 +214,8 @@ def tool_load_from_plant(plant: MultibodyPlant, joint: Joint, tool_frame: Frame)
         tool_frame: Frame at the tool point.
 
     Raises:
-        InputError: If the joint is not fixed, something moves behind it, the tool point is
-            not behind it, or there is no mass.
+        InputError: If the joint is not fixed, something moves behind it, or the tool point is
+            not behind it.
     """
     bodies = _bodies_behind(plant, joint)
     if tool_frame.body().index() not in [body.index() for body in bodies]:
