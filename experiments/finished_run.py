@@ -23,6 +23,7 @@ from experiments.results.guidance_audit import Promise, audit
 from experiments.results.guidance_metrics import guidance_metrics
 from experiments.results.guidance_warnings import guidance_warnings
 from experiments.results.joint_limits import JointLimits
+from experiments.results.limit_metrics import limit_metrics
 from experiments.results.link_signals import lap_length
 from experiments.results.mounting_metrics import mounting_metrics
 from experiments.results.path_metrics import path_following_metrics
@@ -200,6 +201,7 @@ def _measure(
     )
     metrics.update(press_metrics(log))
     metrics.update(guidance_metrics(log))
+    metrics.update(limit_metrics(log))
     metrics.update(_guidance_audit(log, settings))
     metrics.update(mounting_metrics(log))
     metrics.update(friction_metrics(log))

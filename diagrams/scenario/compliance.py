@@ -14,6 +14,7 @@ from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Impedan
 from pfsc_drake.control.compliance.press import PressParameters
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
+from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
 
 SOURCES = ("sensor", "observed")
@@ -59,6 +60,8 @@ class ComplianceParameters:
         with_turning: Whether torques act along eta where the path's orientation turns.
         press: With which force a tool presses on a surface, whose transversal coordinate has no
             stiffness then. None without the block.
+        limits: How far the tool follows a hand along a path or a surface, to where the robot
+            itself cannot go on; in space see ``fixtures.limits``.
     """
 
     source: str = "sensor"
@@ -68,6 +71,7 @@ class ComplianceParameters:
     rotational: CoordinateImpedance = dc.field(default_factory=CoordinateImpedance)
     with_turning: bool = False
     press: PressParameters | None = None
+    limits: RobotLimitParameters = dc.field(default_factory=RobotLimitParameters)
 
     def __post_init__(self) -> None:
         require(self.source in SOURCES, "source", self.source, ", ".join(SOURCES))

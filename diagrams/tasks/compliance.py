@@ -12,11 +12,16 @@ from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
     ImpedanceLaw,
 )
+from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning
+from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.impedance_tuner import ImpedanceTuner
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
@@ -63,6 +68,8 @@ def add_compliance(
     builder: DiagramBuilder,
     scenario: Scenario,
     linearization: Linearization,
+    robot: RobotModel,
+    start: np.ndarray,
     ports: dict[str, OutputPort],
     lap: float | None = None,
     end: float = math.inf,
@@ -74,6 +81,8 @@ def add_compliance(
         builder: Builder of the diagram.
         scenario: The scenario, with compliance.
         linearization: Of the law that follows the reference.
+        robot: The robot as it is believed, N joints.
+        start: Joint coordinates at the start, shape (N,).
         ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
             ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
             derivatives up to :func:`reference_order`; with an operator ``impedance_wish``.
@@ -84,7 +93,7 @@ def add_compliance(
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
         a force reference ``press``, with an operator ``impedance`` and ``tank``, else where it
-        varies ``damping`` of every coordinate;
+        varies ``damping`` of every coordinate; where a hand leads the tool along, ``limit_force``;
         ``compliance_status``, an :class:`ImpedanceStatus`, and with a force reference
         ``press_lost``, whether the force is too far from it.
 
@@ -104,7 +113,10 @@ def add_compliance(
         desired_order=reference_order(scenario, linearization),
         lap=lap,
     )
-    impedance = builder.AddNamedSystem("impedance_filter", ImpedanceFilter(law, start="actual"))
+    limits = _limits(scenario, linearization, robot, start)
+    impedance = builder.AddNamedSystem(
+        "impedance_filter", ImpedanceFilter(law, start="actual", limits=limits)
+    )
     transform = builder.AddNamedSystem(
         "manifold_force_transform",
         ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning),
@@ -124,6 +136,10 @@ def add_compliance(
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]
+    if limits is not None:
+        for name in ("joint_state", "manifold_point"):
+            builder.Connect(ports[name], impedance.GetInputPort(name))
+        signals["limit_force"] = impedance.GetOutputPort("limit_force")
     # where guidance leads along, the impedance is the scenario's
     if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
         signals |= _add_tuner(builder, scenario, linearization, law, impedance, ports)
@@ -135,6 +151,26 @@ def add_compliance(
         "manifold_force": force,
         "compliance_status": impedance.GetOutputPort("status"),
     }
+
+
+def _limits(
+    scenario: Scenario, linearization: Linearization, robot: RobotModel, start: np.ndarray
+) -> LedMotion | None:
+    """Return what of the robot limits a hand that leads it along a manifold, if one does."""
+    parameters, manifold = scenario.compliance.limits, linearization.manifold
+    stiffness = scenario.compliance.tangential.stiffness
+    led = bool(stiffness.at) or np.isfinite(stiffness.value)
+    if not (led and parameters.on and isinstance(manifold, PathManifold | SurfaceManifold)):
+        return None
+    limits = RobotLimits(
+        robot,
+        parameters,
+        start,
+        oriented=manifold.is_oriented,
+        tool_axis=manifold.tool.tool_axis,
+        yaw_axis=manifold.tool.yaw_axis,
+    )
+    return LedMotion(limits, manifold, scenario.controller.sampling_time)
 
 
 def _add_tuner(

@@ -191,6 +191,8 @@ def add_law(
             builder,
             scenario,
             law.linearization,
+            following.robot,
+            following.start,
             inputs,
             task.lap,
             task.motion.domain[1],

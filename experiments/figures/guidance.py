@@ -182,9 +182,9 @@ def draw_limits(log: RunLog) -> Drawing:
         label = _limit_label(forces.labels[column])
         force.plot(log.time, forces.values[:, column], color=colour, label=label)
     force.set(title="Forces by which the robot's own limits hold the hand", ylabel="force in N")
-    command = np.linalg.norm(log["velocity_command"].values, axis=1)
-    speed.plot(log.time, command, color=COLOURS[0])
-    speed.set(title="Speed that is asked of the tool", ylabel="speed in m/s")
+    velocity = np.gradient(log["y_t"].values, log.time, axis=0)
+    speed.plot(log.time, np.linalg.norm(velocity, axis=1), color=COLOURS[0])
+    speed.set(title="Speed of the tool", ylabel="speed in m/s")
     place_legend(force)
     caption = (
         "Where joints are at their speeds or ends, or the arm is nearly singular, the hand feels a "

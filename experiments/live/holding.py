@@ -37,6 +37,17 @@ def holding_limit(row: np.ndarray, joints: int) -> str | None:
     return limit_kinds(joints)[int(hardest[SLOT.index("index")]) - regions]
 
 
+def hardest_limit(forces: np.ndarray, joints: int) -> str | None:
+    """Return the kind of limit that holds a tool on a path or surface most, if one does.
+
+    Args:
+        forces: By kind [N].
+        joints: N.
+    """
+    hardest = int(np.argmax(forces))
+    return list(dict.fromkeys(limit_kinds(joints)))[hardest] if forces[hardest] > 0.0 else None
+
+
 def joint_text(kind: str) -> str:
     """Return what a limit of a joint is called for people.
 

@@ -5,7 +5,13 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from diagrams.station import Station
-from experiments.live.holding import POSTURES, holding_limit, joint_text, posture_text
+from experiments.live.holding import (
+    POSTURES,
+    hardest_limit,
+    holding_limit,
+    joint_text,
+    posture_text,
+)
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -102,7 +108,7 @@ class LiveStatus:
             self.tank = float(signals["tank"][0])
         if "guidance" in signals:
             self._observe_guidance(signals["guidance"])
-            self._observe_limit(station, signals)
+        self._observe_limit(station, signals)
         self.ready = "tared" not in signals or bool(signals["tared"][0] > 0.5)
         if "mode" in signals:
             self.mode = station.mode_name(int(signals["mode"][0]))
@@ -124,8 +130,13 @@ class LiveStatus:
 
     def _observe_limit(self, station: Station, signals: dict[str, np.ndarray]) -> None:
         """Take over what of the robot itself holds the hand."""
+        if not {"guidance", "limit_force"} & signals.keys():
+            return
         n = station.robot.dimension
-        kind = holding_limit(signals["guidance"], n)
+        if "guidance" in signals:
+            kind = holding_limit(signals["guidance"], n)
+        else:
+            kind = hardest_limit(signals["limit_force"], n)
         if kind is None:
             self.limit = None
         elif kind != "singular":

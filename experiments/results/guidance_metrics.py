@@ -44,9 +44,6 @@ def guidance_metrics(log: RunLog) -> Metrics:
     metrics.add("mode_changes_per_second", changes / max(log.time[-1], period), "1/s")
     for number, name in enumerate(log["mode"].labels):
         metrics.add(f"time_{name}", float(np.count_nonzero(modes == number) * period), "s")
-    if "limit_force" in log:
-        held = np.any(log["limit_force"].values > 0.0, axis=1)
-        metrics.add("time_at_limits", float(np.count_nonzero(held) * period), "s")
     evaluated = log["region_evaluated"].values.sum(axis=1)
     metrics.add("distances_per_tick", float(evaluated.mean()), "1", source="mean")
     metrics.add("distances_per_tick_max", float(evaluated.max()), "1")
@@ -90,7 +87,6 @@ def guidance_metric_names(station: Station) -> list[str]:
         "least_tank",
         "mode_changes_per_second",
         *times,
-        "time_at_limits",
         "distances_per_tick",
         "distances_per_tick_max",
         *AUDITED,

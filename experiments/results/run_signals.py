@@ -13,6 +13,7 @@ from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
+from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -251,6 +252,9 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
             log.add(f"{kind.value}_d", desired[:, part], kind.unit, labels)
     if "impedance" in raw:
         _add_impedance(log, station, raw)
+    if "limit_force" in raw:
+        kinds = list(dict.fromkeys(limit_kinds(station.robot.dimension)))
+        log.add("limit_force", raw["limit_force"], "N", kinds)
 
 
 def _add_impedance(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:

@@ -5,6 +5,7 @@ from diagrams.station import Station
 from experiments.results.friction_metrics import friction_metric_names
 from experiments.results.guidance_metrics import guidance_metric_names
 from experiments.results.joint_limits import JointLimits
+from experiments.results.limit_metrics import limit_metric_names
 from experiments.results.link_signals import is_redundant
 from experiments.results.mounting_metrics import mounting_metric_names
 from experiments.results.path_metrics import metric_names
@@ -42,6 +43,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
             *metric_names(station.robot.dimension, signals | other),
             *press_metric_names(signals),
             *guidance_metric_names(station),
+            *limit_metric_names(station),
             *mounting_metric_names(signals),
             *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
             *shape_metrics(station.task.shape, station.task.fit),

@@ -359,6 +359,23 @@ class ImpedanceLaw:
             )
         return self._after.copy(), status
 
+    def push_to(
+        self, state: np.ndarray, speed: np.ndarray, force: np.ndarray, free: slice
+    ) -> np.ndarray:
+        """Return the force after which some coordinates have other speeds, shape (m,).
+
+        Args:
+            state: What :meth:`update` made of a force.
+            speed: ``y_p'`` that they are to have, shape of ``free`` [m/s].
+            force: That force, shape (m,).
+            free: Which coordinates; those that are rigid keep their force.
+        """
+        change = np.zeros(self.num_outputs)
+        change[free] = speed - state[1, free]
+        # e'(T) contains b f / m
+        gain, yields = self._coefficients[1], self._coefficients[7] > 0.0
+        return np.where(yields, force + change * state[3 + MASS] / gain, force)
+
     def _prepare(self, impedance: np.ndarray) -> bool:
         """Put what follows from an impedance in place, and return whether it is valid.
 

@@ -14,10 +14,12 @@ from pydrake.systems.framework import (
 
 from pfsc_drake.control.compliance.impedance import (
     DAMPING,
+    MASS,
     STIFFNESS,
     ImpedanceLaw,
     ImpedanceStatus,
 )
+from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 
@@ -49,16 +51,21 @@ class ImpedanceFilter(LeafSystem):
         ready (input, optional): Until it first rises above 0.5, what yields rests where it
             started, whatever y_d and forces do: so that no coordinate is led by a sensor that is
             not tared. Then it goes on to y_d as its impedance does. Shape (1,).
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,); only with
+            ``limits``.
+        manifold_point (input): Where on the manifold the tool is; only with ``limits``.
         impedance (input, optional): Rows mass, damping, stiffness of every coordinate,
             shape (3 m,), in place of the law's own.
         reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
         status (output): :class:`ImpedanceStatus` of the last update, shape (1,).
+        limit_force (output): By what forces the robot's own limits hold the hand, shape (kinds,)
+            [N]; only with ``limits``.
         damping (output): d of the last interval, shape (m,) [N s/m, Nm s/rad].
 
     State:
         Discrete: y_p, y_p', and force, mass, damping, stiffness of the last interval, each
-        (m,); whether started or waiting, engaged, status, each (1,). Until it has started,
-        y_p = y_d.
+        (m,); whether started or waiting, engaged, status, each (1,); forces of the limits,
+        shape (kinds,). Until it has started, y_p = y_d.
 
     Args:
         law: The law.
@@ -67,13 +74,19 @@ class ImpedanceFilter(LeafSystem):
             measured yhat (and yhat' if r > 1, else y_d'), so that the loop, not active
             before, has no error. At initialization yhat may not be known yet; then
             it happens at the first tick, unless :meth:`set_motion` was called.
+        limits: What the robot can do along the tangential coordinates, which then move no faster;
+            nothing limits them if omitted.
 
     Raises:
         InputError: If ``start`` is neither.
     """
 
     def __init__(
-        self, law: ImpedanceLaw, *, start: Literal["reference", "actual"] = "reference"
+        self,
+        law: ImpedanceLaw,
+        *,
+        start: Literal["reference", "actual"] = "reference",
+        limits: LedMotion | None = None,
     ) -> None:
         if start not in ("reference", "actual"):
             raise InputError(f"start of an impedance filter: {start!r}; reference or actual")
@@ -83,7 +96,9 @@ class ImpedanceFilter(LeafSystem):
         self._shape = (-1, m)
         self._filter, self._started, self._engaged_before = slice(0, 6 * m), 6 * m, 6 * m + 1
         self._status = 6 * m + 2
-        initial = np.concatenate([law.start(np.zeros((2, m))).ravel(), np.zeros(3)])
+        self._limits, kinds = limits, len(limits.kinds) if limits else 0
+        self._held = slice(6 * m + 3, 6 * m + 3 + kinds)
+        initial = np.concatenate([law.start(np.zeros((2, m))).ravel(), np.zeros(3 + kinds)])
         memory = self.discrete_state_ticket(self.DeclareDiscreteState(initial))
         self._desired: InputPort = self.DeclareVectorInputPort(
             "desired_reference", (law.desired_order + 1) * m
@@ -93,6 +108,14 @@ class ImpedanceFilter(LeafSystem):
         self._engaged: InputPort = self.DeclareVectorInputPort("engaged", 1)
         self._ready: InputPort = self.DeclareVectorInputPort("ready", 1)
         self._impedance: InputPort = self.DeclareVectorInputPort("impedance", 3 * m)
+        self._joint_state: InputPort | None = None
+        self._manifold_point: InputPort | None = None
+        if limits is not None:
+            self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * limits.num_joints)
+            self._manifold_point = self.DeclareVectorInputPort("manifold_point", limits.point_size)
+            self.DeclareVectorOutputPort(
+                "limit_force", kinds, self._calc_limit_force, prerequisites_of_calc={memory}
+            )
         self.DeclareVectorOutputPort(
             "reference",
             (r + 1) * m,
@@ -147,6 +170,9 @@ class ImpedanceFilter(LeafSystem):
     def _calc_status(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector([context.get_discrete_state_vector().value()[self._status]])
 
+    def _calc_limit_force(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().value()[self._held])
+
     def _calc_damping(self, context: Context, output: BasicVector) -> None:
         memory = context.get_discrete_state_vector().value()[self._filter]
         output.SetFromVector(memory.reshape(self._shape)[3 + DAMPING])
@@ -198,10 +224,35 @@ class ImpedanceFilter(LeafSystem):
             return
         desired = self._desired.Eval(context).reshape(self._shape)
         force = self._force.Eval(context) if engaged else np.zeros(self._law.num_outputs)
-        filter_state, status = self._law.update(
-            memory[self._filter].reshape(self._shape), desired, force, self._parameters(context)
-        )
+        before, parameters = memory[self._filter].reshape(self._shape), self._parameters(context)
+        filter_state, status = self._law.update(before, desired, force, parameters)
+        if self._limits is not None and status == ImpedanceStatus.OK:
+            push, memory[self._held] = self._hold(context, self._limits, filter_state, force)
+            if push is not force:
+                filter_state, status = self._law.update(before, desired, push, parameters)
         memory[self._filter], memory[self._status] = filter_state.ravel(), status
+
+    def _hold(
+        self, context: Context, limits: LedMotion, state: np.ndarray, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the force by which the robot can follow, and what of it is whose limit's.
+
+        Args:
+            context: Of this system.
+            limits: What the robot can do.
+            state: Of the filter, if nothing holds it.
+            force: Of the hand.
+        """
+        assert self._joint_state is not None
+        assert self._manifold_point is not None
+        measured, n = self._joint_state.Eval(context), limits.num_joints
+        along = limits.tangential
+        speed, held = limits.allowed(
+            measured[:n], measured[n : 2 * n], self._manifold_point.Eval(context), state[1, along]
+        )
+        if not held.any():
+            return force, held
+        return self._law.push_to(state, speed, force, along), held * state[3 + MASS, along].max()
 
     def _parameters(self, context: Context) -> np.ndarray:
         if self._impedance.HasValue(context):

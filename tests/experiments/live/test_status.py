@@ -9,6 +9,7 @@ from diagrams.station import Station
 from experiments.live.status import LiveStatus
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from tests.control.conftest import Robot
@@ -85,7 +86,8 @@ def chain_at_its_end():
         linearization=SimpleNamespace(manifold=SimpleNamespace(coordinates=axes)),
         layout=SimpleNamespace(manifold_state=slice(0, 3)),
     )
-    place = SimpleNamespace(is_oriented=True, tool_axis=None)
+    tool = SimpleNamespace(tool_axis=None, yaw_axis=None)
+    place = SimpleNamespace(is_oriented=True, tool=tool)
     part = SimpleNamespace(belief=SimpleNamespace(robot=chain))
     task = SimpleNamespace(place=place)
     station = SimpleNamespace(law=law, robot=chain, part=part, task=task)
@@ -116,6 +118,18 @@ def test_it_names_what_of_the_robot_holds_the_hand():
         status.observe(station, signals | {"guidance": row})
         assert status.limit == expected
         assert status.deviation == {"nearest region": 1e-3}
+
+
+def test_along_a_path_it_names_the_limit_too():
+    station, signals = chain_at_its_end()
+    kinds = list(dict.fromkeys(limit_kinds(6)))
+    status = LiveStatus("mine")
+    for kind, text in [("end_2", "axis 2 near its end"), ("speed_1", "axis 1 at its speed")]:
+        forces = np.array([2.0 * (name == kind) for name in kinds])
+        status.observe(station, signals | {"limit_force": forces})
+        assert status.limit == text
+    status.observe(station, signals | {"limit_force": np.zeros(len(kinds))})
+    assert status.limit is None
 
 
 def test_without_modes_there_is_none_and_unknown_ones_are_numbers():

@@ -1,7 +1,11 @@
-"""A hand that pulls a tool along a plane to where the arm ends, through the command line."""
+"""A hand that pulls a tool to where the arm ends, through the command line."""
 
+import json
+
+import h5py
 import pytest
 
+from experiments.cli import main
 from tests.experiments.runs.test_run_fixtures import run, way
 
 ABOVE = [1.45, 0.02, 0.92]
@@ -32,3 +36,42 @@ def test_it_feels_a_wall(tmp_path, law):
     assert abs(log["v_J"][-1]).max() < 0.15
     held = log["limit_force"][-1]
     assert held.max() > 10.0
+
+
+PATH = """
+name: led
+robot: {model: comau_racer_1_4, tool_frame: tool_point}
+path:
+  shape: !Line {start: [1.35, 0.02, 0.92], end: [2.0, 0.02, 0.92]}
+  orientation: {convention: zyz, keyframes: [{theta: 0.0, angles_deg: [0.0, 45.0, 174.2704]}]}
+controller:
+  law: velocity_servo
+  gains:
+    velocity_servo: {eta: {coefficients: [10]}, xi: {coefficients: [15]}, phi: {coefficients: [12]}}
+compliance:
+  tangential: {mass: {value: 5}, damping: {value: 60}, stiffness: {value: 0}}
+hand:
+  frame: manifold
+  waypoints: [{time: 0.2, position: [0.05, 0, 0]}, {time: 0.8, position: [0.6, 0, 0]}]
+  stiffness: 400
+  force_limit: 30
+sensor: {bandwidth: 200, inertia: none}
+reference: {points: [0.05, 0.05], dwell: 0.3}
+duration: 1.3
+start: {posture_deg: [0, 70, -10, 0, 70, -6]}
+"""
+
+
+def test_a_hand_that_leads_along_a_path_feels_a_wall_too(tmp_path):
+    """The path goes on where the arm ends; without limits it is left by 160 mm, and a fault."""
+    (tmp_path / "led.yaml").write_text(PATH)
+    arguments = ["run", str(tmp_path / "led.yaml"), "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--no-figures", "--no-recording"]) == 0
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert metrics["max_path_deviation"]["value"] < 1e-3
+    assert metrics["time_at_limits"]["value"] > 0.2
+    assert metrics["largest_limit_force"]["value"] > 10.0
+    with h5py.File(tmp_path / "out" / "log.h5") as file:
+        eta = file["eta"][:, 0]
+    assert abs(eta[-1] - eta[-101]) < 0.01  # in 0.1 s
+    assert 0.1 < eta[-1] < 0.3
