@@ -2,10 +2,15 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, link_momentum
+from pfsc_drake.control.estimation.generalized_momentum import (
+    MomentumModel,
+    drive_momentum,
+    link_momentum,
+)
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
 
@@ -79,3 +84,20 @@ def test_wrong_numbers_are_refused(drake_arm):
         MomentumObserver(model, RATE, PERIOD, 3)
     with pytest.raises(InputError, match="bandwidth = 0"):
         MomentumObserver(model, 0.0, PERIOD)
+
+
+def test_torques_are_of_the_age_of_the_velocities():
+    """A mass that nothing but its drive moves, measured by difference quotients: none is seen."""
+    drives = 50.0 * np.sin(0.5 * np.arange(COUNT) ** 1.5)[:, None]
+    mass, state = 2.0, ca.SX.sym("state", 4)
+    model = MomentumModel(
+        state, mass * state[1], ca.SX(1, 1), np.ones(1), np.zeros(1), 1.0
+    ).with_delay(PERIOD / 2.0)
+    q, v = [0.0], 0.0
+    for drive in drives[:, 0]:
+        q.append(q[-1] + v * PERIOD + drive / mass * PERIOD**2 / 2.0)
+        v += drive / mass * PERIOD
+    quotients = np.diff(q, prepend=0.0) / PERIOD
+    states = np.column_stack([q, quotients, q, quotients])
+    found = observe(MomentumObserver(model, RATE, PERIOD), states, drives)
+    np.testing.assert_allclose(found, 0.0, atol=1e-9)

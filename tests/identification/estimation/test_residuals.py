@@ -75,3 +75,14 @@ def test_bad_frequencies(comau, result):
             excess(result.residuals, result.system.used, result.motion, highest)
     with pytest.raises(InputError, match="52 parameters, 4 frequencies of 6 joints"):
         excess(result.residuals, result.system.used, result.motion, 0.4, parameters=52)
+
+
+def test_the_statistic_of_ljung_and_box():
+    """Of few residuals, where ``n + 2`` for n matters; the formula in a loop."""
+    n, lags = 40, 4
+    e = np.random.default_rng(5).normal(size=(n, 1))
+    found = whiteness(e, np.ones((n, 1), bool), ["joint"], lags)
+    x = e[:, 0] - e.mean()
+    r = [np.sum(x[h:] * x[:-h]) / np.sum(x**2) for h in range(1, lags + 1)]
+    expected = sum(n * (n + 2) * r[h - 1] ** 2 / (n - h) for h in range(1, lags + 1))
+    assert found.statistic[0] == pytest.approx(expected, rel=1e-12)

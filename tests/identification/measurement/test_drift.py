@@ -53,3 +53,15 @@ def test_a_joint_that_stands_still(series, robot):
     still = replace(motion, v=motion.v * [1.0, 0.0])
     with pytest.raises(InputError, match="lift does not move to and fro"):
         friction_trend(still)
+
+
+def test_the_change_is_that_from_the_first_to_the_last_period(series, robot):
+    """Without noise, and with friction that grows from period to period: its very size."""
+    t = np.arange(PERIODS * 400) * 0.005
+    q, v, a = series.motion(t)
+    grown = 1.0 + 0.1 * np.repeat(np.arange(PERIODS), 400)[:, None]
+    tau = 3.0 * a + grown * (COULOMB * np.sign(v) + VISCOUS * v)
+    record = Record(t, q, tau, robot.joint_names, series.period)
+    trend = friction_trend(average(record, skip=0))
+    np.testing.assert_allclose(trend.coulomb, 0.1 * (PERIODS - 1) * COULOMB, rtol=1e-6)
+    np.testing.assert_allclose(trend.viscous, 0.1 * (PERIODS - 1) * VISCOUS, rtol=1e-6)

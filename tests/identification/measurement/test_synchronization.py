@@ -83,3 +83,17 @@ def test_velocities_in_degrees_or_turned(record, series):
         check_velocities(replace(record, v=np.rad2deg(v)))
     with pytest.raises(InputError, match=r"v of lift is -1 times|v of lift is -1.000"):
         check_velocities(replace(record, v=v * [1.0, -1.0]))
+
+
+def test_a_joint_that_sticks_before_it_reverses_is_not_late(series, robot):
+    """Its friction turns 12 ms after the velocity, while it is slow; all else is in time."""
+    t = np.arange(4 * 2000) * 0.001
+    _, v, a = series.motion(t)
+    tau = regressor(v, a)[..., :4] @ PARAMETERS
+    stuck = np.abs(v) < 0.1 * np.abs(v).max(axis=0)
+    before = np.sign(series.motion(t - 0.012)[1])
+    tau += np.where(stuck, 3.0 * PARAMETERS[2:] * (before - np.sign(v)), 0.0)
+    tau += 0.1 * np.random.default_rng(4).normal(size=tau.shape)
+    motion = average(Record(t, series.motion(t)[0], tau, robot.joint_names, series.period))
+    lag = check_torque_lag(motion, regressor(motion.v, motion.a))
+    assert abs(lag.time) < 4.0 * lag.standard_deviation + 0.0005
