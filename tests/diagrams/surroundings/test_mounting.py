@@ -136,7 +136,7 @@ def test_random_misplacements_fill_two_balls():
         ("plate.rests=[[0.1, 0.06], [0.1, -0.06], [-0.1, 0]]", "from every pin"),
         ("plate.start=table", "start = table; allowed: magazine, held, frame"),
         ("plate.start=frame", "plate.start = frame; allowed: frame where"),
-        ("plate.mass=0", "mass = 0.0; allowed: a positive number"),
+        ("plate.mass=0", "mass = 0.0; allowed: 0.001 to 100 kg"),
         ("plate.contact.time_step=7.0e-4", "plate.contact.time_step = 0.0007 s; must be a whole"),
         ("plate.suction.cups=[[0, 0]]", "three or more [x, y] in m"),
         ("plate.operator.task=mend", "task = mend; allowed: mount or return"),
