@@ -16,13 +16,15 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.posture import Posture, PostureCoordinate, range_weight
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.posture_reference import PostureReference
 
 _KEY = "controller.posture"
+# of the largest speed of a joint, what a posture may make of it together with the outputs
+_SPEED_SHARE = 0.8
 
 
 def make_posture(
@@ -49,7 +51,8 @@ def make_posture(
         if rest is None:
             raise InputError(f"{_KEY}.task = elbow needs a start of the robot")
         coordinate = _swivel(parameters, robot, rest().q_J)
-    return Posture(gains, _weight(parameters, robot), coordinate)
+    speeds = _SPEED_SHARE * largest_speeds(robot)
+    return Posture(gains, _weight(parameters, robot), coordinate, speeds)
 
 
 def _weight(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:

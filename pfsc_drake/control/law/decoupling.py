@@ -14,6 +14,22 @@ from pfsc_drake.errors import InputError
 _LEAST_SHARE = 0.1
 
 
+class Restraint(NamedTuple):
+    """How fast joints may become by what they do beside the outputs.
+
+    Attributes:
+        rest: Highest joint derivative with which they come to rest, shape (N,).
+        velocity: Of the joints, shape (N,); None where the highest derivative is one.
+        settling: ``a_2``: in the end joints move with ``(x - rest) / a_2``.
+        speeds: Largest of the joints, shape (N,), infinite for any.
+    """
+
+    rest: np.ndarray
+    velocity: np.ndarray | None
+    settling: float
+    speeds: np.ndarray
+
+
 class Spare(NamedTuple):
     """What joints beyond the number of outputs are to do.
 
@@ -24,12 +40,14 @@ class Spare(NamedTuple):
         slope: Of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
             none.
         rate: ``h q^(r)`` that this coordinate is to have.
+        restraint: By what all of this is held back; None for nothing.
     """
 
     wish: np.ndarray
     scale: np.ndarray | None = None
     slope: np.ndarray | None = None
     rate: float = 0.0
+    restraint: Restraint | None = None
 
 
 class DecouplingSolution(NamedTuple):
@@ -42,11 +60,14 @@ class DecouplingSolution(NamedTuple):
             changes as smoothly as A does.
         residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves; None where
             nothing is damped.
+        rest: The same without what joints are to do beside the outputs, as far as they are held
+            back, shape (N,); None where they are not.
     """
 
     x: np.ndarray
     rcond: float
     residual: np.ndarray | None = None
+    rest: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -60,6 +81,12 @@ class DecouplingInverse:
 
     and then, within what leaves the outputs alone, the one that gives one more coordinate of the
     joints the rate that is wanted of it. It fades out where it hardly moves without the outputs.
+
+    Restraint: with ``x_0`` the solution by which joints come to rest as far as the outputs let
+    them, everything else ends in joint velocities ``u = (x - x_0) / a_2`` beside those ``q_y'``
+    that the outputs take. What is used is ``x_0 + s (x - x_0)`` with the largest ``s <= 1`` for
+    which ``|q_y'| + s |u|`` stays below every joint's largest speed. So a posture far away, or a
+    coordinate that hardly moves alone, asks for no more than joints can do.
 
     Damping: where the reciprocal condition number c is below ``damped_below = c_0``, the system
     is solved with ``A W^-1 A' + lambda^2 I``, ``lambda^2 = (c_0^2 - c^2) |A S|^2`` (Frobenius),
@@ -114,10 +141,11 @@ class DecouplingInverse:
         rcond = _rcond(A, R if scale is None else _factors(A)[1])
         if rcond < self.damped_below:
             return self._damped(A, rhs, rcond, spare)
-        z, info = lapack.dtrtrs(R, rhs - A @ wish, trans=1)
+        z, info = lapack.dtrtrs(R, _sides(A, rhs, spare), trans=1)
         if info != 0:
             return DecouplingSolution(np.full(len(wish), np.nan), 0.0)
-        return DecouplingSolution(_next_to(Q, Q @ z, spare), rcond)
+        x, rest, _ = _restrained(Q, Q @ z, spare)
+        return DecouplingSolution(x, rcond, rest=rest)
 
     def _damped(
         self, A: np.ndarray, rhs: np.ndarray, rcond: float, spare: Spare
@@ -130,9 +158,10 @@ class DecouplingInverse:
         square = (self.damped_below**2 - rcond**2) * norm**2
         gram = B @ B.T
         gram[np.diag_indices(len(rhs))] += square
-        z = lapack.dposv(gram, rhs - A @ spare.wish)[1]
-        x = _next_to(_factors(B)[0], B.T @ z, spare)
-        return DecouplingSolution(x, rcond, square * z)
+        z = lapack.dposv(gram, _sides(A, rhs, spare))[1]
+        x, rest, share = _restrained(_factors(B)[0], B.T @ z, spare)
+        missed = square * z[:, 0] if rest is None else square * (z[:, :2] @ [share, 1.0 - share])
+        return DecouplingSolution(x, rcond, missed, rest)
 
 
 def scale_of(weight: np.ndarray) -> np.ndarray:
@@ -205,3 +234,36 @@ def _next_to(Q: np.ndarray, y: np.ndarray, spare: Spare) -> np.ndarray:
         return x
     step = alone * ((spare.rate - float(spare.slope @ x)) / divisor)
     return x + (step if scale is None else scale @ step)
+
+
+def _sides(A: np.ndarray, rhs: np.ndarray, spare: Spare) -> np.ndarray:
+    """Return what is left to the outputs beside the wish, the rest and nothing, as columns."""
+    sides, restraint = [rhs - A @ spare.wish], spare.restraint
+    if restraint is not None:
+        sides.append(rhs - A @ restraint.rest)
+        if restraint.velocity is not None:
+            sides.append(A @ restraint.velocity)
+    return np.column_stack(sides)
+
+
+def _restrained(
+    Q: np.ndarray, y: np.ndarray, spare: Spare
+) -> tuple[np.ndarray, np.ndarray | None, float]:
+    """Return the solution, the one of joints that come to rest, and the share beyond that.
+
+    Args:
+        Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
+        y: Of each side of :func:`_sides`, as columns.
+        spare: What joints are to do.
+    """
+    x, restraint, scale = _next_to(Q, y[:, 0], spare), spare.restraint, spare.scale
+    if restraint is None:
+        return x, None, 1.0
+    others = y[:, 1:] if scale is None else scale @ y[:, 1:]
+    rest = restraint.rest + others[:, 0]
+    taken = np.abs(rest if restraint.velocity is None else others[:, 1])
+    beyond = np.abs(x - rest) / restraint.settling
+    left = np.maximum(restraint.speeds - taken, 0.0)
+    fast = beyond > left
+    share = float(np.min(left[fast] / beyond[fast])) if fast.any() else 1.0
+    return x if share == 1.0 else rest + share * (x - rest), rest, share

@@ -8,6 +8,7 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.law.decoupling import (
     DecouplingInverse,
     DecouplingSolution,
+    Restraint,
     Spare,
     scale_of,
 )
@@ -174,6 +175,10 @@ class FollowingLaw:
         self._posture = arrays.get("posture", np.zeros(0))
         self._wish, self._slope = arrays.get("wish"), arrays.get("slope")
         self._weight, self._rate = arrays.get("weight"), arrays.get("rate", np.zeros(1))
+        self._rest, self._velocity = arrays.get("rest"), arrays.get("velocity")
+        n = self.linearization.num_joints
+        self._gain = arrays["gain"].reshape((n, n), order="F")
+        self._drift, self._offset = arrays["drift"], arrays["offset"]
         self._scale = None if self.posture is None else self.posture.scale
 
     @property
@@ -225,13 +230,15 @@ class FollowingLaw:
         _assign(self._posture, posture)
         self._linearize()
         solution = self.inverse.solve(self._A, self._rhs, self._spare())
-        self._solution[:] = solution.x
         self._rcond[0] = solution.rcond
         if last_held is None:
             self._lead[0] = 0.0
         else:
             self._lead[0] = self.linearization.lead
             self._last_held[:] = last_held
+        self._solution[:] = solution.x
+        if solution.rest is not None:
+            self._leave_to_outputs(solution.rest)
         self._complete()
         result = self._result.copy()
         result[self._fault_index] = self._judge(solution)
@@ -248,9 +255,39 @@ class FollowingLaw:
             return None
         if self._weight is not None:
             self._scale = scale_of(self._weight.reshape((len(self._wish), -1)))
+        restraint = None
+        posture = self.posture
+        if posture is not None and posture.speeds is not None and self._rest is not None:
+            restraint = Restraint(self._rest, self._velocity, posture.settling, posture.speeds)
         if self._slope is None:
-            return Spare(self._wish, self._scale)
-        return Spare(self._wish, self._scale, self._slope, self._rate.item())
+            return Spare(self._wish, self._scale, restraint=restraint)
+        return Spare(self._wish, self._scale, self._slope, self._rate.item(), restraint)
+
+    def _leave_to_outputs(self, rest: np.ndarray) -> None:
+        """Hold a posture back as far as drives would be at their limits for it.
+
+        Drives are affine in the highest joint derivative: between that with which joints come to
+        rest as far as the outputs let them and the one that is asked for, the largest share is
+        taken that they can do.
+
+        Args:
+            rest: The former, shape (N,).
+        """
+        wanted = self._drive(self._solution)
+        beyond = np.abs(wanted) > self.limits
+        if not beyond.any():
+            return
+        least = self._drive(rest)
+        step = (wanted - least)[beyond]
+        room = self.limits[beyond] - np.sign(step) * least[beyond]
+        share = np.divide(room, np.abs(step), out=np.ones_like(room), where=step != 0.0)
+        # where the outputs alone ask for too much, a posture does not add to it
+        self._solution[:] = rest + min(max(float(share.min()), 0.0), 1.0) * (self._solution - rest)
+
+    def _drive(self, solution: np.ndarray) -> np.ndarray:
+        """Return the drive input of a highest joint derivative, without limits, shape (N,)."""
+        held, lead = self._gain @ solution + self._drift, self._lead.item()
+        return held + lead * (held - self._last_held) + self._offset + self._friction
 
     def _reference_velocity(self) -> np.ndarray:
         """Return the joint velocities that the reference asks for, shape (N,)."""

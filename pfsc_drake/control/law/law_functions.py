@@ -73,6 +73,8 @@ def law_function(
         wanted = ca.vertsplit(arguments["posture"], n)
         wishes = posture_expressions(posture, robot, ca.horzsplit(motion), wanted)
         results |= {name: x for name, x in wishes._asdict().items() if x.numel()}
+        if r > 1:
+            results["velocity"] = motion[:, 1]
     elif damped:
         results["wish"] = _coming_to_rest(stabilization, ca.horzsplit(motion))
     return ca.Function(

@@ -38,6 +38,8 @@ class Posture:
         weight: ``W``'s diagonal, shape (N,): a joint of larger weight deviates less; None for
             the robot's inertia in its present posture, rotors included.
         coordinate: What else is to be kept; None for nothing.
+        speeds: How fast joints may become by all of this together with what the outputs take of
+            them, shape (N,), infinite for any; None to hold nothing back.
 
     Raises:
         InputError: If a weight is not positive, or is not one per joint.
@@ -46,11 +48,21 @@ class Posture:
     stabilization: Stabilization
     weight: np.ndarray | None
     coordinate: PostureCoordinate | None = None
+    speeds: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         n, weight = self.stabilization.proportional.shape[1], self.weight
         if weight is not None and (np.shape(weight) != (n,) or not 0.0 < np.min(weight) < np.inf):
             raise InputError(f"posture weight: {weight}; must be {n} positive numbers")
+
+    @property
+    def settling(self) -> float:
+        """What turns the highest derivative that is asked for into a velocity.
+
+        ``a_2``, by which ``w`` changes with the joints' velocity; 1 where it is a velocity.
+        """
+        gains = self.stabilization.proportional
+        return float(gains[1][0]) if len(gains) > 1 else 1.0
 
     @property
     def scale(self) -> np.ndarray | None:
@@ -65,12 +77,15 @@ class PostureExpressions(NamedTuple):
 
     Attributes:
         wish: ``w``, shape (N, 1).
+        rest: What it would be without any place to go, ``-sum_k a_{k+1} q^(k)`` from k = 1 on, by
+            which joints come to rest, shape (N, 1).
         weight: ``W``, shape (N, N), if it varies, else empty.
         slope: ``dc/dq`` of the coordinate, shape (N, 1), or empty.
         rate: ``dc/dq q^(r)`` that the coordinate is to have, shape (1, 1), or empty.
     """
 
     wish: ca.SX
+    rest: ca.SX
     weight: ca.SX
     slope: ca.SX
     rate: ca.SX
@@ -89,11 +104,14 @@ def posture_expressions(
     """
     empty, stabilization = ca.SX(0, 1), posture.stabilization
     wish = stabilization.virtual_input(motion, reference, ca.SX(robot.dimension, 1))
+    rest = ca.SX(robot.dimension, 1)
+    for gains, derivative in zip(stabilization.proportional[1:], motion[1:], strict=True):
+        rest -= ca.SX(gains) * derivative
     weight = empty
     if posture.weight is None:
         weight = robot.mass_matrix(motion[0]) + ca.diag(robot.D_M)
     if posture.coordinate is None:
-        return PostureExpressions(wish, weight, empty, empty)
+        return PostureExpressions(wish, rest, weight, empty, empty)
     actual = posture.coordinate(joint_jets([*motion, ca.SX(robot.dimension, 1)]))
     wanted = posture.coordinate(joint_jets(reference))
     q = ca.SX.sym("q", robot.dimension)
@@ -107,7 +125,7 @@ def posture_expressions(
         if k == 0:  # the shorter way round
             error = ca.atan2(ca.sin(error), ca.cos(error))
         rate = rate - gains[0] * error
-    return PostureExpressions(wish, weight, ca.densify(slope), rate)
+    return PostureExpressions(wish, rest, weight, ca.densify(slope), rate)
 
 
 def range_weight(robot: RobotModel) -> np.ndarray:

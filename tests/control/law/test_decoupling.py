@@ -6,6 +6,7 @@ import pytest
 from pfsc_drake.control.law.decoupling import (
     DecouplingInverse,
     DecouplingSolution,
+    Restraint,
     Spare,
     free_torque,
     scale_of,
@@ -207,3 +208,52 @@ def test_what_is_not_finite_is_refused_with_joints_to_spare(bad, damped_below):
 def test_damping_begins_above_the_limit(damped_below):
     with pytest.raises(InputError, match="damped_below"):
         DecouplingInverse(1e-3, damped_below)
+
+
+def held_back(settling, speeds, velocity=True, scale=None, slope=None, damped_below=0.0, seed=5):
+    """Return matrix, right-hand side, velocity, spare motion, and the solution."""
+    rng = np.random.default_rng(seed)
+    A, rhs, wish = rng.normal(size=(4, 7)), rng.normal(size=4), 50.0 * rng.normal(size=7)
+    v = rng.normal(size=7) if velocity else None
+    restraint = Restraint(-5.0 * v if velocity else np.zeros(7), v, settling, speeds)
+    spare = Spare(wish, scale, slope, 30.0, restraint)
+    return A, rhs, v, spare, DecouplingInverse(damped_below=damped_below).solve(A, rhs, spare)
+
+
+@pytest.mark.parametrize("scale", [None, np.diag(np.linspace(0.5, 2.0, 7))])
+@pytest.mark.parametrize("slope", [None, np.arange(7.0)])
+def test_joints_that_may_be_as_fast_as_they_like_are_not_held_back(scale, slope):
+    A, rhs, _, spare, solution = held_back(3.0, np.full(7, np.inf), scale=scale, slope=slope)
+    free = DecouplingInverse().solve(A, rhs, spare._replace(restraint=None))
+    np.testing.assert_allclose(solution.x, free.x, rtol=1e-12)
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+@pytest.mark.parametrize("scale", [None, np.diag(np.linspace(0.5, 2.0, 7))])
+def test_joints_become_as_fast_as_they_may_and_outputs_stay(velocity, scale):
+    """What outputs take of the velocity is its part next to nothing, by the same weight."""
+    settling, speeds = (3.0 if velocity else 1.0), np.full(7, 5.0)
+    A, rhs, v, spare, solution = held_back(settling, speeds, velocity, scale)
+    np.testing.assert_allclose(A @ solution.x, rhs, atol=1e-12)
+    W = np.eye(7) if scale is None else np.linalg.inv(scale @ scale.T)
+    right = np.linalg.inv(W) @ A.T @ np.linalg.inv(A @ np.linalg.inv(W) @ A.T)
+    rest = spare.restraint.rest + right @ (rhs - A @ spare.restraint.rest)
+    np.testing.assert_allclose(solution.rest, rest, atol=1e-12)
+    taken = np.abs(right @ (A @ v) if velocity else rest)
+    reached = (taken + np.abs(solution.x - rest) / settling) / speeds
+    assert reached.max() == pytest.approx(1.0)
+    far = spare.wish + right @ (rhs - A @ spare.wish) - rest
+    assert np.abs(np.cross((solution.x - rest)[:3], far[:3])).max() < 1e-9  # the same way
+    assert (taken + np.abs(far) / settling).max() > 2.0 * speeds[0]
+
+
+def test_outputs_that_need_all_the_speed_leave_none():
+    _, _, _, _, solution = held_back(3.0, np.full(7, 1e-3))
+    np.testing.assert_array_equal(solution.x, solution.rest)
+
+
+def test_what_damping_misses_is_told_of_joints_that_are_held_back():
+    for speeds in (np.full(7, 5.0), np.full(7, np.inf)):
+        A, rhs, _, _, solution = held_back(3.0, speeds, damped_below=0.9)
+        assert solution.residual is not None
+        np.testing.assert_allclose(rhs - A @ solution.x, solution.residual, atol=1e-10)

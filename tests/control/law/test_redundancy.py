@@ -3,6 +3,8 @@
 Closed loops on Drake's own plant, as in the test of the outputs' linear dynamics.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -139,6 +141,45 @@ def test_damping_tells_what_it_lets_the_outputs_miss(load_robot, make_law, posit
         told = result[law.layout.residual] if law is damped else np.zeros(3)
         assert np.allclose(missed, told, rtol=1e-9, atol=1e-9)
     assert np.abs(results[0][damped.layout.residual]).max() > 1e-3
+
+
+def test_a_posture_far_away_asks_for_no_more_than_drives_can_do(
+    load_robot, make_law, position_path
+):
+    """Drives at their limits would miss the outputs; what is left of the posture misses none."""
+    chain = load_robot("comau_racer_1_4").chain
+    far = make_law(chain, "rigid", False)
+    posture = replace(far.posture, speeds=np.full(6, np.inf))
+    q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])
+    state = np.concatenate([q, 0.1 * q, q, 0.1 * q])
+    y_t, _ = load_robot("comau_racer_1_4").tool_pose(state)
+    theta = position_path.project_globally(y_t).theta
+    point = position_path.evaluator(2)(y_t.tolist(), theta)
+
+    def result_of(law, q_0):
+        wanted = np.concatenate([q_0, np.zeros(12)])
+        return law.evaluate(state, point, np.zeros(9), np.zeros(3), posture=wanted)
+
+    # next to where it is, a posture asks for rest
+    rest, wanted = (result_of(far, q_0)[far.layout.drive] for q_0 in (q, q + 1.5))
+    limits = 1.1 * np.abs(rest) + 20.0
+    assert np.any(np.abs(wanted) > 2.0 * limits)
+    law = make_law(chain, "rigid", False, limits=limits, posture=posture)
+    result = result_of(law, q + 1.5)
+    drive = result[law.layout.drive]
+    assert np.max(np.abs(drive) / limits) == pytest.approx(1.0)
+    share = np.dot(drive - rest, wanted - rest) / np.sum((wanted - rest) ** 2)
+    assert 0.0 < share < 0.6
+    np.testing.assert_allclose(drive, rest + share * (wanted - rest), atol=1e-9)
+    linear = law.linearization.function(state, np.zeros(6), point)
+    A, b, gain, drift, offset = (np.array(x) for x in linear[1:6])
+    acceleration = np.linalg.solve(gain, drive[:, None] - drift - offset)
+    reached = (A @ acceleration + b).ravel()
+    np.testing.assert_allclose(reached, result[law.layout.virtual_input], rtol=1e-9, atol=1e-9)
+    # outputs that ask for too much by themselves get what there is
+    weak = make_law(chain, "rigid", False, limits=0.5 * np.abs(rest) + 1e-3, posture=posture)
+    held = np.clip(rest, -weak.limits, weak.limits)
+    np.testing.assert_allclose(result_of(weak, q + 1.5)[weak.layout.drive], held, atol=1e-9)
 
 
 def test_ranges_weigh_by_the_square():

@@ -93,6 +93,18 @@ def test_a_posture_far_away_does_not_take_the_tool_off_its_path(run, posture):
     assert speed.max() > 0.5
 
 
+def test_an_elbow_that_hardly_moves_alone_leaves_the_joints_to_the_tool(run):
+    """Kept at any price, it took a joint to 3.4 times its largest speed, each lap."""
+    start = [0.0, -20.0, 0.0, -130.0, 0.0, 110.0, 45.0]
+    station, fault, log = run(start, 1.4, task="elbow")
+    assert fault is None
+    assert deviation(station, log) < 5e-5
+    n = station.robot.dimension
+    speed = np.abs(log["joint_state"][:, n : 2 * n]).max(axis=0)
+    shares = speed / station.robot.gather("velocity_limit")
+    assert 0.5 < shares.max() < 0.85
+
+
 @pytest.mark.parametrize("own", [GainParameters(bandwidth=20.0), GainParameters()])
 def test_poles_are_chosen_for_more_joints_than_outputs(load_scenario, own):
     settings = load_scenario("pfc_elastic_7r")
