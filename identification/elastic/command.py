@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from identification.options import Names, Robot, Scales, Units, read_number, read_reading
+from identification.output import check_folder
 from reporting.commands import interruptible
 from reporting.fraction import fraction_display
 
@@ -51,7 +52,10 @@ def elastic_command(
 
     with interruptible():
         console, subject = Console(), load_subject(robot)
+        if subject.note:
+            console.print(f"[yellow]note:[/] {subject.note}", soft_wrap=True, highlight=False)
         folder = out or Path("out") / f"{subject.name}_elastic"
+        check_folder(folder)
         reading = read_reading(names, units, scales)
         if record is not None:
             measured = read_record(record, subject, None, reading, still=locked)
