@@ -83,11 +83,13 @@ def plan_drives(
         return None
     planner = _Planner(scenario, task, law, start, friction)
     try:
-        for longest, share in ((_GLANCED, _AT_A_GLANCE), (_CHECKED, 1.0), (_SLOWED, 1.0)):
-            step, course = planner.course(longest)
-            fits = planner.fits(course, share)
-            if fits:
-                break
+        step, course = planner.course(_GLANCED)
+        fits = planner.fits(course, _AT_A_GLANCE)
+        if not fits and planner.fits(course, 1.0):
+            step, course = planner.course(_CHECKED)
+            fits = planner.fits(course, 1.0)
+        if not fits:
+            step, course = planner.course(_SLOWED)
         demand = planner.demand.of(course)
     except InputError as error:
         return _unknown(task, planner, str(error))
@@ -98,7 +100,7 @@ def plan_drives(
     if fits:
         return asked
     if scenario.reference.limits == "warn":
-        return planner.warned(asked)
+        return planner.warned(asked, course)
     return planner.slowed(asked, course, step)
 
 
@@ -180,10 +182,12 @@ class _Planner:
         """Return a plan that waits where the drives need it."""
         reference, duration = self._scenario.reference, self._task.motion.domain[1]
         change = reference.acceleration / reference.velocity
+        allowed = self.allowed(course)
+        excess = self._excess(asked, allowed)
         try:
-            pace = find_pace(self.demand, course, step, self.allowed(course), change, _SMOOTHING)
+            pace = find_pace(self.demand, course, step, allowed, change, _SMOOTHING)
         except InputError as error:
-            return replace(asked, said=[f"{self._excess(asked)}; and {error}"])
+            return replace(asked, said=[f"{excess}; and {error}"])
         clock = Clock(pace.rates[:, 0], step)
         times, motion = clock.times, _retimed(self._task.motion, clock)
         demand = self.demand.of(with_pace(course, pace.rates))
@@ -194,29 +198,31 @@ class _Planner:
         said = (
             f"the reference is slowed to {speed:.3g} m/s in {places} "
             f"place{'s' if places > 1 else ''}, {duration:.4g} s become {times[-1]:.4g} s: "
-            f"{self._excess(asked)}"
+            + excess
         )
         given = self._scenario.duration
         if 0.0 < given < times[-1]:
             said += f"; duration = {given:g} s ends before it does"
         return DrivePlan(times, demand, asked.demand, asked.limits, slow, motion, [said])
 
-    def warned(self, asked: DrivePlan) -> DrivePlan:
+    def warned(self, asked: DrivePlan, course: np.ndarray) -> DrivePlan:
         """Return a plan as asked for, with what there is to say."""
-        said = f"{self._excess(asked)}; reference.limits: respect would slow it down there"
+        excess = self._excess(asked, self.allowed(course))
+        said = f"{excess}; reference.limits: respect would slow it down there"
         return replace(asked, said=[said])
 
     def _rates(self, time: float) -> np.ndarray:
         return self._task.motion.derivatives(np.array([time]), 1)[0, 1]
 
-    def _excess(self, asked: DrivePlan) -> str:
+    def _excess(self, asked: DrivePlan, allowed: np.ndarray) -> str:
         """Return what is too much in a motion as it was asked for."""
-        share = np.abs(asked.demand) / asked.limits
-        i, column = np.unravel_index(int(share.argmax()), share.shape)
+        ratio = np.abs(asked.demand) / allowed
+        i, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
+        share = np.abs(asked.demand[i, column]) / asked.limits[column]
         kind = "torque" if column < len(self.limits) // 2 else "speed"
         where = self.where(asked.times[i])
         return (
-            f"as asked for it takes {100.0 * share[i, column]:.0f} % of the {kind} of axis "
+            f"as asked for it takes {100.0 * share:.0f} % of the {kind} of axis "
             f"{column % (len(self.limits) // 2) + 1} at {where}"
         )
 

@@ -79,7 +79,7 @@ class CourseFinder:
             start: Where it begins.
             reference: Derivatives 0..r of the virtual output's reference, shape (samples, r + 1,
                 m).
-            times: Of the samples [s], shape (samples,).
+            times: Of the samples, evenly spaced [s], shape (samples,).
             still: Whether joints beyond the outputs only move with them, as little as they can.
                 The posture's own motion needs samples as close as those of the law.
 
@@ -89,10 +89,11 @@ class CourseFinder:
         course = np.zeros((len(times), self._order + 1, self._n))
         q, memory = np.zeros((self._order + 1, self._n)), start.memory
         q[0], q_0 = start.q_J, start.q_J
-        steps = np.diff(times, prepend=times[0])
-        for i, step in enumerate(steps):
+        advance = _advance(self._order, float(times[1] - times[0])) if len(times) > 1 else None
+        for i in range(len(times)):
             if i == 0 or not _rests(q, reference[i - 1 : i + 1]):
-                q = _advanced(q, step)
+                if i > 0:
+                    q = advance @ q
                 if still:
                     q[1:] = 0.0
                 memory = self._correct(q, None if still else q_0, reference[i], memory)
@@ -165,11 +166,12 @@ def _rests(q: np.ndarray, reference: np.ndarray) -> bool:
     )
 
 
-def _advanced(q: np.ndarray, step: float) -> np.ndarray:
-    """Return derivatives (r + 1, N) a step later, the last being constant."""
-    orders = range(len(q))
-    later = [sum(q[k + j] * (step**j / factorial(j)) for j in range(len(q) - k)) for k in orders]
-    return np.array(later)
+def _advance(order: int, step: float) -> np.ndarray:
+    """Return the matrix that advances derivatives 0..order by a step, the last being constant."""
+    ahead = np.subtract.outer(np.arange(order + 1), np.arange(order + 1)).T
+    return np.array(
+        [[step**j / factorial(j) if j >= 0 else 0.0 for j in row.tolist()] for row in ahead]
+    )
 
 
 def _output_function(robot: RobotModel, manifold: PlaceManifold) -> ca.Function:

@@ -10,7 +10,7 @@ from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
 from pfsc_drake.errors import InputError
 
 # paces that are tried; slower than the slowest, a motion stands
-_LADDER = np.linspace(1.0, 0.005, 200)
+_LADDER = np.linspace(1.0, 0.01, 100)
 # steps to the time asked for, from a linear guess
 _NEWTON = 4
 # box filters that make the pace C^4
