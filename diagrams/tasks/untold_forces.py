@@ -38,7 +38,8 @@ def untold_forces(
     observed = friction.source == "observer" and friction.observer == "disturbance"
     if source != "none" or (observed and not exact) or law.linearization.relative_degree == 1:
         return []
-    way, bearable = force * _yield(scenario, robot, law, rest), _bearable(scenario)
+    way = force * _yield(scenario, robot, law, rest) if force else 0.0
+    bearable = _bearable(scenario)
     if not way > bearable and not (exact and (force or scenario.hold_back.force)):
         return []
     effect = _DEFLECTIONS if exact else "it gives way to them like a spring"
