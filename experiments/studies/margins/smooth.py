@@ -56,8 +56,12 @@ def smooth(settings: Scenario) -> tuple[Scenario, list[str]]:
     on_tool = any(not pulse.link for pulse in settings.forces) or settings.hold_back.force != 0.0
     result.forces, result.pushes, result.hold_back = [], [], HoldBackParameters()
     removed += ["forces on the tool"] * on_tool + ["forces on links"] * on_links
-    if any(settings.start.offset) or any(settings.start.rotation_deg):
-        result.start.offset, result.start.rotation_deg = [0.0, 0.0], [0.0, 0.0, 0.0]
+    # what presses starts beside the workpiece, which may stand where the surface was taught
+    beside = any(settings.start.offset) and settings.workpiece is None
+    if beside:
+        result.start.offset = [0.0, 0.0]
+    if beside or any(settings.start.rotation_deg):
+        result.start.rotation_deg = [0.0, 0.0, 0.0]
         removed.append("start beside the path")
     result.simulation.sensor_failure = SensorFailureParameters()
     return result, removed
