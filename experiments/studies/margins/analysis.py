@@ -214,6 +214,11 @@ def analyse(
         drives_are_servos=own.drives_are_servos,
         remarks=_remarks(removed, way, station.workpiece is not None) + remarks,
     )
+    if only_start and settings.compliance.needs_sensor:
+        analysis.remarks.append(
+            "At the start the force sensor is not tared yet, and nothing yields: the loop over it "
+            "is not in these margins."
+        )
     for instant, loop in zip(way.instants, loops, strict=True):
         progress(instant.time, "margins of the drives")
         if loop is not None:
