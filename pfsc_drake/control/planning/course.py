@@ -89,7 +89,8 @@ class CourseFinder:
         course = np.zeros((len(times), self._order + 1, self._n))
         q, memory = np.zeros((self._order + 1, self._n)), start.memory
         q[0], q_0 = start.q_J, start.q_J
-        advance = _advance(self._order, float(times[1] - times[0])) if len(times) > 1 else None
+        step = float(times[1] - times[0]) if len(times) > 1 else 0.0
+        advance = _advance(self._order, step)
         for i in range(len(times)):
             if i == 0 or not _rests(q, reference[i - 1 : i + 1]):
                 if i > 0:
