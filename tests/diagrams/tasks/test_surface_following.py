@@ -201,3 +201,11 @@ def test_places_that_a_hand_goes_to(task):
     normal = np.array([-0.2, 0.0, 1.0]) / np.sqrt(1.04)
     np.testing.assert_allclose(point, np.array([0.9, 0.0, 1.01]) + 0.02 * normal, atol=1e-12)
     np.testing.assert_array_equal(velocity, 0.0)
+
+
+def test_the_ramps_of_the_visco_elastic_axes_reach_the_speeds_that_are_said(load_scenario):
+    """1.5 and 1 m/s, of which a way of 0.55 m between two stops is too short for slow ramps."""
+    motion = make_task(load_scenario("sfc_viscoelastic_3r"), Path()).motion
+    times = np.linspace(*motion.domain, 4001)
+    speeds = np.abs(motion.derivatives(times, 1)[:, 1]).max(axis=0)
+    np.testing.assert_allclose(speeds, [1.5, 1.0], rtol=1e-9)

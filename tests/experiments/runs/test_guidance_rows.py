@@ -117,7 +117,7 @@ def run(arm, scenario, kind, places, changes, duration):
         f"{{time: {t}, position: {np.add(STARTS[kind], place).tolist()}}}"
         for t, place in [(BEGIN, [0.0, 0.0, 0.0]), *places]
     )
-    hand = ["hand.frame=world", f"hand.waypoints=[{waypoints}]"]
+    hand = ["hand.frame=world", f"hand.waypoints=[{waypoints}]", "hand.rotational_stiffness=0"]
     changes = [*hand, "start.transition=0.05", *changes]
     file = read_scenario(scenario, changes)
     settings = load_typed(Scenario, file.data, str(file.path))
