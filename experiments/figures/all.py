@@ -44,6 +44,7 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from experiments.figures.surface_fit import draw_surface_fit
+from experiments.figures.virtual_input import draw_virtual_input, has_virtual_input
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals
 from reporting.style import STYLE, Drawing, Figure, render
@@ -110,6 +111,7 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("phi"), draw_orientation),
     (_has("angles_e", "angles_d"), draw_angles),
     (_has("axis_e", "axis_d"), draw_axis),
+    (has_virtual_input, draw_virtual_input),
     (has_forces, draw_forces),
     (has_varying_damping, draw_damping),
     (_has("notch_position"), draw_notch_position),

@@ -188,7 +188,9 @@ def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: 
         if linearization.relative_degree > 1:
             rates = [f"{x}_dot" for x in labels]
             log.add(f"{name}_dot", Y[:, 1, part], f"{kind.unit}/s", rates)
-    log.add("virtual_input", law[:, layout.virtual_input], f"SI/s^{linearization.relative_degree}")
+    names = [f"v_{coordinate.name}" for coordinate in station.task.place.coordinates]
+    unit = f"SI/s^{linearization.relative_degree}"
+    log.add("virtual_input", law[:, layout.virtual_input], unit, names)
     status = law[:, layout.status]
     log.add("fault", status[:, 0].astype(int), "1", [fault.name.lower() for fault in Fault])
     log.add("rcond", status[:, 1], "1")

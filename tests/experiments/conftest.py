@@ -137,6 +137,8 @@ def drawn_log():
     log.add("xi", np.stack([0.01 * decay, 0.0 * time], axis=1), "m")
     log.add("xi_p", np.zeros((201, 2)), "m")
     log.add("phi", np.outer(decay, [1e-3, 2e-3, 3e-3]), "rad")
+    names = ["v_eta", "v_xi_1", "v_xi_2", "v_phi_1", "v_phi_2", "v_phi_3"]
+    log.add("virtual_input", np.outer(decay, np.arange(1.0, 7.0)), "SI/s^4", names)
     log.add("angles_e", np.outer(time, [0.1, 0.2, 0.3]), "rad", ["z", "y", "x"])
     log.add("angles_d", np.outer(time, [0.1, 0.2, 0.2]), "rad", ["z", "y", "x"])
     for name, unit in (("q_J", "rad"), ("q_M", "rad"), ("v_J", "rad/s"), ("v_M", "rad/s")):

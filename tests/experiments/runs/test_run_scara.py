@@ -54,6 +54,20 @@ def test_two_turns_and_one_angle_everywhere(scara):
     np.testing.assert_allclose(run["R_e"][:, 8], -1.0, rtol=0, atol=1e-12)
 
 
+def test_the_virtual_input_is_what_the_rates_change_by(scara):
+    """While the tool comes to the path, before speed along it bends what a sample holds."""
+    run = scara(duration="0.4")
+    kinds = ("eta", "xi", "phi")
+    names = [f"v_{label}" for kind in kinds for label in run.marks[kind]["labels"]]
+    assert list(run.marks["virtual_input"]["labels"]) == names
+    assert run.marks["virtual_input"]["unit"] == "SI/s^2"
+    rates = np.column_stack([run[f"{kind}_dot"] for kind in kinds])
+    found = np.diff(rates, axis=0) / np.diff(run.t)[:, None]
+    span = np.abs(run["virtual_input"]).max(axis=0)
+    assert np.all(span > [0.5, 1.0, 1.0, 1.0])
+    assert np.all(np.abs(found - run["virtual_input"][:-1]) < 1e-3 * span)
+
+
 def test_elastic_joints_and_time(scara):
     """The law of order four, and a point that moves with time."""
     elastic = "robot.elastic={stiffness: [20000, 10000, 2000000, 400]}"
