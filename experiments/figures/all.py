@@ -125,6 +125,6 @@ _FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
     (_has("tau_d"), draw_efforts),
     (_has("tau_f", "v_J"), draw_friction),
     (_has("tau_f", "friction_estimate"), draw_friction_estimate),
-    (_has("f_c", "f_c_estimate", "f_v", "f_v_estimate"), draw_friction_coefficients),
+    (_has("momentum", "f_c", "f_v"), draw_friction_coefficients),
     (_has("q_M", "q_J"), draw_deflection),
 ]

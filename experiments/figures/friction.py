@@ -15,6 +15,7 @@ from reporting.style import (
 )
 
 _SMALLEST_SPAN = 2.0  # %, of the axis of relative errors
+_TOGETHER = 3  # axes whose momenta share a panel
 
 
 def draw_friction_estimate(log: RunLog) -> Drawing:
@@ -35,10 +36,19 @@ def draw_friction_estimate(log: RunLog) -> Drawing:
 
 
 def draw_friction_coefficients(log: RunLog) -> Drawing:
-    """Estimated Coulomb and viscous friction in units of the true ones."""
-    canvas, panels = make_panels(2, height=2.8)
+    """Momenta, and the coefficients estimated from them in units of the true ones (Fig. A.1)."""
+    momentum = log["momentum"]
+    shares = _shares(momentum.dim)
+    canvas, panels = make_panels(len(shares) + 2, height=2.4)
+    for panel, axes in zip(panels, shares, strict=False):
+        for axis in axes:
+            label = rf"$p_{axis + 1}$"
+            panel.plot(log.time, momentum.values[:, axis], color=_colour(axis), label=label)
+        title = "Generalized momenta $p$" if axes[0] == 0 else "Those of the last axes"
+        panel.set(ylabel=f"momentum in {momentum.unit}", title=title)
+        place_legend(panel)
     kinds = {"f_c": "Coulomb friction $f_c$", "f_v": "Viscous friction $f_v$"}
-    for panel, (name, title) in zip(panels, kinds.items(), strict=True):
+    for panel, (name, title) in zip(panels[-2:], kinds.items(), strict=True):
         values = 100.0 * (1.0 + relative_errors(log, name))
         labels = [f"axis {i + 1}" for i in range(values.shape[1])]
         panel.axhline(100.0, color=REFERENCE, linewidth=0.8)
@@ -48,9 +58,19 @@ def draw_friction_coefficients(log: RunLog) -> Drawing:
         span = max(1.1 * float(np.nanmax(np.abs(late), initial=0.0)), _SMALLEST_SPAN)
         panel.set_ylim(100.0 - span, 100.0 + span)
         panel.set(ylabel="estimate in %\nof the true one", title=title)
-    place_legend(panels[0])
+    place_legend(panels[-2])
     caption = (
-        "Estimated coefficients of friction in units of the true ones; the band is 2 % wide to "
-        "either side."
+        "Momenta on which friction acts, from which it is estimated, and the estimated coefficients"
+        " in units of the true ones; the band is 2 % wide to either side."
     )
     return Drawing("friction_coefficients", "Estimated coefficients of friction", caption, canvas)
+
+
+def _shares(axes: int) -> list[range]:
+    """Axes of each panel of momenta: those next to the tool have too little to be seen."""
+    half = (axes + 1) // 2
+    return [range(axes)] if axes <= _TOGETHER else [range(half), range(half, axes)]
+
+
+def _colour(axis: int) -> str:
+    return COLOURS[axis % len(COLOURS)]

@@ -4,6 +4,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
+from experiments.results.friction_signals import add_friction, friction_signals
 from experiments.results.guidance_signals import add_guidance
 from experiments.results.link_signals import add_link_signals
 from experiments.results.mounting_signals import PLATE_SIGNALS, add_mounting_signals
@@ -91,18 +92,11 @@ def optional_signals(station: Station) -> set[str]:
         names |= PLATE_SIGNALS
     if "desired_reference" in names:
         names.add("xi_d")
-    if "friction_torque" in names:
-        names.add("tau_f")
-    estimate = station.log.rows.get("friction_estimate")
-    if estimate is not None and estimate.stop - estimate.start > station.robot.dimension:
-        names |= {"f_c_estimate", "f_v_estimate"}
-        if "tau_f" in names:
-            names |= {"f_c", "f_v"}
     if "push_wrench" in names:
         names.add("push_force")
     if station.on_motors:
         names.add("xi_M")
-    names |= posture_signals(station)
+    names |= posture_signals(station) | friction_signals(station)
     names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
     return names
 
@@ -290,29 +284,4 @@ def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
         log.add("tau_d", raw["drive_torque"], effort, labels, limits)
         names = [fault.name.lower() for fault in Fault]
         log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
-    if "friction_torque" in raw:
-        labels = [f"tau_f_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("tau_f", raw["friction_torque"], effort, labels)
-    if "friction_estimate" in raw:
-        _add_friction_estimate(log, station, raw["friction_estimate"])
-    if "f_c_estimate" in log and "friction_torque" in raw:
-        _add_coefficients(log, station)
-
-
-def _add_coefficients(log: RunLog, station: Station) -> None:
-    """Add the true coefficients of friction, in the units of what is estimated."""
-    friction = station.diagram.GetSubsystemByName("joint_friction")
-    for name, values in zip(("f_c", "f_v"), friction.coefficients(log.time), strict=True):
-        labels = [f"{name}_{i + 1}" for i in range(station.robot.dimension)]
-        log.add(name, values, log[f"{name}_estimate"].unit, labels)
-
-
-def _add_friction_estimate(log: RunLog, station: Station, estimate: np.ndarray) -> None:
-    """Add what is thought of friction: torques, and coefficients if they are estimated."""
-    _, speed, effort = _joint_units(station)
-    n = station.robot.dimension
-    names = {"friction_estimate": ("tau_f", effort), "f_c_estimate": ("f_c", effort)}
-    names["f_v_estimate"] = ("f_v", f"{effort} s/rad" if speed == "rad/s" else f"{effort} s/m")
-    parts = np.split(estimate, estimate.shape[1] // n, axis=1)
-    for (name, (symbol, unit)), values in zip(names.items(), parts, strict=False):
-        log.add(name, values, unit, [f"{symbol}_estimate_{i + 1}" for i in range(n)])
+    add_friction(log, station, raw, effort)

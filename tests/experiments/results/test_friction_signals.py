@@ -1,0 +1,56 @@
+"""The momenta of a log against Drake's mass matrix of the robot as it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.builder import build_station
+from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains, Scenario
+from experiments.catalog.scenario_catalog import find_scenario
+from experiments.results.friction_signals import friction_signals
+from experiments.results.run_signals import collect_log, optional_signals
+from experiments.simulation import simulate
+from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.yaml.typed import load_file
+
+
+@pytest.fixture(name="settings")
+def fixture_settings():
+    """Return three axes that are observed on their way to the path, masses believed 10 % low."""
+    settings = load_file(Scenario, find_scenario("pfc_elastic_3r"))
+    settings.friction = JointFrictionParameters([4.0, 9.0, 2.0], [1.0, 9.0, 3.0])
+    settings.controller.friction.source = "observer"
+    settings.controller.friction.observer = "kalman"
+    settings.model_error.mass = [0.9]
+    return settings
+
+
+def run(settings):
+    station = build_station(settings, Path())
+    result = simulate(station, settings.simulation, 0.1, lambda *_: None)
+    log = collect_log(station, result.root)
+    assert log["momentum"].unit == "Nm s"
+    assert log["momentum"].labels == ["p_1", "p_2", "p_3"]
+    assert friction_signals(station) <= optional_signals(station) & set(log.signals)
+    assert {"momentum", "f_c", "f_v_estimate"} <= friction_signals(station)
+    return station.part.model, result.root, log
+
+
+def test_of_rigid_joints_it_is_that_of_arm_and_rotors(settings):
+    settings.robot.model = "comau_racer_1_4_3r"
+    settings.controller.law = "rigid"
+    poles = GainParameters(poles=[-30.0, -30.0])
+    settings.controller.gains = {"rigid": LawGains(poles, poles)}
+    plant, root, log = run(settings)
+    context = plant.GetMyContextFromRoot(root)
+    momentum = plant.CalcMassMatrix(context) @ plant.GetVelocities(context)
+    assert np.abs(momentum).max() > 0.5
+    np.testing.assert_allclose(log["momentum"].values[-1], momentum, rtol=1e-6, atol=1e-6)
+
+
+def test_of_elastic_joints_it_is_that_of_the_motors(settings):
+    _, _, log = run(settings)
+    inertia = load_parameters("comau_racer_1_4").rotors.reflected_inertia[:3]
+    assert np.abs(log["v_M"].values).max() > 0.01
+    np.testing.assert_allclose(log["momentum"].values, inertia * log["v_M"].values, rtol=1e-12)
