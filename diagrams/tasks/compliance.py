@@ -1,12 +1,14 @@
 """Compliance: from forces on the tool to the reference of the law."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import ComplianceParameters, Scenario
 from pfsc_drake.control.compliance.impedance import (
+    DAMPING,
     MASS,
     STIFFNESS,
     CoordinateImpedance,
@@ -16,7 +18,7 @@ from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
@@ -130,7 +132,8 @@ def add_compliance(
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
-    signals = _add_press(builder, scenario, linearization, force, ports[ready], end)
+    told = {"manifold_force": force, "reference": reference, "ready": ports[ready]}
+    signals = _add_press(builder, scenario, law, manifold.coordinates, told, end)
     builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
     builder.Connect(ports[ready], impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
@@ -214,13 +217,13 @@ def _add_tuner(
 def _add_press(
     builder: DiagramBuilder,
     scenario: Scenario,
-    linearization: Linearization,
-    force: OutputPort,
-    ready: OutputPort,
+    law: ImpedanceLaw,
+    coordinates: Sequence[Coordinate],
+    ports: dict[str, OutputPort],
     end: float,
 ) -> dict[str, OutputPort]:
     """Return what :class:`Pressing` gives, if there is a force reference."""
-    press, coordinates = scenario.compliance.press, linearization.manifold.coordinates
+    press = scenario.compliance.press
     if press is None:
         return {}
     across = indices(coordinates, Kind.TRANSVERSAL)
@@ -229,16 +232,24 @@ def _add_press(
             "compliance.press: must be null unless controller.manifold is surface, which has one "
             "transversal coordinate"
         )
+    mass, damping = law.impedance(np.zeros(len(coordinates)))[[MASS, DAMPING], across.start]
+    if not damping > 0.0:
+        raise InputError(
+            f"compliance.transversal.damping = {damping:g}: must be positive where a tool presses, "
+            "whose speed towards the workpiece is force / damping"
+        )
     pressing = Pressing(
-        press.over_time(end),
+        press.over_time(end, stiffest=damping**2 / (4.0 * mass)),
         press.touching,
         across.start,
         len(coordinates),
+        ports["reference"].size(),
         scenario.controller.sampling_time,
         press.allowed_difference,
+        press.taken_off(end),
     )
     system = builder.AddNamedSystem("pressing", pressing)
-    builder.Connect(force, system.GetInputPort("manifold_force"))
-    builder.Connect(ready, system.GetInputPort("ready"))
+    for name, port in ports.items():
+        builder.Connect(port, system.GetInputPort(name))
     signals = {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}
     return signals | {"press_lost": system.GetOutputPort("lost")}

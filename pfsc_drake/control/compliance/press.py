@@ -19,12 +19,15 @@ class PressParameters:
     ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
     workpiece with little, to be slow without much damping, which would turn a slope of the
     workpiece into a force; from touch-down with all of it; in the end the other way, off the
-    workpiece.
+    workpiece. A force that went on would carry the tool away for ever, and so would what is left
+    of the sensor's bias: the last part of the way off is led by a spring, which holds the tool
+    there.
 
     Attributes:
         force: With which it presses against the normal [N].
         approach: The same until touch-down [N].
-        retreat: With which it is taken off along the normal [N].
+        retreat: With which it is taken off along the normal [N], a positive number.
+        clearance: How far it is taken off from where it pressed [m], a positive number.
         begin: When it sets off [s].
         touching: From which measured force on the tool is on the workpiece [N]; the approach
             must reach it.
@@ -38,6 +41,7 @@ class PressParameters:
     force: float = 20.0
     approach: float = 6.0
     retreat: float = 6.0
+    clearance: float = 0.01
     begin: float = 0.1
     touching: float = 3.0
     retreat_time: float = 0.5
@@ -45,8 +49,11 @@ class PressParameters:
     limit: float = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("force", "approach", "retreat", "begin", "retreat_time"):
+        for key in ("force", "approach", "begin", "retreat_time"):
             self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
+        # without it nothing would hold the tool once it does not press any more
+        self._require("retreat", 0.0 < self.retreat <= 1e6, "a positive number of newtons")
+        self._require("clearance", 0.0 < self.clearance <= 1e3, "a positive number of meters")
         self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
         if self.force > 0.0:
             reached = 0.0 < self.touching < self.approach
@@ -70,26 +77,39 @@ class PressParameters:
         if not good:
             raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
 
-    def over_time(self, end: float) -> Callable[[float, float], float]:
+    def taken_off(self, end: float) -> float:
+        """Return from when on the tool is taken off [s].
+
+        Args:
+            end: When the reference ends [s].
+        """
+        return end - self.retreat_time
+
+    def over_time(self, end: float, stiffest: float) -> Callable[[float, float, float], float]:
         """Return the force along the inward normal that the workpiece is to bear.
 
         Args:
             end: When the reference ends [s].
+            stiffest: Stiffness up to which the tool does not swing, ``d^2 / (4 m)`` [N/m]; that of
+                the spring in the end is half the clearance's for ``retreat``, or this if less.
 
         Returns:
-            Function of the time and of the time of touch-down, infinite before it, [s] -> [N].
+            Function of the time, of the time of touch-down, infinite before it, and of how far the
+            tool is from where it was when it began to be taken off, [s], [s], [m] -> [N].
         """
-        rest = Transition(self.ramp, 0)
-        off = end - self.retreat_time
+        rest, off = Transition(self.ramp, 0), self.taken_off(end)
+        stiffness = min(2.0 * self.retreat / self.clearance, stiffest)
 
         def change(time: float, begin: float) -> float:
             return float(1.0 - rest.at(time - begin)[0])
 
-        def force(time: float, touch_down: float) -> float:
+        def force(time: float, touch_down: float, lifted: float) -> float:
             pressed = self.approach * change(time, self.begin)
             if touch_down < math.inf:
                 pressed += (self.force - self.approach) * change(time, touch_down)
             share_off = change(time, off)
-            return (1.0 - share_off) * pressed - share_off * self.retreat
+            spring = stiffness * (self.clearance - lifted)
+            lift = max(-self.retreat, min(self.retreat, spring))
+            return (1.0 - share_off) * pressed - share_off * lift
 
         return force

@@ -8,34 +8,45 @@ import pytest
 from pfsc_drake.control.compliance.press import PressParameters
 from pfsc_drake.errors import InputError
 
-END = 5.0
+END, STIFF = 5.0, 1e6
 
 
 def test_it_approaches_presses_and_retreats():
     press = PressParameters(
         force=20.0, approach=6.0, retreat=4.0, begin=0.1, touching=3.0, retreat_time=0.5, ramp=0.2
     )
-    force = press.over_time(END)
+    force = press.over_time(END, STIFF)
     times = [0.0, 0.1, 0.3, 1.0, 1.1, 1.2, 4.5, 4.6, 4.7, 6.0]
     expected = [0.0, 0.0, 6.0, 6.0, 13.0, 20.0, 20.0, 8.0, -4.0, -4.0]
-    assert [force(time, 1.0) for time in times] == pytest.approx(expected)
+    assert [force(time, 1.0, 0.0) for time in times] == pytest.approx(expected)
 
 
 def test_nothing_met_is_approached_for_ever_and_left_again():
-    force = PressParameters(approach=6.0, retreat=4.0).over_time(END)
-    assert force(4.0, math.inf) == pytest.approx(6.0)
-    assert force(END, math.inf) == pytest.approx(-4.0)
+    force = PressParameters(approach=6.0, retreat=4.0).over_time(END, STIFF)
+    assert force(4.0, math.inf, 0.0) == pytest.approx(6.0)
+    assert force(END, math.inf, 0.0) == pytest.approx(-4.0)
 
 
 @pytest.mark.parametrize("touch_down", [0.15, 1.0, 4.52])
 def test_it_is_smooth(touch_down):
     press, step = PressParameters(), 1e-4
-    force = press.over_time(END)
-    forces = np.array([force(time, touch_down) for time in np.arange(0.0, END, step)])
+    force = press.over_time(END, STIFF)
+    forces = np.array([force(time, touch_down, 0.0) for time in np.arange(0.0, END, step)])
     slope = np.diff(forces) / step
     # of a step that is C^4: 315 / 128; two of them at once
     assert np.abs(slope).max() < 2.0 * 2.5 * 26.0 / press.ramp
     assert np.abs(np.diff(slope)).max() < 20.0 * step * 26.0 / press.ramp**2
+
+
+def test_what_is_taken_off_comes_to_rest_by_a_spring():
+    """Half the clearance with all of the force, then less, and back from beyond."""
+    force = PressParameters(retreat=4.0, clearance=0.01).over_time(END, STIFF)
+    lifted = [-0.001, 0.0, 0.005, 0.0075, 0.01, 0.0125, 0.1]
+    expected = [-4.0, -4.0, -4.0, -2.0, 0.0, 2.0, 4.0]
+    assert [force(END, 1.0, x) for x in lifted] == pytest.approx(expected)
+    soft = PressParameters(retreat=4.0, clearance=0.01).over_time(END, 100.0)
+    assert soft(END, 1.0, 0.0075) == pytest.approx(-0.25)
+    assert soft(1.0, 0.5, 0.1) == pytest.approx(20.0), "before it is taken off it only presses"
 
 
 @pytest.mark.parametrize(
@@ -45,6 +56,8 @@ def test_it_is_smooth(touch_down):
         ({"ramp": 0.0}, "ramp = 0.0: must be a positive"),
         ({"touching": 6.0}, "touching = 6.0: must be a positive number below approach = 6 N"),
         ({"retreat": float("nan")}, "retreat = nan"),
+        ({"retreat": 0.0}, "retreat = 0.0: must be a positive number of newtons"),
+        ({"clearance": 0.0}, "clearance = 0.0: must be a positive number of meters"),
     ],
 )
 def test_refused(change, words):
