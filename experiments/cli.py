@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.markup import escape
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from reporting.page import Report
 
 _LONGEST_AFTER_FAULT = 100.0  # s
+_WIDEST_TABLE = 160  # columns, of postures
 # studies that run by their names, as a scenario does
 IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
 
@@ -373,6 +375,41 @@ def margins_command(
             console.print()
         console.print(summary(outcome.analysis), highlight=False)
         raise typer.Exit(show_page("margins", outcome.report))
+
+
+@app.command("inverse-kinematics")
+def inverse_kinematics_command(
+    model: Annotated[
+        str, typer.Argument(help="Name of a shipped arm, or path of a parameters.yaml.")
+    ],
+    position: Annotated[
+        tuple[float, float, float],
+        typer.Option(metavar="X Y Z", help="Tool point in the base frame [m]."),
+    ],
+    zyx_deg: Annotated[
+        tuple[float, float, float],
+        typer.Option(
+            metavar="A B C",
+            help="Angles of the flange about z, then the new y, then the new x [deg].",
+        ),
+    ],
+) -> None:
+    """Print all postures of an arm with a spherical wrist that reach a pose, in closed form."""
+    from experiments.inverse_kinematics import find_postures, posture_table
+
+    with interruptible():
+        postures = find_postures(model, np.array(position), np.array(zyx_deg))
+        table, console = posture_table(postures), Console()
+        # angles that a narrow terminal cuts off are worth nothing
+        console.width = max(console.width, _WIDEST_TABLE)
+        console.print(table)
+        within = sum(posture.branch.is_within_limits for posture in postures)
+        console.print(f"{within} of {len(postures)} within the limits, angles in deg")
+        if any(p.branch.is_singular for p in postures):
+            console.print(
+                "theta_1 of an open shoulder and theta_4 of a straight wrist are free: 0 stands "
+                "for all"
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -309,10 +309,10 @@ def load_parameters(robot: str | Path) -> RobotParameters:
     """
     path = Path(robot)
     if not path.suffix:
+        files = models_directory().glob("*/parameters.yaml")
+        known = sorted(file.parent.name for file in files if any(file.parent.glob("*.sdf")))
         path = models_directory() / path / "parameters.yaml"
-        if not path.is_file():
-            arms = {file.parent.name for file in models_directory().glob("*/*.sdf")}
-            known = sorted(arms)
+        if str(robot) not in known:
             raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
     return load_file(RobotParameters, path)
 

@@ -19,6 +19,36 @@ Vector = Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
+class Branch:
+    """One of the postures that reach a pose.
+
+    Attributes:
+        q: ``[6]`` joint angles [rad].
+        violation: ``[6]`` by how much they are beyond their limits [rad]; zero within.
+        shoulder: ``front`` or ``back``, whether it is turned towards the wrist centre; ``open`` if
+            that lies on axis 1.
+        elbow: ``up`` or ``down``, above or below the line from the shoulder to the wrist centre.
+        wrist: ``positive`` or ``flipped``, the sign of ``theta_5``; ``straight`` if that is 0.
+    """
+
+    q: np.ndarray
+    violation: np.ndarray
+    shoulder: str
+    elbow: str
+    wrist: str
+
+    @property
+    def is_within_limits(self) -> bool:
+        """Whether all joints are within their limits, but for rounding."""
+        return bool(np.all(self.violation <= _LIMIT_TOLERANCE))
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether an angle of it is a preference, of many that reach the pose."""
+        return self.shoulder == "open" or self.wrist == "straight"
+
+
+@dataclass(frozen=True, eq=False)
 class SphericalWrist:
     """All joint angles of a six-axis robot with spherical wrist that reach a pose.
 
@@ -72,16 +102,39 @@ class SphericalWrist:
         Raises:
             InputError: if the pose is out of reach, or if every branch violates a limit.
         """
+        found = self.branches(y_t, R_e, preference=preference)
+        allowed = [branch.q for branch in found if branch.is_within_limits]
+        if not allowed:
+            where = np.asarray(y_t, dtype=float).tolist()
+            raise InputError(f"pose at y_t = {where} m: {self._describe_limits(found)}")
+        return np.clip(allowed, self.lower, self.upper)
+
+    def branches(
+        self, y_t: Vector, R_e: np.ndarray, *, preference: Vector = (0,) * 6
+    ) -> list[Branch]:
+        """Returns all branches, whether within the limits or not, in the order of solutions.
+
+        Args:
+            y_t: ``[3]`` tool point in the base frame [m].
+            R_e: ``[3, 3]`` rotation from DH frame 6 to the base frame.
+            preference: ``[6]`` angles that stand in where a singularity leaves them open [rad].
+
+        Raises:
+            InputError: if the pose is out of reach.
+        """
         y_t, R_e = _finite("y_t", y_t, (3,)), _finite("R_e", R_e, (3, 3))
         preference = _finite("preference", preference, (6,))
         if np.abs(R_e.T @ R_e - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(R_e) < 0:
             raise InputError(f"R_e = {R_e.tolist()}: must be a rotation matrix")
-        branches = self._unwrap(self._branches(y_t, R_e, preference))
-        within = self._violation(branches) <= _LIMIT_TOLERANCE
-        allowed = branches[np.all(within, axis=1)]
-        if not allowed.size:
-            raise InputError(f"pose at y_t = {y_t.tolist()} m: {self._describe_limits(branches)}")
-        return np.clip(allowed, self.lower, self.upper)
+        wrist_offset = self.tool_offset + np.array([0.0, 0.0, self.table.d[5]])
+        y_wcp = y_t - R_e @ wrist_offset  # (2.9)
+        found = []
+        for shoulder, elbow, arm in self._arm_angles(y_wcp, preference[0]):
+            for wrist, angles in _wrist_angles(self._R_36(arm, R_e), preference[3]):
+                q = self._unwrap(np.concatenate([arm, angles]))
+                violation = np.maximum(np.maximum(self.lower - q, q - self.upper), 0.0)
+                found.append(Branch(q, violation, shoulder, elbow, wrist))
+        return found
 
     def closest(self, y_t: Vector, R_e: np.ndarray, q_reference: Vector) -> np.ndarray:
         """Returns the solution within the limits that is closest to a reference.
@@ -107,40 +160,34 @@ class SphericalWrist:
         distance = np.sum((found - reference) ** 2, axis=1)
         return np.clip(found[np.argmin(distance)], self.lower, self.upper)
 
-    def _branches(self, y_t: np.ndarray, R_e: np.ndarray, preference: np.ndarray) -> np.ndarray:
-        wrist_offset = self.tool_offset + np.array([0.0, 0.0, self.table.d[5]])
-        y_wcp = y_t - R_e @ wrist_offset  # (2.9)
-        found = [
-            np.concatenate([arm, wrist])
-            for arm in self._arm_angles(y_wcp, preference[0])
-            for wrist in _wrist_angles(self._R_36(arm, R_e), preference[3])
-        ]
-        return np.array(found)
-
-    def _arm_angles(self, y_wcp: np.ndarray, theta_1_open: float) -> list[np.ndarray]:
-        """Returns theta_1 to theta_3 of all branches that reach the wrist centre, (2.10a-c)."""
+    def _arm_angles(
+        self, y_wcp: np.ndarray, theta_1_open: float
+    ) -> list[tuple[str, str, np.ndarray]]:
+        """Returns shoulder, elbow and theta_1..3 of all that reach the wrist centre, (2.10a-c)."""
         a_1, a_2, a_3 = self.table.a[:3]
         d_1, d_4 = self.table.d[[0, 3]]
         rho, s_ik = np.hypot(y_wcp[0], y_wcp[1]), y_wcp[2] - d_1
         b_ik, gamma_ik = np.hypot(a_3, d_4), np.arctan2(a_3, d_4)
         if rho > _SINGULAR:
             front = np.arctan2(y_wcp[1], y_wcp[0])
-            shoulders = [(front, rho - a_1), (front + np.pi, -rho - a_1)]
+            shoulders = [("front", front, rho - a_1), ("back", front + np.pi, -rho - a_1)]
         else:
-            shoulders = [(theta_1_open, -a_1)]
+            shoulders = [("open", theta_1_open, -a_1)]
         found, distances = [], []
-        for theta_1, r_ik in shoulders:
+        for shoulder, theta_1, r_ik in shoulders:
             distances.append(np.hypot(r_ik, s_ik))
             c_ik = (a_2**2 + b_ik**2 - r_ik**2 - s_ik**2) / (2 * a_2 * b_ik)
             if abs(c_ik) > 1 + _REACH_TOLERANCE:
                 continue
             inner = np.arccos(np.clip(c_ik, -1.0, 1.0))  # between upper arm and forearm
-            for bend in (inner, -inner):  # elbow up, elbow down
+            # a turn of the upper arm against the line to the wrist centre lifts it in front only
+            up = inner if r_ik >= 0.0 else -inner
+            for elbow, bend in (("up", up), ("down", -up)):
                 theta_3 = bend - gamma_ik - np.pi / 2
                 theta_2 = np.arctan2(s_ik, r_ik) + np.arctan2(
                     b_ik * np.cos(theta_3 + gamma_ik), a_2 + b_ik * np.sin(theta_3 + gamma_ik)
                 )
-                found.append(np.array([theta_1, theta_2, theta_3]))
+                found.append((shoulder, elbow, np.array([theta_1, theta_2, theta_3])))
         if not found:
             shown = " or ".join(f"{distance:.4f}" for distance in distances)
             reach = f"{abs(a_2 - b_ik):.4f} to {a_2 + b_ik:.4f} m"
@@ -159,23 +206,19 @@ class SphericalWrist:
         middle = 0.5 * (self.lower + self.upper)
         return q - 2 * np.pi * np.round((q - middle) / (2 * np.pi))
 
-    def _violation(self, q: np.ndarray) -> np.ndarray:
-        return np.maximum(np.maximum(self.lower - q, q - self.upper), 0.0)
-
-    def _describe_limits(self, branches: np.ndarray) -> str:
+    def _describe_limits(self, branches: list[Branch]) -> str:
         """Names the worst joint of the branch that comes nearest to the limits."""
-        violation = self._violation(branches)
-        q = branches[np.argmin(violation.max(axis=1))]
-        joint = int(np.argmax(self._violation(q)))
-        value, lower, upper = np.rad2deg([q[joint], self.lower[joint], self.upper[joint]])
+        nearest = min(branches, key=lambda branch: float(branch.violation.max()))
+        joint = int(np.argmax(nearest.violation))
+        value, lower, upper = np.rad2deg([nearest.q[joint], self.lower[joint], self.upper[joint]])
         return (
             f"all {len(branches)} branches violate a limit; in the nearest one theta_{joint + 1} = "
             f"{value:.2f} deg: must be {lower:g} to {upper:g} deg"
         )
 
 
-def _wrist_angles(R_36: np.ndarray, theta_4_open: float) -> list[np.ndarray]:
-    """Returns theta_4 to theta_6 of both branches, (2.10d-f), from R_36 = Rz Ry Rz."""
+def _wrist_angles(R_36: np.ndarray, theta_4_open: float) -> list[tuple[str, np.ndarray]]:
+    """Returns names and theta_4..6 of both branches, (2.10d-f), from R_36 = Rz Ry Rz."""
     sine = np.hypot(R_36[0, 2], R_36[1, 2])
     regular = sine > _SINGULAR
     theta_4 = np.arctan2(R_36[1, 2], R_36[0, 2]) if regular else theta_4_open
@@ -184,8 +227,11 @@ def _wrist_angles(R_36: np.ndarray, theta_4_open: float) -> list[np.ndarray]:
     # whatever theta_5 is, and matches the theta_4 that was chosen.
     s_6, c_6 = np.array([-np.sin(theta_4), np.cos(theta_4)]) @ R_36[:2, :2]
     theta_6 = np.arctan2(s_6, c_6)
-    branch = np.array([theta_4, theta_5, theta_6])
-    return [branch, np.array([theta_4 + np.pi, -theta_5, theta_6 + np.pi])][: 1 + regular]
+    angles = np.array([theta_4, theta_5, theta_6])
+    if not regular:
+        return [("straight", angles)]
+    flipped = np.array([theta_4 + np.pi, -theta_5, theta_6 + np.pi])
+    return [("positive", angles), ("flipped", flipped)]
 
 
 def _finite(name: str, value: Vector, shape: tuple[int, ...]) -> np.ndarray:
