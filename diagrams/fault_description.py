@@ -13,6 +13,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.manifold import Kind, PlaceManifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.geometry import euler_margin
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.singularity_name import singularity_name
@@ -284,6 +285,12 @@ def _map_state(scene: FaultScene) -> str:
         f"{coordinates[i].name} = {np.rad2deg(Y[i]):.1f} deg"
         for i in range(rotational.start, rotational.stop)
     ]
+    euler = linearization.manifold.tool.euler
+    if euler is not None:
+        margin = euler_margin(signals["tool_pose"][3:12].reshape(3, 3), euler)
+        words.append(
+            f"the tool's {euler} angles are {np.rad2deg(margin):.3g} deg from their singularity"
+        )
     alpha = signals["manifold_point"][scene.place.layout.alpha].item()
     return ", ".join([*words, f"alpha = {alpha:.3g}"])
 

@@ -12,7 +12,7 @@ from diagrams.scenario.checks import (
     require_numbers,
     require_place,
 )
-from diagrams.scenario.surface import SurfaceShape
+from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.yaml.files import FILE
 
@@ -205,6 +205,10 @@ class OrientationParameters:
             SCARA has); ``none``.
         tool_axis: The axis, in the tool frame, of any length.
         yaw_axis: The axis of ``yaw``, in the world, of any length; by default the vertical.
+        jacobian: How the errors of orientation are told: ``geometric``, by the ZYX angles of the
+            turn from the reference to the tool; or, for comparison, ``analytic`` (2.16), by the
+            Euler angles of the tool in the world less those of the reference, of ``convention``,
+            which are singular where these are. Only for the task ``full``.
     """
 
     convention: str = "zyx"
@@ -212,10 +216,12 @@ class OrientationParameters:
     task: str = "full"
     tool_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
     yaw_axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    jacobian: str = "geometric"
 
     def __post_init__(self) -> None:
         require(self.convention in ("zyx", "zyz"), "convention", self.convention, "zyx, zyz")
         require(self.task in TASKS, "task", self.task, ", ".join(TASKS))
+        require_jacobian(self.jacobian, "task", self.task)
         require_direction("tool_axis", self.tool_axis)
         require_direction("yaw_axis", self.yaw_axis)
         for i, keyframe in enumerate(self.keyframes):

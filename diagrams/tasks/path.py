@@ -76,6 +76,11 @@ def make_path(
         raise InputError(
             f"path.orientation.task = {task}: the path has no orientation; {_GIVE_ORIENTATION}"
         )
+    if parameters.orientation.jacobian == "analytic" and path.orientation is None:
+        raise InputError(
+            f"path.orientation.jacobian = analytic: the path has no orientation; "
+            f"{_GIVE_ORIENTATION}"
+        )
     path.require_smoothness(smoothness, f"the law '{law}'")
     return path
 

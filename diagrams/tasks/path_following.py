@@ -10,10 +10,11 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
+from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.path_warnings import closing_gap, path_warnings
-from diagrams.tasks.surface import followed_axes, require_joints
+from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
@@ -29,6 +30,7 @@ from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint
 
 # m, between the points of the way along the path
 _SPACING = 2e-3
+_ORIENTATIONS = 1001
 _LOOKS_CLOSED = "; it ends where it starts: if it is to go round, write path.shape.closed: true"
 
 
@@ -67,11 +69,12 @@ class PathTask(Task):
         self.relative_degree = RELATIVE_DEGREE[law]
         followed: dict[str, Any] = {
             "oriented": self.path.orientation is not None,
-            **followed_axes(said),
+            **followed_angles(said),
             "turning": self.path.frame.turns,
         }
         self.place = PathManifold(self.relative_degree, **followed)
         self.manifold = self._law_manifold(self.relative_degree, **followed)
+        self.warnings += self._euler_warnings("path" if surface is None else "surface")
         self._check_points(reference.points)
         self.motion = rest_to_rest(
             reference.points,
@@ -115,6 +118,15 @@ class PathTask(Task):
                     f"reference.points: {eta:g} m; the path is open and "
                     f"{self.path.length:.6g} m long{_LOOKS_CLOSED if closed else ''}"
                 )
+
+    def _euler_warnings(self, block: str) -> list[str]:
+        """Return :func:`euler_warnings` of the path's orientation, which a block tells."""
+        orientation, euler = self.path.orientation, self.place.tool.euler
+        if orientation is None or euler is None:
+            return []
+        theta = np.linspace(*self.path.position.domain, _ORIENTATIONS)
+        eta, R_d = self.path.arc_length(theta), orientation.rotation_matrix(theta)
+        return euler_warnings(euler, R_d, block, lambda i: f"at eta = {eta[i]:.4g} m")
 
     def _is_on_path(self, eta: float) -> bool:
         """Return whether an arc length is on the path, up to its very ends but for rounding."""

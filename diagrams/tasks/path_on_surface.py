@@ -36,7 +36,7 @@ def surface_of_path(scenario: Scenario) -> SurfaceParameters | None:
             "path.shape = !OnSurface: there is no surface; write surface: {shape: !Plane {..}}"
         )
     said = scenario.path.orientation
-    if said.keyframes or said.task != "full":
+    if said.keyframes or said.task != "full" or said.jacobian != "geometric":
         raise InputError(
             "path.orientation: given, and a path on a surface takes surface.orientation: "
             "{kind: none|given|normal, task: full|tool_axis|yaw}; leave out path.orientation"

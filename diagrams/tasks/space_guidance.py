@@ -10,8 +10,9 @@ from diagrams.drawing.region_drawing import SpaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.fixtures import make_fixtures
-from diagrams.tasks.surface import followed_axes, given_quaternion, require_joints
+from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.fixtures.parameters import Admittance
@@ -54,7 +55,7 @@ class SpaceTask(Task):
         self.place = SpaceManifold(
             RELATIVE_DEGREE[scenario.controller.law],
             given_quaternion(said),
-            **followed_axes(said),
+            **followed_angles(said),
         )
         self.manifold = self.place
         given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
@@ -63,6 +64,11 @@ class SpaceTask(Task):
         require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
         self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
+        if self.place.is_oriented:
+            R_d = self.place.orientation(self.place.point(given)[None])
+            self.warnings += euler_warnings(
+                self.place.tool.euler, R_d, "fixtures", lambda _: "everywhere"
+            )
 
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""

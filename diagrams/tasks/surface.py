@@ -1,7 +1,7 @@
 """The surface of a scenario."""
 
 from pathlib import Path as FilePath
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -126,25 +126,27 @@ def make_surface_manifold(order: int, parameters: SurfaceParameters) -> SurfaceM
     said = parameters.orientation
     kind = None if said.kind == "none" else cast(Literal["given", "normal"], said.kind)
     offset = normal_offset(said) if kind == "normal" else None
-    return SurfaceManifold(order, orientation=kind, offset=offset, **followed_axes(said))
+    return SurfaceManifold(order, orientation=kind, offset=offset, **followed_angles(said))
 
 
-def followed_axes(
+def followed_angles(
     orientation: OrientationParameters | SurfaceOrientationParameters,
-) -> dict[str, np.ndarray | None]:
-    """Return the axis of the tool, or that in the world, that alone follows an orientation.
+) -> dict[str, Any]:
+    """Return the axis of the tool, or that in the world, that alone follows, or whose angles do.
 
     Args:
         orientation: What the scenario says.
 
     Returns:
-        ``tool_axis`` and ``yaw_axis``, each of shape (3,) and length one, or None.
+        ``tool_axis`` and ``yaw_axis``, each of shape (3,) and length one, or None; ``euler``, the
+        convention of Euler angles whose differences are the coordinates, or None.
     """
     none = isinstance(orientation, SurfaceOrientationParameters) and orientation.kind == "none"
     task = "none" if none else orientation.task
     axes = {"tool_axis": orientation.tool_axis, "yaw_axis": orientation.yaw_axis}
     chosen = {"tool_axis": "tool_axis", "yaw": "yaw_axis"}.get(task)
-    return {
+    euler = orientation.convention if orientation.jacobian == "analytic" else None
+    return {"euler": euler} | {
         name: rotation_to_axis(axis)[:, 0] if name == chosen else None
         for name, axis in axes.items()
     }

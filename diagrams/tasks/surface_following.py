@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.drawing.manifold_drawing import SurfaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_numbers
+from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.surface import (
     given_quaternion,
     make_surface,
@@ -76,6 +77,7 @@ class SurfaceTask(Task):
         self.warnings: list[str] = []
         self.motion = _motion(scenario)
         self._start = self._find_start()
+        self.warnings += self._euler_warnings()
 
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""
@@ -125,6 +127,18 @@ class SurfaceTask(Task):
             raise InputError(f"start.theta: {error}") from None
         position = point[self.place.layout.position][:3]
         return position + start.offset[0] * self.place.axes(point)[:, 2]
+
+    def _euler_warnings(self) -> list[str]:
+        """Return :func:`euler_warnings` of the orientation where the tool starts."""
+        if self.place.tool.euler is None:
+            return []
+        try:
+            foot = self._evaluator.project_globally(self._start)
+            point = self._evaluator.evaluate_at(foot.theta)
+        except InputError:  # which is told when the start is looked for
+            return []
+        R_d = self.place.orientation(point[None])
+        return euler_warnings(self.place.tool.euler, R_d, "surface", lambda _: "at the start")
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""

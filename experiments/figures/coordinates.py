@@ -1,5 +1,7 @@
 """The coordinates of the path over time: along, across, and orientation."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -125,6 +127,8 @@ def draw_orientation(log: RunLog) -> Drawing:
     angles = log["phi"].dim
     of_axis, of_yaw = angles == 2, angles == 1
     labels = [r"$\varphi$ (about z)", r"$\vartheta$ (about y)", r"$\psi$ (about x)"]
+    if _convention(log["phi"].labels) == "ZYZ":
+        labels[2] = r"$\psi$ (about z again)"
     if angles < 3:
         labels = [r"$\varphi$", r"$\vartheta$"][:angles]
     error = _draw_with_references(panels[0], log, "phi", r"\phi", labels)
@@ -147,7 +151,8 @@ def draw_orientation(log: RunLog) -> Drawing:
         "Angles by which the tool's axis is turned away from the direction that belongs to its"
         " place, about two directions across it; the turn about the axis is free"
         if of_axis
-        else "ZYX angles of the tool against the orientation that belongs to its place"
+        else f"{_convention(log['phi'].labels)} angles of the tool against the orientation that"
+        " belongs to its place"
     )
     if of_yaw:
         caption = (
@@ -156,6 +161,11 @@ def draw_orientation(log: RunLog) -> Drawing:
         )
     caption += "." if error is None else ", over the reference that yields to torques (broad)."
     return Drawing("orientation", name, caption, canvas)
+
+
+def _convention(labels: Sequence[str]) -> str:
+    """Return the convention of Euler angles with these labels, of which ZYZ's second z has a 2."""
+    return "ZYZ" if labels[-1].endswith("z_2") else "ZYX"
 
 
 def draw_angles(log: RunLog) -> Drawing:
@@ -172,7 +182,9 @@ def draw_angles(log: RunLog) -> Drawing:
     # the tool has another colour in each panel
     for panel in panels:
         place_legend(panel)
-    angles = "Turns about the yaw axis since the start" if tool.shape[1] == 1 else "ZYX angles"
+    angles = f"{_convention(log['angles_e'].labels)} angles"
+    if tool.shape[1] == 1:
+        angles = "Turns about the yaw axis since the start"
     caption = (
         f"{angles} of tool and reference in the world: the reference belongs to a point that"
         " moves with time and runs on, whatever holds the tool."

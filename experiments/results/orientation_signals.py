@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from diagrams.station import Station
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
-from pfsc_drake.geometry import angle_between, matrix_to_zyx, turn_about
+from pfsc_drake.geometry import angle_between, matrix_to_zyx, matrix_to_zyz, turn_about
 
 
 def add_orientation(
@@ -14,9 +14,10 @@ def add_orientation(
 ) -> None:
     """Add the ZYX angles of the tool and of the reference that the law compares it with.
 
-    And how far that reference is away from the orientation that belongs to the tool's place.
-    Where only an axis of the tool matters, its directions take the place of the angles; where only
-    its turn about an axis in space does, the turn since the reference that the run begins with.
+    They are ZYZ angles where those are coordinates. And how far that reference is away from the
+    orientation that belongs to the tool's place. Where only an axis of the tool matters, its
+    directions take the place of the angles; where only its turn about an axis in space does, the
+    turn since the reference that the run begins with.
 
     Args:
         log: To add to; nothing without an orientation to follow.
@@ -40,9 +41,10 @@ def add_orientation(
             turn = np.unwrap(turn_about(yaw_axis, R, begin))
             log.add(f"angles_{name}", np.where(unknown, np.nan, turn), "rad", ["the yaw axis"])
         elif axis is None:
-            angles = np.unwrap(matrix_to_zyx(R), axis=0)
+            of_zyz = tool.euler == "zyz"
+            angles = np.unwrap(matrix_to_zyz(R) if of_zyz else matrix_to_zyx(R), axis=0)
             angles[unknown] = np.nan
-            log.add(f"angles_{name}", angles, "rad", ["z", "y", "x"])
+            log.add(f"angles_{name}", angles, "rad", ["z", "y", "z_2" if of_zyz else "x"])
         else:
             directions = np.where(unknown[:, None], np.nan, R @ axis)
             log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])

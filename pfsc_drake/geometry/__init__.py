@@ -29,6 +29,7 @@ from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
     angle_between,
     check_rotation_matrix,
+    euler_margin,
     matrix_to_quaternion,
     matrix_to_zyx,
     matrix_to_zyz,
@@ -108,6 +109,7 @@ __all__ = [
     "check_single_sheet",
     "cone",
     "cylinder",
+    "euler_margin",
     "extruded_surface",
     "find_corners",
     "find_edge",

@@ -82,6 +82,21 @@ def matrix_to_zyz(matrix: ArrayLike) -> np.ndarray:
     return np.stack([first, np.arctan2(sin_2, R[..., 2, 2]), third], axis=-1)
 
 
+def euler_margin(matrix: ArrayLike, convention: str) -> np.ndarray:
+    """How far the second Euler angle is from where the other two are not defined.
+
+    Args:
+        matrix: Rotation matrices, [..., 3, 3].
+        convention: ``zyx``, singular at -pi/2 and pi/2, or ``zyz``, at 0 and pi.
+
+    Returns:
+        rad, [...], 0 to pi/2.
+    """
+    if convention == "zyx":
+        return np.pi / 2.0 - np.abs(matrix_to_zyx(matrix)[..., 1])
+    return np.pi / 2.0 - np.abs(matrix_to_zyz(matrix)[..., 1] - np.pi / 2.0)
+
+
 def matrix_to_quaternion(matrix: ArrayLike) -> np.ndarray:
     """Unit quaternions of rotation matrices.
 

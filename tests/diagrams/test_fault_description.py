@@ -1,5 +1,7 @@
 """What a station says of a fault, and where: on real runs into it, and at made-up instants."""
 
+import re
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -15,9 +17,11 @@ from diagrams.scenario import (
     ReferenceParameters,
     StartParameters,
 )
+from diagrams.tasks.make import make_task
 from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix
+from pfsc_drake.geometry.rotation import matrix_to_zyz, zyz_to_matrix
 
 FOLDER = find_scenario("pfc_compliant_6r").parent
 
@@ -204,3 +208,18 @@ def test_a_wrist_that_aims_its_tool(through_the_wrist, num_joints, name):
     sentence = station.fault(root)
     assert sentence.startswith(f"{name} singular at eta = 0.")
     assert "q_5 = " in sentence and "(q_4 can move without the tool)" in sentence
+
+
+def test_a_tool_where_its_euler_angles_end(six_axes):
+    """It starts tilted to the vertical, about the axis that the second angle turns about."""
+    R_d = make_task(six_axes, FOLDER).start(np.zeros(3)).target.R_e
+    first, second, third = matrix_to_zyz(R_d)
+    there = zyz_to_matrix([first, np.deg2rad(0.01), third])
+    six_axes.start.rotation_deg = np.rad2deg(matrix_to_zyx(R_d.T @ there)).tolist()
+    six_axes.path.orientation = OrientationParameters("zyz", jacobian="analytic")
+    assert np.rad2deg(second) > 15.0
+    station, root = run(six_axes, 0.0)
+    sentence = station.fault(root)
+    assert sentence.startswith(f"{Fault.SINGULAR.explanation} at eta = 0.026 m")
+    margin = re.search(r"the tool's zyz angles are (\S+) deg from their singularity", sentence)
+    assert float(margin.group(1)) == pytest.approx(0.01, rel=0.1)

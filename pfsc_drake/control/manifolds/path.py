@@ -141,6 +141,7 @@ class PathManifold:
             shape (3,); None if the whole tool does.
         yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
             of any length, shape (3,); None if more does.
+        euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
         turning: Whether ``e_perp`` is given with the path, such as the normal of a surface that
             the path lies on, rather than transported in parallel.
 
@@ -162,10 +163,11 @@ class PathManifold:
         oriented: bool,
         tool_axis: np.ndarray | None = None,
         yaw_axis: np.ndarray | None = None,
+        euler: str | None = None,
         turning: bool = False,
     ) -> None:
         self.tool = ToolOrientation(
-            oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+            oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, euler=euler, manifold=self.name
         )
         self.layout = PathPointLayout(order, oriented, turning)
         self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
@@ -224,6 +226,8 @@ class PathManifold:
     def rotational_force(self, torque: ca.SX, point: ca.SX, phi: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the torque that acts on the angles, shape (3,), and the forces along them [Nm].
 
+        Of differences of Euler angles it is the torque in the turn of the reference.
+
         Args:
             torque: Torque on the tool about the tool point, world axes [Nm], shape (3,).
             point: Path point.
@@ -232,6 +236,8 @@ class PathManifold:
         if self.tool.yaw_axis is not None:
             return self.tool.yaw_torque(torque)
         quaternion, alignment = point[self.layout.quaternion][:4], self.tool.alignment
+        if self.tool.euler is not None:
+            return self.tool.euler_torque(torque, quaternion_matrix(quaternion), phi)
         if alignment is not None:
             torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, alignment)
         return torque, rotational_force(in_axes_of(quaternion, torque), phi, alignment)

@@ -86,6 +86,7 @@ class SpaceManifold:
             shape (3,); None if the whole tool does.
         yaw_axis: The axis about which alone the tool's turn keeps the orientation, world axes,
             of any length, shape (3,); None if more does.
+        euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
 
     Attributes:
         tool: What of the tool's orientation matters.
@@ -104,6 +105,7 @@ class SpaceManifold:
         *,
         tool_axis: np.ndarray | None = None,
         yaw_axis: np.ndarray | None = None,
+        euler: str | None = None,
     ) -> None:
         self.layout = SpacePointLayout(order, quaternion is not None)
         self._point = np.zeros(self.layout.size)
@@ -111,7 +113,11 @@ class SpaceManifold:
         if quaternion is not None:
             self._point[self.layout.quaternion] = quaternion
         self.tool = ToolOrientation(
-            self.is_oriented, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+            self.is_oriented,
+            tool_axis=tool_axis,
+            yaw_axis=yaw_axis,
+            euler=euler,
+            manifold=self.name,
         )
         self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
 
@@ -148,6 +154,9 @@ class SpaceManifold:
         if self.tool.yaw_axis is not None:
             return ca.vertcat(force, self.tool.yaw_torque(torque)[1])
         phi, quaternion = reference[3:], point[self.layout.quaternion]
+        if self.tool.euler is not None:
+            R_d = quaternion_matrix(quaternion)
+            return ca.vertcat(force, self.tool.euler_torque(torque, R_d, phi)[1])
         alignment = self.tool.alignment
         if alignment is not None:
             torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, alignment)

@@ -184,6 +184,7 @@ class SurfaceManifold:
             shape (3,); None if the whole tool does.
         yaw_axis: The axis about which alone the tool's turn follows the orientation, world axes,
             of any length, shape (3,); None if more does.
+        euler: ``zyx`` or ``zyz`` for differences of Euler angles, see :class:`ToolOrientation`.
 
     Attributes:
         tool: What of the tool's orientation matters.
@@ -205,6 +206,7 @@ class SurfaceManifold:
         offset: np.ndarray | None = None,
         tool_axis: np.ndarray | None = None,
         yaw_axis: np.ndarray | None = None,
+        euler: str | None = None,
     ) -> None:
         if orientation not in (None, "given", "normal"):
             raise InputError(f"orientation '{orientation}': unknown; allowed are given, normal")
@@ -214,7 +216,11 @@ class SurfaceManifold:
             )
         self.layout = SurfacePointLayout(order, orientation == "given")
         self.tool = ToolOrientation(
-            orientation is not None, tool_axis=tool_axis, yaw_axis=yaw_axis, manifold=self.name
+            orientation is not None,
+            tool_axis=tool_axis,
+            yaw_axis=yaw_axis,
+            euler=euler,
+            manifold=self.name,
         )
         self.coordinates = (*_TRANSLATIONAL, *self.tool.coordinates)
         self.offset: np.ndarray | None = None
@@ -270,18 +276,20 @@ class SurfaceManifold:
         alignment = self.tool.alignment
         if alignment is not None:
             torque = torque_across_axis(torque, R_d, phi, alignment)
-        yaw = None
+        rotational = None
         if self.tool.yaw_axis is not None:
-            torque, yaw = self.tool.yaw_torque(torque)
+            torque, rotational = self.tool.yaw_torque(torque)
+        elif self.tool.euler is not None:
+            torque, rotational = self.tool.euler_torque(torque, R_d, phi)
         if with_turning:
             if self.offset is None:
                 turning = quaternion_turning_force(torque, plane, quaternion)
             else:
                 turning = frame_turning_force(torque, plane)
             translational[:2] += turning
-        if yaw is not None:
-            return ca.vertcat(translational, yaw)
-        return ca.vertcat(translational, rotational_force(R_d.T @ torque, phi, alignment))
+        if rotational is None:
+            rotational = rotational_force(R_d.T @ torque, phi, alignment)
+        return ca.vertcat(translational, rotational)
 
     def axes(self, point: np.ndarray) -> np.ndarray:
         """Return ``[t_1, e_perp x t_1, e_perp]`` as columns, shape (3, 3)."""

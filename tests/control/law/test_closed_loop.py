@@ -11,7 +11,7 @@ import pytest
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.path import PathManifold
 from tests.control.law.closed_loop import ClosedLoop, assert_linear_dynamics, simulate, start
-from tests.control.manifolds.surfaces import path_on_cylinder
+from tests.control.manifolds.surfaces import euler_difference, path_on_cylinder
 
 # law, model, joint damping as a fraction of the stiffness [s], orientation, damping of the drives
 CASES = {
@@ -80,6 +80,23 @@ def test_a_path_on_a_surface(name, load_robot, make_law, virtual_output):
     assert abs(point[manifold.layout.turn][0]) > 0.01
     law = make_law(robot.chain, name, manifold=manifold)
     check(robot, rigid, path, law, virtual_output)
+
+
+@pytest.mark.parametrize(
+    ("name", "convention"), [("velocity_servo", "zyx"), ("velocity_servo", "zyz"), ("rigid", "zyx")]
+)
+def test_euler_angles(name, convention, load_robot, make_law, virtual_output, oriented_path):
+    """The law with the analytic Jacobian (2.16): the tool's own angles obey linear dynamics."""
+    robot = load_robot("comau_racer_1_4")
+    manifold = PathManifold(RELATIVE_DEGREE[name], oriented=True, euler=convention)
+    law = make_law(robot.chain, name, manifold=manifold)
+
+    def output(path, y_t, R_e):
+        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        angles = euler_difference(R_e, R_d, convention)
+        return np.append(virtual_output(path, y_t, R_e)[:3], angles)
+
+    check(robot, robot, oriented_path, law, output)
 
 
 def check(robot, rigid, path, law, virtual_output, theta=0.7):

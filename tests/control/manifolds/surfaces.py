@@ -116,6 +116,12 @@ def reference_rotation(manifold, geometry, theta, given=None):
     return frame(geometry, theta)[2] @ manifold.offset
 
 
+def euler_difference(R_e, R_d, convention):
+    """Return the Euler angles of one rotation less those of another, between -pi and pi."""
+    e, d = (Rotation.from_matrix(R).as_euler(convention.upper()) for R in (R_e, R_d))
+    return (e - d + np.pi) % (2.0 * np.pi) - np.pi
+
+
 def further_coordinates(manifold, geometry, theta, y_t, R_e, given=None):
     """Return xi and the angles of a tool."""
     sigma, _, axes = frame(geometry, theta)
@@ -128,4 +134,6 @@ def further_coordinates(manifold, geometry, theta, y_t, R_e, given=None):
     if manifold.tool.yaw_axis is not None:
         *v, w = Rotation.from_matrix(R_e @ R_d.T).as_quat(canonical=True)
         angles = [2.0 * np.arctan2(manifold.tool.yaw_axis @ v, w)]
+    if manifold.tool.euler is not None:
+        angles = euler_difference(R_e, R_d, manifold.tool.euler)
     return np.array([xi, *angles[: len(manifold.coordinates) - 3]])

@@ -17,7 +17,7 @@ from pfsc_drake.geometry import (
     quaternion_to_matrix,
 )
 from pfsc_drake.jets import Jet
-from tests.control.manifolds.surfaces import path_on_cylinder
+from tests.control.manifolds.surfaces import euler_difference, path_on_cylinder
 from tests.control.manifolds.tool_motion import NODES, ORDER, ToolMotion, assert_derivatives
 
 WHOLE = ToolOrientation()
@@ -114,6 +114,8 @@ def outputs_over_time(path, point, motion, times, tool=WHOLE):
             if tool.yaw_axis is not None:
                 *v, w = Rotation.from_matrix(R_e @ R_d.T).as_quat(canonical=True)
                 angles = [2.0 * np.arctan2(tool.yaw_axis @ v, w)]
+            if tool.euler is not None:
+                angles = euler_difference(R_e, R_d, tool.euler).tolist()
             row += angles[: len(tool.coordinates)]
         rows.append(row)
     return np.array(rows)
@@ -141,6 +143,15 @@ def test_jets_of_a_turn_about_an_axis_are_derivatives_of_the_outputs(oriented_pa
         oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
     )
     check_jets(oriented_path, 2.45, motion, ToolOrientation(yaw_axis=axis))
+
+
+@pytest.mark.parametrize("convention", ["zyx", "zyz"])
+def test_jets_of_euler_angles_are_derivatives_of_the_outputs(oriented_path, convention):
+    """The tool's own angles less the reference's, which moves with the tool."""
+    motion = tool_motion(
+        oriented_path, 2.45, np.array([0.01, 0.015, -0.02]), np.random.default_rng(4)
+    )
+    check_jets(oriented_path, 2.45, motion, ToolOrientation(euler=convention))
 
 
 def check_jets(path, theta, motion, tool=WHOLE):

@@ -17,14 +17,14 @@ from pfsc_drake.geometry import (
     rotation_to_axis,
 )
 from pfsc_drake.geometry.curves.orientation import interpolate_orientation
-from tests.control.manifolds.surfaces import path_on_cylinder
+from tests.control.manifolds.surfaces import euler_difference, path_on_cylinder
 
 OFFSET = np.array([0.02, -0.03, 0.025])
 
 
-def manifold_force(wrench, point, layout, phi=None, *, with_turning=False, tool_axis=None):
+def manifold_force(wrench, point, layout, phi=None, *, with_turning=False, **of_tool):
     """Return the force along the coordinates for a reference with angles phi."""
-    manifold = PathManifold(layout.order, oriented=layout.oriented, tool_axis=tool_axis)
+    manifold = PathManifold(layout.order, oriented=layout.oriented, **of_tool)
     function = manifold_force_function(manifold, with_turning=with_turning)
     reference = np.concatenate([np.full(3, 0.7), [] if phi is None else phi])
     return np.array(function(wrench, point, reference)).ravel()
@@ -37,6 +37,17 @@ def axis_output(virtual_output, C):
         R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
         angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX")
         return np.append(virtual_output(path, y_t, R_e)[:3], angles[:2])
+
+    return calc
+
+
+def euler_output(virtual_output, convention):
+    """Return the virtual output with differences of Euler angles."""
+
+    def calc(path, y_t, R_e):
+        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        angles = euler_difference(R_e, R_d, convention)
+        return np.append(virtual_output(path, y_t, R_e)[:3], angles)
 
     return calc
 
@@ -114,6 +125,21 @@ def test_power_of_torques_across_an_axis(oriented_path, virtual_output, axis):
         assert np.abs(still).max() < 1e-12
         turned = output_rates(output, oriented_path, y_t, R_e, np.zeros(3), about)
         assert np.abs(turned).max() < 1e-8
+
+
+@pytest.mark.parametrize("convention", ["zyx", "zyz"])
+def test_power_of_euler_angles(oriented_path, virtual_output, convention):
+    """With the turning force ``tau . yhat'`` is the wrench's power, whatever the motion."""
+    rng, output = np.random.default_rng(12), euler_output(virtual_output, convention)
+    for theta in (0.4, 2.5):
+        y_t, R_e, point, layout, _ = place(oriented_path, theta, rng)
+        phi = output(oriented_path, y_t, R_e)[3:]
+        assert np.abs(phi).min() > 0.01
+        for _ in range(2):
+            wrench, twist = rng.uniform(-20, 20, 6), 0.3 * rng.uniform(-1, 1, 6)
+            rates = output_rates(output, oriented_path, y_t, R_e, *np.split(twist, 2))
+            tau = manifold_force(wrench, point, layout, phi, with_turning=True, euler=convention)
+            assert tau @ rates == pytest.approx(wrench @ twist, abs=1e-7)
 
 
 def test_virtual_work_of_an_axis_with_the_jacobian_of_a_robot(

@@ -16,6 +16,8 @@ KINDS = {
     "none": {},
     "all": {"quaternion": QUATERNION},
     "axis": {"quaternion": QUATERNION, "tool_axis": [0.3, -0.2, 1.0]},
+    "euler zyx": {"quaternion": QUATERNION, "euler": "zyx"},
+    "euler zyz": {"quaternion": QUATERNION, "euler": "zyz"},
     "turn": {"quaternion": QUATERNION, "yaw_axis": [0.0, 0.0, 1.0]},
 }
 

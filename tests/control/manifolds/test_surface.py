@@ -36,6 +36,7 @@ ORIENTATIONS = {
     "axis": {"orientation": "normal", "offset": OFFSET, "tool_axis": [0.0, 0.0, 1.0]},
     "given": {"orientation": "given"},
     "axis of a given one": {"orientation": "given", "tool_axis": [0.2, -0.4, 0.3]},
+    "euler": {"orientation": "normal", "offset": OFFSET, "euler": "zyz"},
     "turn": {"orientation": "normal", "yaw_axis": [0.0, 0.0, 1.0]},
 }
 ETA = (0.3, -0.2)

@@ -20,12 +20,15 @@ from tests.control.manifolds.surfaces import (
 )
 
 DOWN = np.diag([1.0, -1.0, -1.0])
+TILT = zyx_to_matrix([0.2, 0.15, -0.3])
 ORIENTATIONS = {
     "none": {},
-    "normal": {"orientation": "normal", "offset": DOWN @ zyx_to_matrix([0.2, 0.15, -0.3])},
+    "normal": {"orientation": "normal", "offset": DOWN @ TILT},
     "given": {"orientation": "given"},
     "axis": {"orientation": "normal", "offset": DOWN, "tool_axis": [0.0, 0.0, 1.0]},
     "axis of a given one": {"orientation": "given", "tool_axis": [0.2, -0.4, 0.3]},
+    "euler": {"orientation": "normal", "offset": DOWN @ TILT, "euler": "zyx"},
+    "euler of a given one": {"orientation": "given", "euler": "zyz"},
     "turn": {"orientation": "normal", "offset": DOWN, "yaw_axis": [0.1, 0.2, 1.0]},
     "turn of a given one": {"orientation": "given", "yaw_axis": [0.0, 0.0, 1.0]},
 }

@@ -15,8 +15,9 @@ from diagrams.scenario import (
     PathParameters,
     Waypoints,
 )
+from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.tasks.path import make_path, require_orientation
-from diagrams.tasks.surface import followed_axes
+from diagrams.tasks.surface import followed_angles
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import shape_report
@@ -338,11 +339,11 @@ def test_tasks_of_the_orientation(keys, said):
 
 
 def test_the_axis_alone_is_told_where_it_alone_matters():
-    axes = followed_axes(OrientationParameters(tool_axis=[1.0, 0.0, 0.0]))
-    assert axes == {"tool_axis": None, "yaw_axis": None}
+    axes = followed_angles(OrientationParameters(tool_axis=[1.0, 0.0, 0.0]))
+    assert axes == {"euler": None, "tool_axis": None, "yaw_axis": None}
     for task, other in {"tool_axis": "yaw", "yaw": "tool_axis"}.items():
         name, none = f"{task.removesuffix('_axis')}_axis", f"{other.removesuffix('_axis')}_axis"
-        axes = followed_axes(OrientationParameters(task=task, **{name: [0.0, -3e200, 4e200]}))
+        axes = followed_angles(OrientationParameters(task=task, **{name: [0.0, -3e200, 4e200]}))
         np.testing.assert_allclose(axes[name], [0.0, -0.6, 0.8], rtol=1e-15)
         assert axes[none] is None
 
@@ -360,3 +361,29 @@ def test_noise_in_millimetres_is_one_of_the_unit(tmp_path):
     file = write_csv(tmp_path, "xyz", line + rng.normal(0.0, 0.2, line.shape))
     with pytest.raises(InputError, match=r"tolerance = 0\.001 m.*their unit is m, not mm"):
         make(Waypoints(file, tolerance=1e-3), law="rigid", folder=tmp_path)
+
+
+def test_euler_angles_of_the_tool_are_of_the_scenarios_convention():
+    said = OrientationParameters("zyz", jacobian="analytic")
+    assert followed_angles(said) == {"euler": "zyz", "tool_axis": None, "yaw_axis": None}
+    surface = SurfaceOrientationParameters(kind="given", jacobian="analytic")
+    assert followed_angles(surface)["euler"] == "zyx"
+
+
+@pytest.mark.parametrize("task", ["tool_axis", "yaw", "none"])
+def test_the_analytic_jacobian_is_one_of_the_whole_orientation(task):
+    with pytest.raises(InputError, match=rf"jacobian = analytic.*geometric with task: {task}"):
+        OrientationParameters(task=task, jacobian="analytic")
+    if task != "none":
+        with pytest.raises(InputError, match=rf"jacobian = analytic.*with task: {task}"):
+            SurfaceOrientationParameters(kind="given", task=task, jacobian="analytic")
+
+
+def test_the_analytic_jacobian_needs_an_orientation():
+    with pytest.raises(InputError, match="jacobian = exact; allowed: geometric, analytic"):
+        OrientationParameters(jacobian="exact")
+    with pytest.raises(InputError, match=r"jacobian = analytic.*geometric with kind: none"):
+        SurfaceOrientationParameters(jacobian="analytic")
+    parameters = PathParameters(Circle(), OrientationParameters(jacobian="analytic"))
+    with pytest.raises(InputError, match=r"jacobian = analytic: the path has no orientation; give"):
+        make_path(parameters, "rigid", None)
