@@ -165,7 +165,7 @@ def draw_orientation(log: RunLog) -> Drawing:
 
 def _convention(labels: Sequence[str]) -> str:
     """Return the convention of Euler angles with these labels, of which ZYZ's second z has a 2."""
-    return "ZYZ" if labels[-1].endswith("z_2") else "ZYX"
+    return "ZYZ" if labels[-1].endswith("z2") else "ZYX"
 
 
 def draw_angles(log: RunLog) -> Drawing:

@@ -44,7 +44,7 @@ def add_orientation(
             of_zyz = tool.euler == "zyz"
             angles = np.unwrap(matrix_to_zyz(R) if of_zyz else matrix_to_zyx(R), axis=0)
             angles[unknown] = np.nan
-            log.add(f"angles_{name}", angles, "rad", ["z", "y", "z_2" if of_zyz else "x"])
+            log.add(f"angles_{name}", angles, "rad", ["z", "y", "z2" if of_zyz else "x"])
         else:
             directions = np.where(unknown[:, None], np.nan, R @ axis)
             log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])

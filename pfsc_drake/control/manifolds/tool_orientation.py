@@ -15,7 +15,7 @@ def _angles(*axes: str) -> tuple[Coordinate, ...]:
     return tuple(Coordinate(f"phi_{axis}", Kind.ROTATIONAL, f"tau_{axis}") for axis in axes)
 
 
-_ANGLES = {"zyx": _angles("z", "y", "x"), "zyz": _angles("z", "y", "z_2")}
+_ANGLES = {"zyx": _angles("z", "y", "x"), "zyz": _angles("z", "y", "z2")}
 _YAW = (Coordinate("phi", Kind.ROTATIONAL, "tau_phi"),)
 
 

@@ -89,7 +89,7 @@ def test_names_and_what_is_refused():
         for euler in (None, "zyx", "zyz")
     }
     assert names[None] == names["zyx"] == ["phi_z", "phi_y", "phi_x"]
-    assert names["zyz"] == ["phi_z", "phi_y", "phi_z_2"]
+    assert names["zyz"] == ["phi_z", "phi_y", "phi_z2"]
     with pytest.raises(InputError, match="Euler angles xyz: unknown; allowed are zyx, zyz"):
         ToolOrientation(euler="xyz")
     with pytest.raises(InputError, match="Euler angles zyx: one of them at most"):

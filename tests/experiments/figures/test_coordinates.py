@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.mathtext import MathTextParser
 
 from experiments.figures.coordinates import (
     draw_angles,
@@ -10,6 +11,7 @@ from experiments.figures.coordinates import (
     draw_progress,
     draw_transversal,
 )
+from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 
 
 def lines(panel):
@@ -166,6 +168,19 @@ def test_constant_angles_are_not_blown_up(drawn_log):
     low, high = draw_angles(drawn_log).canvas.axes[0].get_ylim()
     assert high - low == pytest.approx(2.0)
     assert 0.5 * (low + high) == pytest.approx(np.rad2deg(1.0), abs=1e-3)
+
+
+def test_zyz_angles_are_called_so(drawn_log):
+    """With names that can be written as symbols, too."""
+    names = [coordinate.name for coordinate in ToolOrientation(euler="zyz").coordinates]
+    drawn_log["phi"].labels = names
+    drawn_log["angles_e"].labels = [name.removeprefix("phi_") for name in names]
+    drawing = draw_orientation(drawn_log)
+    assert "ZYZ angles of the tool against" in drawing.caption
+    assert r"$\psi$ (about z again)" in lines(drawing.canvas.axes[0])
+    assert "ZYZ angles of tool and path" in draw_angles(drawn_log).caption
+    for name in names:
+        MathTextParser("path").parse(rf"$v_{{\{name}}}$")
 
 
 def test_orientation_of_an_axis(drawn_log):
