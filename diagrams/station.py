@@ -18,7 +18,7 @@ from diagrams.workpiece import FurtherLength, Workpiece
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
@@ -105,12 +105,19 @@ class Station:
         return self.task.motion.domain[1]
 
     def set_start(self, root: Context) -> None:
-        """Put the robot at the start of the scenario.
+        """Put the robot at the start of the scenario, where its drives hold its weight.
+
+        A discrete plant's first step is one of what the drives did before the first tick: without
+        this the robot would fall for as long.
 
         Args:
             root: Context of the diagram.
         """
         self.place_robot(root, self.initial_state)
+        if self.part.drives.step is not None:
+            hold = self.diagram.GetSubsystemByName("hold")
+            weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
+            hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), weight)
         projector = self.projector.GetMyMutableContextFromRoot(root)
         self.projector.set_place(projector, self.initial_place)
 

@@ -28,6 +28,7 @@ from diagrams.robots.plant_wiring import (
 from diagrams.robots.start_posture import posture_warnings, start_posture, tilt_warnings
 from diagrams.scenario import Scenario, StartParameters
 from diagrams.scenario.checks import require
+from diagrams.scenario.robot import MULTIBODY
 from diagrams.workpiece import Workpiece
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
@@ -276,6 +277,8 @@ def add_arm(
         InputError: If the model cannot be read, is no chain of joints, its rotors are not known,
             or what is to be believed of it makes no arm.
     """
+    plant, allowed = scenario.robot.plant, f"{MULTIBODY}; only a DELTA robot has another"
+    require(plant == MULTIBODY, "robot.plant", plant, allowed)
     if scenario.robot.rotor_coupling:
         return _add_coupled_arm(builder, scenario, folder, workpiece)
     if workpiece is not None:

@@ -1,5 +1,6 @@
 """The DELTA robot in a diagram, whichever model moves it."""
 
+import math
 from abc import abstractmethod
 from dataclasses import asdict, dataclass
 from pathlib import Path as FilePath
@@ -24,6 +25,7 @@ from diagrams.robots.plant_wiring import (
 )
 from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
+from diagrams.scenario.robot import ANALYTIC, MULTIBODY
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
@@ -45,6 +47,8 @@ from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 from pfsc_drake.yaml.reading import read_yaml
 
 TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
+_ROUNDING = 1e-9
+_LOAD_RADIUS = 0.05  # m, of a load without a shape, which does not turn
 
 
 @dataclass(frozen=True)
@@ -104,8 +108,8 @@ class DeltaPart(RobotPart):
 
 
 @dataclass(frozen=True)
-class FreeDelta(DeltaPart):
-    """A DELTA robot that touches nothing: (2.72).
+class AnalyticDelta(DeltaPart):
+    """A DELTA robot that touches nothing and moves as (2.72) says, in continuous time.
 
     Attributes:
         analytic: The plant.
@@ -161,8 +165,8 @@ class FreeDelta(DeltaPart):
 
 
 @dataclass(frozen=True)
-class TouchingDelta(DeltaPart):
-    """A DELTA robot that may touch a workpiece: (2.71), bodies tied by constraints.
+class ConstrainedDelta(DeltaPart):
+    """A DELTA robot of bodies tied by constraints, (2.71), which may touch a workpiece.
 
     The plant samples its inputs and its reaction forces: drive forces act, and contact forces
     are felt, one of its time steps later.
@@ -171,13 +175,13 @@ class TouchingDelta(DeltaPart):
         multibody: The plant, discrete.
         model: The robot in it.
         tool: Frame in E, behind the sensor.
-        contact: Wrench of the workpiece on the tool.
+        contact: Wrench of the workpiece on the tool, if there is one.
     """
 
     multibody: MultibodyPlant
     model: DeltaModel
     tool: Frame
-    contact: ContactWrench
+    contact: ContactWrench | None = None
 
     @property
     def plant(self) -> MultibodyPlant:
@@ -286,16 +290,26 @@ def add_delta(
     robot = load_delta_robot(scenario.robot.model, folder)
     _check(scenario)
     belief = _believe(robot, scenario, folder)
-    if workpiece is None:
-        return FreeDelta(robot, belief, builder.AddNamedSystem("plant", DeltaPlant(robot)))
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(workpiece.time_step))
-    scene_graph = add_scene(builder, plant)
+    if scenario.robot.plant == ANALYTIC:
+        allowed = f"{MULTIBODY} where the robot touches a workpiece"
+        require(workpiece is None, "robot.plant", ANALYTIC, allowed)
+        return AnalyticDelta(robot, belief, builder.AddNamedSystem("plant", DeltaPlant(robot)))
+    step = workpiece.time_step if workpiece else _free_step(scenario)
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(step))
+    scene_graph = add_scene(builder, plant) if workpiece else None
     model = add_delta_plant(plant, robot.parameters, with_load=False)
-    tool = _weld_gripper(plant, model.end_effector, robot, workpiece)
-    geometries = workpiece.add(plant, tool)
+    reach, radius = (workpiece.reach, workpiece.radius) if workpiece else (0.0, _LOAD_RADIUS)
+    tool = _weld_gripper(plant, model.end_effector, robot, reach, radius)
+    geometries = workpiece.add(plant, tool) if workpiece else []
     plant.Finalize()
-    contact = connect_scene(builder, plant, scene_graph, geometries)
-    return TouchingDelta(robot, belief, plant, model, tool, contact)
+    contact = connect_scene(builder, plant, scene_graph, geometries) if scene_graph else None
+    return ConstrainedDelta(robot, belief, plant, model, tool, contact)
+
+
+def _free_step(scenario: Scenario) -> float:
+    """Return the step of bodies that touch nothing: the largest that ticks are multiples of [s]."""
+    period, longest = scenario.controller.sampling_time, scenario.simulation.max_step
+    return period / math.ceil(period / longest - _ROUNDING)
 
 
 def _believe(robot: DeltaRobot, scenario: Scenario, folder: FilePath) -> Belief:
@@ -322,7 +336,7 @@ def _check(scenario: Scenario) -> None:
     require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
     for key, none in asdict(RobotParameters()).items():
         value = asdict(robot)[key]
-        given = key not in ("model", "tool_frame") and value != none
+        given = key not in ("model", "tool_frame", "plant") and value != none
         require(not given, f"robot.{key}", value, "none for a DELTA robot")
     turned = "none; a DELTA robot only translates"
     require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
@@ -334,18 +348,26 @@ def _check(scenario: Scenario) -> None:
 
 
 def _weld_gripper(
-    plant: MultibodyPlant, end_effector: RigidBody, robot: DeltaRobot, workpiece: Workpiece
+    plant: MultibodyPlant, end_effector: RigidBody, robot: DeltaRobot, reach: float, radius: float
 ) -> Frame:
     """Weld the load to the end-effector, with a joint for the sensor between.
 
     The load is a gripper that reaches down to what touches the workpiece. The frame that is
     returned is in E; the end-effector only translates, so that the inertia about the centre
     of mass has no effect.
+
+    Args:
+        plant: The plant.
+        end_effector: Its end-effector.
+        robot: The robot.
+        reach: Of the gripper [m]; without one the load is a ball about E.
+        radius: Size of the load [m].
     """
-    up = upwards(robot.gravity, "robot")
-    middle = -0.5 * workpiece.reach * up
+    middle = -0.5 * reach * upwards(robot.gravity, "robot") if reach else np.zeros(3)
     mass = robot.parameters.masses.load
-    inertia = SpatialInertia.SolidSphereWithMass(mass, workpiece.radius).Shift(-middle)
+    inertia = SpatialInertia.Zero()
+    if mass > 0.0:
+        inertia = SpatialInertia.SolidSphereWithMass(mass, radius).Shift(-middle)
     tool = plant.AddRigidBody(TOOL, end_effector.model_instance(), inertia)
     plant.AddJoint(
         WeldJoint(SENSOR_JOINT, end_effector.body_frame(), tool.body_frame(), RigidTransform())

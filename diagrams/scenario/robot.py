@@ -17,6 +17,8 @@ from pfsc_drake.robot.models.reading import ModelOptions
 from pfsc_drake.yaml.files import FILE, NAME_OR_FILE
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
+# what moves a DELTA robot
+MULTIBODY, ANALYTIC = "multibody", "analytic"
 _FARTHEST = 1e6  # m
 _STRONGEST = 1e6  # m/s^2
 
@@ -98,6 +100,9 @@ class RobotParameters:
             where the rotors of its drives sit. The robot then obeys the full elastic model
             (2.64), with the inertia coupling of spinning rotors and moving links that the
             laws neglect; empty for the simplified model (2.65).
+        plant: Of a DELTA robot: ``multibody`` for bodies that rods tie together, (2.71), discrete
+            with ``simulation.max_step`` or less where they touch nothing; ``analytic`` for (2.72)
+            in continuous time, without contact, whose error is that of the integration alone.
     """
 
     model: str = dc.field(default="comau_racer_1_4", metadata=NAME_OR_FILE)
@@ -110,8 +115,11 @@ class RobotParameters:
     elastic: ElasticParameters = dc.field(default_factory=ElasticParameters)
     joint_damping: list[float] = dc.field(default_factory=list)
     rotor_coupling: str = dc.field(default="", metadata=NAME_OR_FILE)
+    plant: str = MULTIBODY
 
     def __post_init__(self) -> None:
+        plants = (MULTIBODY, ANALYTIC)
+        require(self.plant in plants, "plant", self.plant, ", ".join(plants))
         require_numbers("gravity", self.gravity, 3)
         bearable = all(abs(component) <= _STRONGEST for component in self.gravity)
         require(bearable, "gravity", self.gravity, f"up to {_STRONGEST:g} m/s^2")

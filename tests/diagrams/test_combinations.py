@@ -58,7 +58,8 @@ def delta(load_exact_scenario):
 
 
 def test_a_delta_robot_that_touches_nothing_yields_to_its_sensor(delta):
-    """Without contact the plant is the analytic one, and the load's reaction is computed."""
+    """The analytic plant has no joint that bears the load; its reaction is computed."""
+    delta.robot.plant = "analytic"
     delta.compliance, force = soft(), 3.0
     delta.forces = [ForcePulse(0.1, 2.0, np.array([0.0, force, 0.0]), frame="manifold")]
     station, _, log = run(delta, 0.9)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
@@ -12,9 +13,11 @@ from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import load_scenario_data
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.yaml.typed import load_typed
 
 FILE = SCENARIO_DIRECTORY / "pfc_delta.yaml"
+NOTCH = SCENARIO_DIRECTORY / "pfc_delta_notch.yaml"
 PERIOD = 0.04
 
 
@@ -25,6 +28,10 @@ def load(*changes):
 
 def build(*changes):
     return build_station(load(*changes), SCENARIO_DIRECTORY)
+
+
+def build_analytic(*changes):
+    return build("robot.plant=analytic", *changes)
 
 
 def sources(diagram):
@@ -39,7 +46,7 @@ def sources(diagram):
 
 
 def test_friction_is_beside_the_drives():
-    behind = sources(build().diagram)
+    behind = sources(build_analytic().diagram)
     assert behind["plant", "actuation"] == ("hold", "y")
     assert behind["plant", "resistance"] == ("joint_friction", "resistance")
     assert behind["joint_friction", "velocity"] == ("motor_velocity", "y0")
@@ -48,7 +55,7 @@ def test_friction_is_beside_the_drives():
 
 
 def test_without_friction_the_held_force_drives_the_plant():
-    station = build("drive_friction=false")
+    station = build_analytic("drive_friction=false")
     assert sources(station.diagram)["plant", "actuation"] == ("hold", "y")
     assert "friction_torque" not in station.log.rows
 
@@ -94,7 +101,7 @@ def test_a_push_deflects_as_the_gains_say():
 
 
 def test_starts_at_rest_beside_the_path():
-    station = build()
+    station = build_analytic()
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     plant = station.part.plant.GetMyContextFromRoot(root)
@@ -147,7 +154,7 @@ def test_the_first_force_is_weight_and_proportional_part():
         ("friction={f_c: [1, 1]}", ["friction.f_c", "3 joints"]),
         ("controller.law=velocity_servo", ["controller.law", "velocity_servo", "rigid"]),
         ("controller.law=elastic", ["controller.law", "elastic", "rigid"]),
-        ("simulation.integrator=implicit_euler", ["simulation.integrator", "runge_kutta3"]),
+        ("robot.plant=lagrange", ["plant = lagrange", "multibody, analytic"]),
         ("simulation.sensor_failure={time: 1, component: 12}", ["component", "0 to 11"]),
         ("reference.points=[0.022, 0.5]", ["reference.points", "0.5 m"]),
         ("start.offset=[0, 1]", ["start: [", "outside the workspace"]),
@@ -164,6 +171,65 @@ def test_refused(change, parts):
         build(change)
     for part in parts:
         assert part in str(caught.value)
+
+
+def test_friction_of_the_analytic_plant_wants_an_integrator():
+    with pytest.raises(InputError, match=r"simulation.integrator = implicit_euler .*runge_kutta3"):
+        build_analytic("simulation.integrator=implicit_euler")
+
+
+def test_only_the_plant_of_bodies_touches():
+    settings = load_typed(Scenario, load_scenario_data(NOTCH, ["robot.plant=analytic"]), str(NOTCH))
+    with pytest.raises(InputError, match=r"robot.plant = analytic.* multibody where .*touches"):
+        build_station(settings, SCENARIO_DIRECTORY)
+
+
+def run(*changes, duration):
+    """Return slides and drive forces at every tick, of a run that starts off the path."""
+    station = build("drive_friction=false", *changes)
+    simulator = Simulator(station.diagram)
+    station.set_start(simulator.get_mutable_context())
+    simulator.AdvanceTo(duration)
+    times, log = station.log.read(simulator.get_context())
+    return times, log["joint_state"][:, :6]
+
+
+def test_both_plants_move_alike():
+    """In closed loop, 10 mm back to the path; bodies are late by about a step of the plant."""
+    times, analytic = run("robot.plant=analytic", duration=0.2)
+    way = np.ptp(analytic[:, :3], axis=0).max()
+    assert way > 5e-3
+    errors = []
+    for step in (1e-3, 2.5e-4):
+        t, bodies = run(f"simulation.max_step={step}", duration=0.2)
+        count = min(len(t), len(times))
+        errors.append(np.abs(bodies[:count, :3] - analytic[:count, :3]).max())
+    assert errors[0] < 0.05 * way
+    assert errors[1] < 0.4 * errors[0]
+
+
+@pytest.mark.parametrize(("longest", "step"), [(1e-2, 1e-3), (1e-3, 1e-3), (7e-4, 5e-4)])
+def test_ticks_are_multiples_of_the_step_of_bodies(longest, step):
+    assert build(f"simulation.max_step={longest}").part.drives.step == pytest.approx(step)
+
+
+def test_bodies_do_not_fall_before_the_first_tick():
+    """The plant's first step is one of what the drives did before."""
+    _, states = run("start.offset=[0, 0]", "reference.dwell=1", duration=0.02)
+    assert np.abs(states[:, 3:]).max() < 1e-5  # m/s; 7e-3 if it fell for a millisecond
+
+
+def test_a_robot_without_a_load(tmp_path):
+    """Nothing is welded to its end-effector but what has no mass."""
+    own = yaml.safe_load((models_directory() / "festo_expt_45" / "parameters.yaml").read_text())
+    own["masses"]["load"] = 0.0
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
+    station = build(f"robot.model={tmp_path / 'own.yaml'}")
+    plant = station.part.plant
+    assert plant.CalcTotalMass(plant.CreateDefaultContext()) == pytest.approx(
+        3.0 * station.robot.parameters.masses.effective_slide
+        + station.robot.parameters.masses.effective_plate
+    )
 
 
 def test_a_way_there_and_back_is_looked_at_as_a_whole():

@@ -15,7 +15,13 @@ CONTINUOUS, DISCRETE = 1.0, 0.5
 
 def free_delta(settings):
     settings.start.offset = [0.0, 0.0]
-    return settings.simulation.max_step, CONTINUOUS
+    return settings.simulation.max_step, DISCRETE
+
+
+def analytic_delta(settings):
+    settings.robot.plant = "analytic"
+    step, _ = free_delta(settings)
+    return step, CONTINUOUS
 
 
 def delta_in_a_notch(settings):
@@ -37,6 +43,7 @@ def arm_in_a_notch(settings):
     ("scenario", "change"),
     [
         ("pfc_delta", free_delta),
+        ("pfc_delta", analytic_delta),
         ("pfc_delta_notch", delta_in_a_notch),
         ("pfc_compliant_6r", arm_in_a_notch),
     ],

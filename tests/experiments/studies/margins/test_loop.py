@@ -86,7 +86,8 @@ CASES = [
     ("pfc_elastic_3r", ["controller.law=rigid"]),
     ("pfc_elastic_3r", ["controller.law=singular_perturbation"]),
     ("pfc_viscoelastic_3r", []),
-    ("pfc_delta", ["encoders.difference_quotient=false"]),
+    # bodies get their drives' forces a step late
+    ("pfc_delta", ["encoders.difference_quotient=false", "robot.plant=analytic"]),
 ]
 
 
