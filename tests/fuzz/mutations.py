@@ -68,8 +68,10 @@ def _changed_value(draw: st.DrawFn, value: Any) -> Any:
     elif isinstance(value, list):
         own_lists = [value[:1], value[:-1], value + value[-1:], value[::-1], [value], value * 40]
         own = st.sampled_from(own_lists) | st.sampled_from(NUMBERS).map(lambda n: [n] * len(value))
-    else:
+    elif isinstance(value, dict):
         own = st.sampled_from([dict(list(value.items())[:-1]), {**value, "x" * 50: 1}, {}])
+    else:
+        own = anything  # null
     return copy.deepcopy(draw(own if draw(st.integers(0, 3)) else anything))
 
 
