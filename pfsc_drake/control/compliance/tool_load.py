@@ -172,7 +172,8 @@ class Taring:
     strokes of drives that creep against their friction: an arm that holds a load which nobody
     told it of does so for seconds, at rest but for the last increments of its encoders, and what
     the tool's inertia is believed to do at every one of them is a spike of a sample or two. What
-    pushes or moves the tool lasts longer than a block.
+    pushes or moves the tool lasts longer than a block. The first block is judged, but does not
+    count for the bias: what came before it, a start for instance, may still fade in it.
 
     A *window*, shape (25,), is ``[count, sum (6), lowest (6), highest (6), block (6)]``: lowest
     and highest mean of a block, and the sum of the block that is not full. It starts anew, with the
@@ -196,6 +197,7 @@ class Taring:
     ) -> None:
         self._block = min(block, samples)
         self._samples = -(-samples // self._block) * self._block
+        self._only_judged = self._block if 1 < self._block < self._samples else 0
         self._largest_spread, self._largest_bias = largest_spread, largest_bias
 
     @staticmethod
@@ -206,12 +208,15 @@ class Taring:
     def extend(self, window: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Return the window with one more residual; only its last block if that differs."""
         count, lowest, highest = window[0] + 1.0, window[7:13], window[13:19]
-        total, block = window[1:7] + residual, window[19:] + residual
+        total, block = window[1:7], window[19:] + residual
+        if window[0] >= self._only_judged:
+            total = total + residual
         if count % self._block == 0.0:
             mean = block / self._block
             lowest, highest = np.minimum(lowest, mean), np.maximum(highest, mean)
             if np.any(highest - lowest > self._largest_spread):
-                count, total, lowest, highest = float(self._block), block, mean, mean
+                count, lowest, highest = float(self._block), mean, mean
+                total = np.zeros(6) if self._only_judged else block
             block = np.zeros(6)
         return np.concatenate([[count], total, lowest, highest, block])
 
@@ -222,7 +227,7 @@ class Taring:
         """
         if window[0] < self._samples:
             return None
-        mean = window[1:7] / window[0]
+        mean = window[1:7] / (window[0] - self._only_judged)
         return np.full(6, np.nan) if np.any(np.abs(mean) > self._largest_bias) else mean
 
 

@@ -224,6 +224,16 @@ def test_taring_takes_the_mean_of_a_quiet_stretch_after_a_restless_one():
     assert taring.bias(window) == pytest.approx(np.full(6, 2.3))
 
 
+def test_what_fades_in_the_first_block_is_no_bias():
+    """A transient that one block's mean hardly shows."""
+    taring = Taring(20, np.full(6, 1.0), np.full(6, 10.0), block=10)
+    window = taring.empty()
+    for k in range(20):
+        assert taring.bias(window) is None
+        window = taring.extend(window, np.full(6, 2.0 + 5.0 * 0.3**k))
+    assert taring.bias(window) == pytest.approx(np.full(6, 2.0), abs=1e-4)
+
+
 def test_strokes_of_a_sample_do_not_keep_a_sensor_from_being_tared():
     """What lasts does, though each sample differs from the next by less."""
     taring = Taring(48, np.full(6, 1.0), np.full(6, 10.0), block=10)
