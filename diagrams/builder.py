@@ -44,6 +44,7 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
 def build_station(
@@ -51,6 +52,8 @@ def build_station(
     folder: FilePath,
     progress: Progress | None = None,
     task: Task | None = None,
+    *,
+    with_slope: bool = False,
 ) -> Station:
     """Build the station of a scenario.
 
@@ -59,6 +62,8 @@ def build_station(
         folder: Where the scenario's relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
         task: The scenario's task, if it has been made before.
+        with_slope: Whether a workpiece that is pressed on is a spring, with the stiffness that
+            contact has there, and the plant continuous.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -68,7 +73,8 @@ def build_station(
     """
     builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
     workpiece, mounting = _workpiece(scenario, task), make_mounting(scenario, task)
-    part = _add_robot(builder, scenario, folder, workpiece)
+    spring = _spring(scenario, workpiece) if with_slope else None
+    part = _add_robot(builder, scenario, folder, workpiece if spring is None else None)
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
     begin = cache(lambda: _start(scenario, task, part, workpiece, mounting))
@@ -89,7 +95,9 @@ def build_station(
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     operator = add_operator(builder, scenario, folder)
-    forces = add_surroundings(builder, part, task, scenario, around, start, operator, mounting)
+    forces = add_surroundings(
+        builder, part, task, scenario, around, start, operator, mounting, spring
+    )
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
         forces |= add_sensor(builder, part, scenario, states | forces)
@@ -157,6 +165,15 @@ def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
     if not isinstance(task, PathTask):
         raise InputError("notch = given: must be null where the task is no path")
     return NotchedWorkpiece(task.path, scenario.notch)
+
+
+def _spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
+    """Return what a workpiece that is pressed on is to the tool, if there is one."""
+    press = scenario.compliance.press
+    if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
+        return None
+    period = scenario.controller.sampling_time
+    return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), period)
 
 
 def _add_robot(

@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.geometry import GeometryId, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame
+from pydrake.multibody.tree import Frame, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
 from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
@@ -204,6 +204,15 @@ class MultibodyArm(Arm):
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
         self.model.SetPositionsAndVelocities(context, state)
+
+    def hang(self, context: Context, joint: str, mass: float) -> None:
+        """See :class:`RobotPart`."""
+        mount, load = self.true.sensor_joint(joint), self.true.tool_load(joint)
+        body = mount.child_body()
+        p_BC = mount.frame_on_child().GetFixedPoseInBodyFrame() @ load.p_SC
+        M_B = body.CalcSpatialInertiaInBodyFrame(context)
+        M_B += SpatialInertia(mass, p_BC, UnitInertia.PointMass(p_BC))
+        body.SetSpatialInertiaInBodyFrame(context, M_B)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, Outpu
 from diagrams.robots.belief import Belief
 from diagrams.scenario import Scenario, StartParameters
 from pfsc_drake.control.compliance.tool_load import ToolLoad
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
@@ -132,6 +133,20 @@ class RobotPart(ABC):
         Raises:
             InputError: See :meth:`sensor_mount`.
         """
+
+    def hang(self, context: Context, joint: str, mass: float) -> None:
+        """Let more hang below a force sensor than is believed, where the load's centre is.
+
+        Args:
+            context: Of the plant.
+            joint: See :meth:`believed_load`.
+            mass: [kg].
+
+        Raises:
+            InputError: If the plant's masses cannot be changed once it is made.
+        """
+        del context, joint, mass
+        raise InputError("masses of this robot's plant cannot be changed once it is made")
 
     @abstractmethod
     def check_belief(self, scenario: Scenario, folder: FilePath) -> None:

@@ -2,6 +2,9 @@
 
 import dataclasses as dc
 
+import numpy as np
+from scipy.optimize import brentq
+
 from diagrams.scenario.checks import require, require_between
 
 SMALLEST, LARGEST = 1e-4, 10.0  # m, of workpiece and ball
@@ -33,6 +36,26 @@ class SoftBall:
         require_between("modulus", self.modulus, *_MODULUS, "Pa; 4 MPa are 4e+06")
         for key, most in {"dissipation": 1e6, "friction": 1e3}.items():
             require_up_to(key, getattr(self, key), most)
+
+    def stiffness(self, force: float) -> float:
+        """Return by how much the force on a flat rigid body grows with the depth [N/m].
+
+        The pressure in the ball grows with the depth, from zero at its skin to the modulus E in
+        its centre. A flat at depth d bears ``F = pi E d^2 (1 - 2 d / (3 R))``, the pressure's
+        integral over the disc that is touched, so that ``dF / dd = 2 pi E d (1 - d / R)``.
+
+        Args:
+            force: That it bears there [N].
+        """
+        R, E = self.radius, self.modulus
+
+        def missing(d: float) -> float:
+            return float(np.pi * E * d**2 * (1.0 - 2.0 * d / (3.0 * R)) - force)
+
+        # from half of the way on the slope falls again: the steepest is on the safe side
+        deepest = R / 2.0
+        d = deepest if missing(deepest) <= 0.0 else float(brentq(missing, 0.0, deepest))
+        return float(2.0 * np.pi * E * d * (1.0 - d / R))
 
 
 def require_up_to(key: str, value: float, most: float) -> None:

@@ -18,6 +18,7 @@ from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
 from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
 def add_surroundings(
@@ -29,6 +30,7 @@ def add_surroundings(
     start: StartPoint,
     operator: Operator | None = None,
     mounting: Mounting | None = None,
+    spring: SurfaceSpring | None = None,
 ) -> dict[str, OutputPort]:
     """Add the scenario's forces on the robot, and return their signals for the log.
 
@@ -41,6 +43,7 @@ def add_surroundings(
         start: Where the tool starts.
         operator: A person who guides the tool, if there is one.
         mounting: Plates that are mounted, if there are any.
+        spring: What the tool touches in place of contact in the plant, if it does.
 
     Returns:
         ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, what
@@ -59,7 +62,8 @@ def add_surroundings(
             builder, mounting, part.robot, task, scenario, start, ports["joint_state"]
         )
         sources, signals = sources + wrenches, signals | mounted
-    acting, held = [], None
+    acting: list[OutputPort] = []
+    held: OutputPort | None = None
     if part.contact is not None:
         # the law's own pose is what encoders make of it, or that of the motors
         view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
@@ -75,6 +79,11 @@ def add_surroundings(
         builder.Connect(total, hold.get_input_port())
         held = hold.get_output_port()
         acting.append(held)
+    if spring is not None:
+        # what is stiff follows the tool within a tick, too
+        touching = _add_spring(builder, part, spring, ports["joint_state"])
+        held = touching if held is None else _sum(builder, "tool_wrench", [touching, held])
+        acting = [held]
     if pushes is not None and isinstance(part, Arm):
         part.connect_pushes(builder, pushes, held, ports["joint_state"])
     elif held is not None:
@@ -82,6 +91,17 @@ def add_surroundings(
     if acting:
         signals["wrench_ext"] = _sum(builder, "all_wrenches", acting)
     return signals
+
+
+def _add_spring(
+    builder: DiagramBuilder, part: RobotPart, spring: SurfaceSpring, joint_state: OutputPort
+) -> OutputPort:
+    """Add what the tool touches, and return its wrench on the tool."""
+    view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
+    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    builder.AddNamedSystem("surface_spring", spring)
+    builder.Connect(view.GetOutputPort("tool_pose"), spring.GetInputPort("tool_pose"))
+    return spring.GetOutputPort("wrench")
 
 
 def _scripted(

@@ -45,6 +45,7 @@ class PressedWorkpiece(Workpiece):
         self._p_TC = parameters.ball.radius * manifold.offset[2]
         self._R = zyx_to_matrix(np.deg2rad(parameters.turn_zyx_deg))
         self._middle = surface.partials([sum(ends) / 2.0 for ends in surface.domain], 0)[0]
+        self._evaluator = SurfaceEvaluator(surface, 1)
 
     @property
     def time_step(self) -> float:
@@ -73,12 +74,41 @@ class PressedWorkpiece(Workpiece):
         moved = (vertices - self._middle) @ self._R.T + self._middle + self.parameters.shift
         return moved, triangles
 
+    def touch(
+        self, y_t: np.ndarray, near: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return height over the workpiece [m], its normal, and the parameters of the foot.
+
+        Args:
+            y_t: Tool point [m], shape (3,).
+            near: Parameters near which the foot is, shape (2,); sought everywhere if omitted.
+        """
+        taught = (y_t - self.parameters.shift - self._middle) @ self._R + self._middle
+        if near is None:
+            theta = np.array(self._evaluator.project_globally(taught).theta)
+            sigma, first, second = self._surface.partials(self._surface.wrap(theta), 1)
+        else:
+            point = self._evaluator(taught.tolist(), near.tolist(), (0.0, 0.0))
+            theta = point[:2]
+            rows = point[self._evaluator.layout.position].reshape(-1, 3)
+            sigma, first, second = rows[:3]
+        normal = surface_axes(first, second)[:, 2]
+        return float(normal @ (taught - sigma)), self._R @ normal, theta
+
+    def stiffness(self, force: float) -> float:
+        """Return the stiffness of the contact along the normal where it bears a force [N/m].
+
+        See :func:`~diagrams.scenario.ball.SoftBall.stiffness`; the workpiece is rigid, and flat
+        where it is touched.
+
+        Args:
+            force: [N].
+        """
+        return self.parameters.ball.stiffness(force)
+
     def check_start(self, y_t: np.ndarray) -> None:
         """See :class:`Workpiece`; the ball reaches to the tool point."""
-        taught = (y_t - self.parameters.shift - self._middle) @ self._R + self._middle
-        theta = SurfaceEvaluator(self._surface, 1).project_globally(taught).theta
-        sigma, first, second = self._surface.partials(self._surface.wrap(theta), 1)
-        height = float(surface_axes(first, second)[:, 2] @ (taught - sigma))
+        height, _, _ = self.touch(y_t)
         if height < 0.0:
             raise InputError(
                 f"start: the tool point is {-1e3 * height:.3g} mm inside of the workpiece; "

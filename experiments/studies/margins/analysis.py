@@ -14,6 +14,7 @@ from diagrams.scenario import Scenario
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
+from experiments.studies.margins.touched import TouchedSurface, touched_surface
 from experiments.studies.margins.walk import Instant, Walk, walk
 from pfsc_drake.control.margins.delay import delay_margin
 from pfsc_drake.control.margins.disc import (
@@ -114,6 +115,7 @@ class MarginAnalysis:
         margins: What the drives bear, as the scenario says.
         drives_are_servos: Whether the drives are servos that take velocities.
         remarks: What was left out of the loop, and why, one sentence each.
+        surface: What of a surface that is pressed on it bears, if that is so and was looked at.
     """
 
     period: float
@@ -125,6 +127,7 @@ class MarginAnalysis:
     margins: list[DriveMargins] = field(default_factory=list)
     drives_are_servos: bool = False
     remarks: list[str] = field(default_factory=list)
+    surface: TouchedSurface | None = None
 
     @property
     def cases(self) -> list[Case]:
@@ -212,19 +215,21 @@ def analyse(
         box=box,
         nominal=nominal,
         drives_are_servos=own.drives_are_servos,
-        remarks=_remarks(removed, way, station.workpiece is not None) + remarks,
+        remarks=_remarks(removed, way, own) + remarks,
     )
-    if only_start and settings.compliance.needs_sensor:
-        analysis.remarks.append(
-            "At the start the force sensor is not tared yet, and nothing yields: the loop over it "
-            "is not in these margins."
-        )
+    if not only_start:
+        analysis.surface = study.touched_surface(own, nominal)
     for instant, loop in zip(way.instants, loops, strict=True):
         progress(instant.time, "margins of the drives")
         if loop is not None:
             analysis.margins.append(_drive_margins(instant, loop, own.map.period))
+    unknown = settings.sensor.unknown_mass if settings.compliance.needs_sensor else 0.0
+    if unknown > 0.0:
+        with _saying("sensor.unknown_mass", analysis.remarks):
+            case, _ = study.case(own, Error((), unknown), way.instants)
+            analysis.singles.append(Case(case.error, "unknown_mass", case.places))
     for key, error in singles:
-        with _saying(key, analysis.remarks):
+        with _saying(f"model_error.{key}", analysis.remarks):
             case, _ = study.case(study.build(error), error, way.instants)
             analysis.singles.append(Case(error, key, case.places))
     weak = _weakest_instants(analysis)
@@ -282,10 +287,19 @@ class _Study:
         self.progress(0.0, f"linearizing, {error}")
         return StationLoop(error.applied_to(self.settings), self.folder, self.walked.station.task)
 
-    def section(self, loop: StationLoop, instant: Instant) -> Context:
-        """Return an instant as a state of a loop's own station."""
-        own = loop is self.walked
-        return instant.section if own else loop.map.adopted(instant.section)
+    def section(self, loop: StationLoop, instant: Instant, unknown: float = 0.0) -> Context:
+        """Return an instant as a state of a loop's own station, with a payload [kg]."""
+        if loop is self.walked and unknown == 0.0:
+            return instant.section
+        section, load = (
+            loop.map.adopted(instant.section),
+            self.walked.external_load(instant.section),
+        )
+        if unknown > 0.0:
+            loop.hang(section, self.settings.sensor.joint, unknown)
+        if load is not None:
+            loop.tare(section, load)
+        return section
 
     def case(
         self, loop: StationLoop, error: Error, instants: Sequence[Instant]
@@ -294,12 +308,31 @@ class _Study:
         loops = []
         for instant in instants:
             self.progress(instant.time, f"linearizing, {error}")
-            loops.append(linearize(loop, self.section(loop, instant), self.chosen))
+            section = self.section(loop, instant, error.unknown_mass)
+            loops.append(linearize(loop, section, self.chosen))
         places = [
             Place(instant, None if linear is None else modes(linear.A, loop.map.period))
             for instant, linear in zip(instants, loops, strict=True)
         ]
         return Case(error, "", places), loops
+
+    def touched_surface(self, loop: StationLoop, nominal: Case) -> TouchedSurface | None:
+        """Return how stiff a surface may be where the loop is slowest on it, if there is one."""
+        pressed = [
+            place
+            for place in nominal.places
+            if self.walked.pressed_force(place.instant.section) > 0.0
+        ]
+        if not pressed:
+            return None
+        instant = max(pressed, key=lambda place: place.rate).instant
+        return touched_surface(
+            loop,
+            instant,
+            self.section(loop, instant),
+            self.chosen,
+            lambda phase: self.progress(instant.time, phase),
+        )
 
 
 def _drive_margins(instant: Instant, loop: LinearLoop, period: float) -> DriveMargins:
@@ -328,12 +361,21 @@ def _saying(key: str, remarks: list[str]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        remarks.append(f"model_error.{key} is left out: {error}")
+        remarks.append(f"{key} is left out: {error}")
 
 
-def _remarks(removed: Sequence[str], way: Walk, touches: bool) -> list[str]:
+def _remarks(removed: Sequence[str], way: Walk, loop: StationLoop) -> list[str]:
     remarks = []
-    if touches:
+    if way.tared:
+        remarks.append(
+            "At the start the force sensor would not be tared yet; here it is, at that place."
+        )
+    if loop.spring is not None:
+        remarks.append(
+            "The workpiece is a spring along its normal, without friction and damping, where the "
+            "tool touches it."
+        )
+    elif loop.station.workpiece is not None:
         remarks.append(
             "Contact forces are those of the plant's last step, which it remembers beside its "
             "state; that lag is left out, so that rates near zero tell little."

@@ -43,9 +43,11 @@ class Error:
 
     Attributes:
         parts: By key of ``model_error``: relative errors, and the tool's in kg.
+        unknown_mass: What hangs below the force sensor beside what is believed [kg].
     """
 
     parts: tuple[tuple[str, float], ...] = ()
+    unknown_mass: float = 0.0
 
     def applied_to(self, settings: Scenario) -> Scenario:
         """Return a scenario whose controller errs so.
@@ -64,6 +66,8 @@ class Error:
 
     def __str__(self) -> str:
         """In words."""
+        if self.unknown_mass > 0.0:
+            return f"{self.unknown_mass:g} kg more below the force sensor than believed"
         if len(self.parts) > 1:
             return f"believed {', '.join(_short(*part) for part in self.parts)}"
         return "".join(_words(*part) for part in self.parts) or "as the scenario says"

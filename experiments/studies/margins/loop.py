@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, Diagram, LeafSystem
 
 from diagrams.builder import build_station
 from diagrams.integration import continuous_modes
@@ -18,11 +19,17 @@ from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.margins.modes import in_loop
 from pfsc_drake.systems.can_fail import FailingSystem
+from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.bus_delay import BusDelay
+from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
+
+Kind = TypeVar("Kind", bound=LeafSystem)
 
 # accurate enough for eigenvalues while no mode turns by more than 1 rad per step; RK3 would damp
 # such a resonance by 30 1/s at 1 ms
 _SCHEME, _MOST_STEPS = "runge_kutta5", 100
+# times its stiffness, up to which a surface that is touched is looked at
+STIFFEST = 64.0
 
 
 class StationLoop:
@@ -38,12 +45,15 @@ class StationLoop:
         map: The map.
         drives: Variables that hold what the drives are told, shape (N,).
         drives_are_servos: Whether these are velocities for servos that sample faster, not torques.
+        spring: What the tool presses on, if it does: a spring in place of contact.
     """
 
     def __init__(self, settings: Scenario, folder: Path, task: Task | None = None) -> None:
         with compiled_when_bound():
-            self.station: Station = build_station(settings, folder, task=task)
+            self.station: Station = build_station(settings, folder, task=task, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
+        self.spring = _only(diagram, SurfaceSpring)
+        self._sensor = _only(diagram, ToolCompensation)
         self._step = self._accurate_step()
         self.map = OnePeriodMap(diagram, period, self.configure)
         self._can_fail = [s for s in diagram.GetSystems() if isinstance(s, FailingSystem)]
@@ -68,6 +78,80 @@ class StationLoop:
             for system in self._can_fail
         )
 
+    def external_load(self, section: Context) -> np.ndarray | None:
+        """Return what a force sensor feels beside the tool [N, Nm], shape (6,).
+
+        Args:
+            section: Context right after a tick.
+
+        Returns:
+            In the sensor's frame; None without a sensor, or as long as it is not tared.
+        """
+        if self._sensor is None:
+            return None
+        self.map.approach(section)
+        return self._sensor.external_load(self._sensor.GetMyContextFromRoot(self.map.context))
+
+    def tare(self, section: Context, load: np.ndarray) -> None:
+        """Tare the force sensor at a section, as if nothing but a known load acted on the tool.
+
+        What hangs there and is not known weighs nothing then, as after a taring in a run; its
+        inertia remains.
+
+        Args:
+            section: Context right after a tick, whose sensor is tared.
+            load: See :meth:`external_load`.
+        """
+        assert self._sensor is not None
+        self.map.approach(section)
+        reading = self._sensor.GetMyContextFromRoot(self.map.context)
+        self._sensor.tare_at(self._sensor.GetMyMutableContextFromRoot(section), reading, load)
+
+    def needs_taring(self, section: Context) -> bool:
+        """Return whether there is a force sensor that is not tared.
+
+        Args:
+            section: Context right after a tick.
+        """
+        return self._sensor is not None and self.external_load(section) is None
+
+    def hang(self, section: Context, joint: str, mass: float) -> None:
+        """Let more hang below the force sensor than anybody knows of, at a section.
+
+        Args:
+            section: Context right after a tick.
+            joint: Of the sensor, see :meth:`~diagrams.robots.part.RobotPart.hang`.
+            mass: [kg].
+
+        Raises:
+            InputError: If the plant does not allow for that.
+        """
+        part = self.station.part
+        part.hang(part.plant.GetMyMutableContextFromRoot(section), joint, mass)
+
+    def pressed_force(self, section: Context) -> float:
+        """Return what the spring bears [N]; zero without one.
+
+        Args:
+            section: Context right after a tick.
+        """
+        if self.spring is None:
+            return 0.0
+        return self.spring.force(self.spring.GetMyContextFromRoot(section))
+
+    def stiffened(self, section: Context, stiffness: float) -> Context:
+        """Return a section at which another spring bears the same force.
+
+        Args:
+            section: Context right after a tick; unchanged.
+            stiffness: Of the other one [N/m].
+        """
+        assert self.spring is not None
+        result = section.Clone()
+        own = self.spring.GetMyMutableContextFromRoot(result)
+        self.spring.set_stiffness(own, stiffness, self.pressed_force(section))
+        return result
+
     def variables_in_loop(self, sections: list[Context]) -> np.ndarray:
         """Return the variables whose changes come back through plant and controller.
 
@@ -91,6 +175,9 @@ class StationLoop:
         station.set_start(root)
         if root.num_continuous_states() == 0:
             return period
+        if self.spring is not None:
+            own = self.spring.GetMyMutableContextFromRoot(root)
+            self.spring.set_stiffness(own, STIFFEST * self.spring.stiffness, 1.0)
         fastest = float(np.max(np.abs(continuous_modes(station.diagram, root))))
         return period / min(max(int(np.ceil(fastest * period)), 1), _MOST_STEPS)
 
@@ -103,6 +190,11 @@ class StationLoop:
                 return self.map.rows(system)[:N], True
         name = "velocity_hold" if "velocity_hold" in systems else "hold"
         return self.map.rows(systems[name]), name != "hold"
+
+
+def _only(diagram: Diagram, kind: type[Kind]) -> Kind | None:
+    """Return the system of a kind, if there is one."""
+    return next((system for system in diagram.GetSystems() if isinstance(system, kind)), None)
 
 
 @dataclass(frozen=True)

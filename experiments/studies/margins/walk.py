@@ -16,6 +16,8 @@ _SAMPLES = 2000
 _SLOW = 1e-3  # of the fastest reference: slower is rest
 # s, between two looks at progress and faults
 _CHUNK = 0.05
+# ticks after which what waits for a force sensor to be tared has set off
+_SETTLED = 5
 
 
 @dataclass(frozen=True)
@@ -49,10 +51,12 @@ class Walk:
     Attributes:
         instants: In order of time.
         fault: Whether a fault ended it.
+        tared: Whether a force sensor was tared before it would have been.
     """
 
     instants: list[Instant]
     fault: bool
+    tared: bool = False
 
 
 def walk(
@@ -77,17 +81,27 @@ def walk(
     simulator.Initialize()
     instants: list[Instant] = []
     chosen = _chosen_ticks(station, duration)
+    tared = False
     for tick, eta, speed in chosen[:1] if only_start else chosen:
         now = round(root.get_time() / period)
+        if tick <= now:
+            continue
         stride = max(1, round(_CHUNK / period))
         for goal in [*range(now + stride, tick, stride), tick]:
             simulator.AdvanceTo(goal * period)
             progress(root.get_time())
             if loop.has_failed(root):
-                return Walk(instants, True)
+                return Walk(instants, True, tared)
         simulator.AdvancePendingEvents()
+        if loop.needs_taring(root):
+            loop.tare(root, np.zeros(6))
+            tick, tared = tick + _SETTLED, True
+            simulator.AdvanceTo(tick * period)
+            if loop.has_failed(root):
+                return Walk(instants, True, tared)
+            simulator.AdvancePendingEvents()
         instants.append(Instant(tick * period, eta, speed, root.Clone()))
-    return Walk(instants, False)
+    return Walk(instants, False, tared)
 
 
 def _chosen_ticks(station: Station, duration: float) -> list[tuple[int, tuple[float, ...], float]]:

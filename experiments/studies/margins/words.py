@@ -6,7 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.studies.margins.analysis import Case, MarginAnalysis, Place
+from experiments.studies.margins.analysis import (
+    Case,
+    MarginAnalysis,
+    Place,
+)
+from experiments.studies.margins.loop import STIFFEST
+from experiments.studies.margins.touched import TouchedSurface
 from pfsc_drake.control.margins.disc import DiscMargin
 from reporting.metrics import Metrics
 
@@ -21,6 +27,7 @@ _PARAMETERS = {
     "stiffness": "the joint stiffnesses",
     "rotor_inertia": "the rotor inertias",
     "tool_mass": "the tool's mass",
+    "unknown_mass": "the mass below the force sensor",
 }
 
 
@@ -35,6 +42,7 @@ def sentences(analysis: MarginAnalysis) -> list[str]:
         _box(analysis),
         *_parameters(analysis),
         *_drives(analysis),
+        *_touched(analysis.surface),
         *analysis.remarks,
     ]
 
@@ -78,6 +86,13 @@ def metrics_of(analysis: MarginAnalysis) -> Metrics:
         result.add(
             "slowest_rate_in_box", weakest.worst.rate, "1/s", "< 0", source=str(weakest.error)
         )
+    surface = analysis.surface
+    if surface is not None:
+        stiffness = surface.stiffness
+        result.add("surface_stiffness", stiffness, "N/m", source="of the contact, as a spring")
+        if math.isfinite(surface.borne):
+            most = surface.borne * stiffness
+            result.add("borne_stiffness", most, "N/m", source=surface.instant.place)
     tightest = analysis.tightest
     if tightest is not None:
         margin = min(tightest.drives, key=lambda margin: margin.alpha)
@@ -170,6 +185,23 @@ def _drives(analysis: MarginAnalysis) -> list[str]:
     ]
 
 
+def _touched(surface: TouchedSurface | None) -> list[str]:
+    if surface is None:
+        return []
+    where = (
+        f"The tool presses with {surface.force:.3g} N on a surface of "
+        f"{1e-3 * surface.stiffness:.3g} N/mm ({surface.instant.place})"
+    )
+    hertz = f"{surface.frequency / (2.0 * np.pi):.2g} Hz"
+    if surface.borne == 0.0:
+        return [f"{where}, which the loop does not bear: it grows at {hertz}."]
+    if math.isinf(surface.borne):
+        return [f"{where}; one {STIFFEST:g} times as stiff is borne, and none stiffer was tried."]
+    return [
+        f"{where}; one {surface.borne:.2g} times as stiff is borne, stiffer ones ring at {hertz}."
+    ]
+
+
 def _mode(case: Case) -> str:
     place = case.worst
     if place.modes is None:
@@ -210,6 +242,7 @@ def _instant_data(item: Any) -> dict[str, Any]:
 def _case_data(case: Case) -> dict[str, Any]:
     return {
         "model_error": dict(case.error.parts),
+        "unknown_mass": case.error.unknown_mass,
         "slowest_rate": case.worst.rate,
         "stable": case.is_stable,
         "places": [

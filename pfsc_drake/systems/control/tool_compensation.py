@@ -165,6 +165,30 @@ class ToolCompensation(LeafSystem):
         memory[_WINDOW] = self._taring.empty()
         memory[-memory_size(6) :] = 0.0
 
+    def external_load(self, context: Context) -> np.ndarray | None:
+        """Return what acts beside the tool, in the sensor frame, shape (6,) [N, Nm].
+
+        None as long as the sensor is not tared.
+
+        Args:
+            context: The system's own.
+        """
+        result = self._output.Eval(context)
+        return result[_RESIDUAL] - self.bias(context) if result[_TARED] else None
+
+    def tare_at(self, context: Context, reading: Context, load: np.ndarray) -> None:
+        """Tare at once, knowing what acts beside the tool; a run waits for a quiet stretch.
+
+        Args:
+            context: The system's own, which is tared.
+            reading: The same system's at the tick that tells the residual.
+            load: What acts, in the sensor frame, shape (6,) [N, Nm].
+        """
+        residual = self._output.Eval(reading)[_RESIDUAL]
+        memory = context.get_mutable_discrete_state_vector().get_mutable_value()
+        memory[_BIAS], memory[_TARED] = residual - load, 1.0
+        memory[_WINDOW] = self._taring.empty()
+
     def bias(self, context: Context) -> np.ndarray:
         """Return the bias in use, in the sensor frame, shape (6,) [N, Nm]."""
         return context.get_discrete_state_vector().value()[_BIAS].copy()
