@@ -11,7 +11,7 @@ from experiments.studies.margins.walk import Instant
 from pfsc_drake.control.margins.modes import modes
 
 # to which factor the stiffest surface that is borne is found
-_FINEST = 1.1
+_FINEST = 1.05
 
 
 @dataclass(frozen=True)
