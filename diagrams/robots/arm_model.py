@@ -45,8 +45,9 @@ class ArmModel:
         """Return the joint with the force/torque sensor in it.
 
         Args:
-            name: Its name; empty for the first fixed joint behind the last moving link, on the way
-                to the tool frame.
+            name: Its name; empty for the fixed joint between the last moving link and the tool
+                frame that is the nearest to the tool with some mass behind it, or, if nothing
+                has mass there, the nearest to the link.
 
         Raises:
             InputError: If there is none of that name, or none at all.
@@ -61,11 +62,12 @@ class ArmModel:
         return self.plant.GetJointByName(name)
 
     def _flange(self) -> Joint:
-        """Return the joint that fixes what is not the last link's own to it."""
+        """Return the joint that fixes the tool to what is not the tool's own."""
         link = link_frames(self.plant, self.coordinates)[-1].body()
         inboard = inboard_joints(self.plant)
-        body, flange = self.tool.body(), None
-        while body.index() != link.index():
+        body, flange, mass = self.tool.body(), None, 0.0
+        while body.index() != link.index() and not mass > 0.0:
+            mass += body.default_mass()
             flange = inboard[body.index()]
             body = flange.parent_body()
         if flange is None:

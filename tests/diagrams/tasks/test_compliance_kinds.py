@@ -38,7 +38,6 @@ def arm(settings):
 
     def three_axes(lemniscate: Scenario):
         settings.robot.model = "comau_racer_1_4_3r"
-        settings.sensor.joint = "weld_tool"  # not at the wrist, which is fixed
         settings.path = lemniscate.path
         settings.start.posture_deg = [15, 115, -10]
         settings.reference.points = [0.96, 0.96]
