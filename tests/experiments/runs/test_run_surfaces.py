@@ -1,6 +1,7 @@
 """Surface following through the command line: what a user of a run relies on."""
 
 import base64
+import operator
 import re
 
 import numpy as np
@@ -63,7 +64,8 @@ def test_signals_and_targets(surface_run, name):
 
 def _met(metric):
     sign, number = metric["target"].split()
-    return metric["value"] < float(number) if sign == "<" else metric["value"] > float(number)
+    compare = {"<": operator.lt, "<=": operator.le, ">": operator.gt}[sign]
+    return compare(metric["value"], float(number))
 
 
 @pytest.mark.parametrize(
