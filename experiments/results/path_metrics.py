@@ -294,12 +294,15 @@ def max_unanswered_force(log: RunLog) -> float:
     """Largest force on the tool while what yields waits for a sensor that is not tared.
 
     Args:
-        log: With ``wrench_ext`` and ``tared``.
+        log: With ``wrench_ext`` and ``tared``; with ``held`` only samples without a plate, whose
+            weight is known.
 
     Returns:
         N; zero if it was tared all the time.
     """
     waiting = log["tared"].values[:, 0] == 0.0
+    if "held" in log:
+        waiting &= log["held"].values[:, 0] == 0.0
     forces = np.linalg.norm(log["wrench_ext"].values[waiting, :3], axis=1)
     return float(forces.max(initial=0.0))
 

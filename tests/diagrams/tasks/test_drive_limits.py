@@ -128,3 +128,12 @@ def test_velocity_servos_keep_a_reserve_of_speed(settings):
     )
     assert asked > 0.75 and 0.5 < planned <= 0.7
     assert "% of the speed of axis" in plan.said[0]
+
+
+def test_what_seems_too_much_at_a_glance_is_looked_at_closely(load_exact_scenario):
+    """Seven axes at 93 % of a joint's speed, which the coarse grid of a glance overstates."""
+    settings = load_exact_scenario("pfc_elastic_7r")
+    station = build_station(settings, find_scenario("pfc_elastic_7r").parent)
+    assert not station.task.drive_plan.said
+    asked = make_task(settings, find_scenario("pfc_elastic_7r").parent).motion
+    np.testing.assert_array_equal(station.task.motion.breakpoints, asked.breakpoints)
