@@ -131,7 +131,8 @@ class SensorParameters:
 
     Attributes:
         joint: Fixed joint of the model with the sensor in it; its child side is the tool. By
-            default the first one behind the last moving link, on the way to the tool frame.
+            default, of those between the last moving link and the tool frame, the nearest to the
+            tool that has mass behind it.
         measurement_range: Largest magnitude that is measured, shape (6,).
         bias: Reading without load, shape (6,).
         noise: Standard deviation of one sample, shape (6,).
