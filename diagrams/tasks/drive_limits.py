@@ -46,28 +46,7 @@ def keep_drive_limits(
 ) -> None:
     """Give a task its plan, and the reference that the drives can follow, unless it has them.
 
-    Args:
-        scenario: The scenario.
-        task: What the tool is to do.
-        law: The law that does it.
-        start: Where the robot starts, near the first place of the reference.
-        friction: See :func:`plan_drives`.
-    """
-    if task.drive_plan is not None:
-        return
-    task.drive_plan = plan_drives(scenario, task, law, start, friction)
-    if task.drive_plan is not None:
-        task.motion = task.drive_plan.motion
-
-
-def plan_drives(
-    scenario: Scenario,
-    task: Task,
-    law: FollowingLaw,
-    start: CourseStart,
-    friction: tuple[np.ndarray, np.ndarray] | None,
-) -> DrivePlan | None:
-    """Return a reference that the drives can follow, or None where nobody plans the motion.
+    Where a hand leads, or the motion is longer than any run, nobody plans it.
 
     Args:
         scenario: The scenario; ``reference.limits`` says whether the reference may be slowed.
@@ -79,31 +58,10 @@ def plan_drives(
     """
     along = indices(task.place.coordinates, Kind.TANGENTIAL)
     led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
-    if led or task.motion.domain[1] > _LONGEST:
-        return None
-    planner = _Planner(scenario, task, law, start, friction)
-    try:
-        step, course = planner.course(_GLANCED)
-        fits = planner.fits(course, _AT_A_GLANCE)
-        if not fits and planner.fits(course, 1.0):
-            step, course = planner.course(_CHECKED)
-            fits = planner.fits(course, 1.0)
-        if not fits:
-            # a glance may see too much, of joints beyond the outputs above all
-            step, course = planner.course(_SLOWED)
-            fits = planner.fits(course, 1.0)
-        demand = planner.demand.of(course)
-    except InputError as error:
-        return _unknown(task, planner, str(error))
-    ones = np.ones(len(course))
-    asked = DrivePlan(
-        step * np.arange(len(course)), demand, demand, planner.limits, ones, task.motion, []
-    )
-    if fits:
-        return asked
-    if scenario.reference.limits == "warn":
-        return planner.warned(asked, course)
-    return planner.slowed(asked, course, step)
+    if task.drive_plan is not None or led or task.motion.domain[1] > _LONGEST:
+        return
+    task.drive_plan = _Planner(scenario, task, law, start, friction).plan()
+    task.motion = task.drive_plan.motion
 
 
 class _Planner:
@@ -133,6 +91,35 @@ class _Planner:
         # of speeds only servos run short; with torques, nothing but the motion decides over them
         of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
         self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
+
+    def plan(self) -> DrivePlan:
+        """Return a plan of the motion as it was asked for, or of a slower one."""
+        try:
+            step, course = self.course(_GLANCED)
+            fits = self.fits(course, _AT_A_GLANCE)
+            if not fits and self.fits(course, 1.0):
+                step, course = self.course(_CHECKED)
+                fits = self.fits(course, 1.0)
+            if not fits:
+                # a glance may see too much, of joints beyond the outputs above all
+                step, course = self.course(_SLOWED)
+                fits = self.fits(course, 1.0)
+            demand = self.demand.of(course)
+        except InputError as error:
+            return self.unknown(str(error))
+        times, ones, motion = step * np.arange(len(course)), np.ones(len(course)), self._task.motion
+        asked = DrivePlan(times, demand, demand, self.limits, ones, motion, [])
+        if fits:
+            return asked
+        if self._scenario.reference.limits == "warn":
+            return self.warned(asked, course)
+        return self.slowed(asked, course, step)
+
+    def unknown(self, error: str) -> DrivePlan:
+        """Return a plan of a motion of which nothing is known."""
+        nothing, empty = np.zeros((0, len(self.limits))), np.zeros(0)
+        said = f"whether the drives can follow the reference is not known: its course is {error}"
+        return DrivePlan(empty, nothing, nothing, self.limits, empty, self._task.motion, [said])
 
     def course(self, longest: float) -> tuple[float, np.ndarray]:
         """Return the joints' course on an even grid of the time asked for, and its step [s].
@@ -245,11 +232,3 @@ def _retimed(motion: PiecewisePolynomialCurve, clock: Clock) -> PiecewisePolynom
     table = [spline(even[:-1], k) / factorial(k) for k in range(_DEGREE + 1)]
     coefficients = np.array(table).transpose(1, 0, 2)
     return PiecewisePolynomialCurve(even, coefficients, closed=False, known_smoothness=_DEGREE - 1)
-
-
-def _unknown(task: Task, planner: _Planner, error: str) -> DrivePlan:
-    """Return a plan of a motion of which nothing is known."""
-    nothing = np.zeros((0, len(planner.limits)))
-    said = f"whether the drives can follow the reference is not known: its course is {error}"
-    empty = np.zeros(0)
-    return DrivePlan(empty, nothing, nothing, planner.limits, empty, task.motion, [said])

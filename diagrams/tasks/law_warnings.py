@@ -1,5 +1,8 @@
 """What a law will not do well on a robot."""
 
+from collections.abc import Callable
+from functools import cache
+
 import casadi as ca
 import numpy as np
 
@@ -15,7 +18,7 @@ from pfsc_drake.control.compliance.observed_inertia import (
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.robust_gains import RobotError
+from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.robot.resonance import joint_resonances
@@ -51,6 +54,7 @@ def law_warnings(
         rest: The start, and the manifold's point there.
     """
     parameters = scenario.controller
+    sampled = cache(lambda: sampled_robot(parameters, robot, law.linearization, rest, law.posture))
     causes = [
         *_fast_resonance(parameters, robot, link_state),
         *_fast_damping(parameters, robot),
@@ -58,9 +62,9 @@ def law_warnings(
     ]
     return [
         # where the law does not suit the robot, gains are not to blame
-        *(causes or _fragile_gains(parameters, robot, law, rest)),
+        *(causes or _fragile_gains(parameters, law, sampled)),
         *_fast_servo(scenario, robot, link_state),
-        *untold_forces(scenario, robot, law, rest),
+        *untold_forces(scenario, robot, law, rest, sampled),
         *untold_friction(scenario, law),
         *_observed_forces(scenario, robot, law, rest),
         *_friction_behind_servos(parameters),
@@ -86,27 +90,26 @@ def _fast_resonance(
 
 
 def _fragile_gains(
-    parameters: ControllerParameters, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+    parameters: ControllerParameters, law: FollowingLaw, sampled: Callable[[], SampledRobot]
 ) -> list[str]:
     """Warn of gains that do not bear a small error of the model, on the loop at rest."""
     if law.linearization.relative_degree == 1:
         return []
-    sampled = sampled_robot(parameters, robot, law.linearization, rest, law.posture)
-    gains = law.gains
+    at_rest, gains = sampled(), law.gains
     advice = "poles: auto with a bandwidth chooses some that do; 'margins' tells more"
-    if sampled.rate(gains, RobotError()) > 0.0:
+    if at_rest.rate(gains, RobotError()) > 0.0:
         return [
             f"the loop of the law '{parameters.law}' with these gains is unstable at the start "
             f"even on a perfect model, sampled at {1e3 * parameters.sampling_time:g} ms: lower "
             "the gains or sample faster"
         ]
-    unborne = sampled.unborne(gains, _BORNE_ERROR)
+    unborne = at_rest.unborne(gains, _BORNE_ERROR)
     if unborne is None:
         return []
     return [
         f"the gains of the law '{parameters.law}' do not bear {100.0 * _BORNE_ERROR:g} %: with "
         f"{unborne} the loop is unstable at the start, and about "
-        f"{100.0 * sampled.borne(gains, unborne):.1f} % is borne; {advice}"
+        f"{100.0 * at_rest.borne(gains, unborne):.1f} % is borne; {advice}"
     ]
 
 

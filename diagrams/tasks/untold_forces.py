@@ -1,12 +1,13 @@
 """Forces that a law is not told of, and how far they will move the tool."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.gains import sampled_robot
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.robust_gains import RobotError
+from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.untold_force import largest_yield
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -16,7 +17,11 @@ _LARGEST_WAY = 1e-3
 
 
 def untold_forces(
-    scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+    scenario: Scenario,
+    robot: RobotModel,
+    law: FollowingLaw,
+    rest: RestPosture,
+    sampled: Callable[[], SampledRobot],
 ) -> list[str]:
     """Return what forces will do that a law is not told of, one sentence each.
 
@@ -27,6 +32,7 @@ def untold_forces(
         robot: The robot, as it is believed.
         law: Its law.
         rest: The start, and the manifold's point there.
+        sampled: Returns the law, if it commands torques, on its robot at rest.
     """
     parameters, force = scenario.controller, largest_force(scenario)
     on_links = bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces)
@@ -38,8 +44,10 @@ def untold_forces(
     observed = friction.source == "observer" and friction.observer == "disturbance"
     if source != "none" or (observed and not exact) or law.linearization.relative_degree == 1:
         return []
-    way = force * _yield(scenario, robot, law, rest) if force else 0.0
     bearable = _bearable(scenario)
+    if bearable == np.inf and not exact:
+        return []
+    way = force * _yield(sampled(), robot, law, rest) if force else 0.0
     if not way > bearable and not (exact and (force or scenario.hold_back.force)):
         return []
     effect = _DEFLECTIONS if exact else "it gives way to them like a spring"
@@ -103,9 +111,8 @@ def _is_exact(law: str, robot: RobotModel) -> bool:
     return law in ("elastic", "visco_elastic") and robot.is_elastic
 
 
-def _yield(scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture) -> float:
+def _yield(sampled: SampledRobot, robot: RobotModel, law: FollowingLaw, rest: RestPosture) -> float:
     """Return how far the tool gives way [m/N]; NaN where the loop is unstable."""
-    sampled = sampled_robot(scenario.controller, robot, law.linearization, rest, law.posture)
     if sampled.rate(law.gains, RobotError()) > 0.0:
         return np.nan
     loop, period = sampled.loop, sampled.period
