@@ -1,0 +1,79 @@
+"""Cases of a law as expressions, which read like the dissertation's braces.
+
+All branches are evaluated, and one is selected: what the others are, NaN or infinite, does not
+matter. Conditions are 1 or 0. A comparison with NaN is 0, so write it such that 0 is the safe side.
+"""
+
+from functools import reduce
+from typing import Any
+
+import casadi as ca
+
+
+def where(condition: Any, value: Any, otherwise: Any) -> Any:
+    """Return one of two values, entry by entry; scalars stand for all entries.
+
+    Args:
+        condition: Number or expression, shape () or (k,); nonzero for the first.
+        value: The first, shape () or (k,).
+        otherwise: The second, shape () or (k,).
+    """
+    return ca.if_else(condition, value, otherwise)
+
+
+def first_of(*cases: tuple[Any, Any], otherwise: Any) -> Any:
+    """Return the value of the first case whose condition holds.
+
+    ``first_of((x < 0, -1), (x > 0, 1), otherwise=0)`` is -1 if ``x < 0``, 1 if ``x > 0``, else 0.
+
+    Args:
+        cases: Conditions and values, see :func:`where`.
+        otherwise: The value if no condition holds.
+    """
+    return reduce(lambda rest, case: where(*case, rest), reversed(cases), otherwise)
+
+
+def latched(before: Any, now: Any) -> Any:
+    """Return the value before if it is not zero, else the one of now: the first one stays.
+
+    Args:
+        before: Last result, shape (k,).
+        now: What is found now, shape (k,).
+    """
+    return where(before, before, now)
+
+
+def any_of(*conditions: Any) -> Any:
+    """Return whether one condition holds, shape (1,).
+
+    Args:
+        conditions: Each of any shape.
+    """
+    return ca.sum1(ca.vertcat(*[ca.vec(condition) != 0.0 for condition in conditions])) > 0.0
+
+
+def all_of(*conditions: Any) -> Any:
+    """Return whether all conditions hold, shape (1,).
+
+    Args:
+        conditions: Each of any shape.
+    """
+    return ca.logic_not(any_of(*[ca.logic_not(condition) for condition in conditions]))
+
+
+def is_finite(x: Any) -> Any:
+    """Return which entries are finite numbers, of the shape of x.
+
+    Args:
+        x: Numbers or expressions.
+    """
+    return ca.fabs(x) < ca.inf
+
+
+def all_finite(*parts: Any) -> Any:
+    """Return whether all entries are finite numbers, shape (1,).
+
+    Args:
+        parts: Each of any shape.
+    """
+    return all_of(*[is_finite(part) for part in parts])
