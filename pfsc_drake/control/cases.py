@@ -30,7 +30,7 @@ def first_of(*cases: tuple[Any, Any], otherwise: Any) -> Any:
         cases: Conditions and values, see :func:`where`.
         otherwise: The value if no condition holds.
     """
-    return reduce(lambda rest, case: where(*case, rest), reversed(cases), otherwise)
+    return reduce(lambda rest, case: where(case[0], case[1], rest), reversed(cases), otherwise)
 
 
 def latched(before: Any, now: Any) -> Any:
@@ -73,7 +73,9 @@ def is_finite(x: Any) -> Any:
 def all_finite(*parts: Any) -> Any:
     """Return whether all entries are finite numbers, shape (1,).
 
+    A sum is finite only if all its terms are; that of finite numbers is, if it does not overflow.
+
     Args:
         parts: Each of any shape.
     """
-    return all_of(*[is_finite(part) for part in parts])
+    return is_finite(ca.sum1(ca.vertcat(*[ca.vec(part) for part in parts])))

@@ -67,3 +67,4 @@ def test_what_is_finite(evaluate, bad):
     assert evaluate(cases.is_finite, [1.0, bad, -1e308]).tolist() == [1.0, 0.0, 1.0]
     assert evaluate(cases.all_finite, [1.0, -1e308], [2.0]).tolist() == [1.0]
     assert evaluate(cases.all_finite, [1.0, 2.0], [bad]).tolist() == [0.0]
+    assert evaluate(cases.all_finite, [bad, -bad], [1.0]).tolist() == [0.0]
