@@ -1,0 +1,187 @@
+"""Which results of a CasADi function depend on which arguments.
+
+The sparsity of a Jacobian does not say it: a place in a table has no derivative, and CasADi leaves
+out what goes through it. Here a value depends on all that its calculation reads.
+"""
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["dependencies", "nonzero_dependencies"]
+
+# any result may come from any operand, and the Jacobian does not have all of them
+_READS_EVERYTHING = {
+    ca.OP_FIND,
+    ca.OP_GETNONZEROS_PARAM,
+    ca.OP_SETNONZEROS_PARAM,
+    ca.OP_ADDNONZEROS_PARAM,
+}
+
+
+def dependencies(function: ca.Function) -> np.ndarray:
+    """Return which results of a function depend on which of its arguments.
+
+    Args:
+        function: Any function.
+
+    Returns:
+        Array of bool (number of results, number of arguments). It follows from the structure, not
+        from values: true wherever a dependency cannot be excluded.
+    """
+    elements = nonzero_dependencies(function).tocoo()
+    rows = np.searchsorted(_ends(_sizes_out(function)), elements.row, side="right")
+    columns = np.searchsorted(_ends(_sizes_in(function)), elements.col, side="right")
+    result = np.zeros((function.n_out(), function.n_in()), dtype=bool)
+    result[rows, columns] = True
+    return result
+
+
+def nonzero_dependencies(function: ca.Function) -> sp.csr_array:
+    """Return which elements of a function's results depend on which elements of its arguments.
+
+    Args:
+        function: Any function.
+
+    Returns:
+        Array of bool (nonzeros of all results, nonzeros of all arguments), in the order of the
+        function.
+    """
+    return _Walk().function(function)
+
+
+class _Walk:
+    """A walk through a function and those that it calls, each of them once."""
+
+    def __init__(self) -> None:
+        # the functions are kept, for the key is their address
+        self._known: dict[int, tuple[ca.Function, sp.csr_array]] = {}
+
+    def function(self, function: ca.Function) -> sp.csr_array:
+        """Return what depends on what in a function, (nonzeros out, nonzeros in)."""
+        key = function.__hash__()
+        if key not in self._known:
+            self._known[key] = function, sp.csr_array(self._of_its_kind(function))
+        return self._known[key][1]
+
+    def _of_its_kind(self, function: ca.Function) -> sp.sparray:
+        kind, parts = function.class_name(), function.info()
+        if kind == "MXFunction":
+            return self._matrices(function)
+        if kind == "SXFunction" and not _calls(function):
+            return _jacobian(function)
+        if kind == "Map":
+            return self._map(parts["f"], parts["n"])
+        if kind == "Switch" and not parts["project_in"] and not parts["project_out"]:
+            return self._switch([*parts["f"], parts["f_def"]])
+        return _everything(sum(_sizes_out(function)), sum(_sizes_in(function)))
+
+    def _matrices(self, function: ca.Function) -> sp.sparray:
+        """Return the same of a function of matrix expressions, instruction by instruction."""
+        n_in = sum(_sizes_in(function))
+        arguments = sp.eye_array(n_in, dtype=bool, format="csr")
+        first = [0, *_ends(_sizes_in(function))]
+        # what the elements at each place of the interpreter's memory depend on at present
+        places: dict[int, sp.csr_array] = {}
+        results = []
+        for k in range(function.n_instructions()):
+            node, operation = function.instruction_MX(k), function.instruction_id(k)
+            if operation == ca.OP_INPUT:
+                start = first[node.info()["ind"]] + node.info()["offset"]
+                values = arguments[start : start + node.nnz()]
+            else:
+                read = [
+                    places[place] if place >= 0 else _nothing(node.dep(i).nnz(), n_in)
+                    for i, place in enumerate(function.instruction_input(k))
+                ]
+                if operation == ca.OP_OUTPUT:
+                    results.append((node.info()["ind"], node.info()["offset"], read[0]))
+                    continue
+                values = self._instruction(operation, node, _stack(read, n_in))
+            # a node of several results has no size of its own
+            several = node.is_call() or node.n_out() > 1
+            row = 0
+            for i, place in enumerate(function.instruction_output(k)):
+                n_rows = (node.get_output(i) if several else node).nnz()
+                if place >= 0:
+                    places[place] = values[row : row + n_rows]
+                row += n_rows
+        results.sort(key=lambda result: result[:2])
+        return _stack([values for _, _, values in results], n_in)
+
+    def _instruction(self, operation: int, node: ca.MX, operands: sp.csr_array) -> sp.csr_array:
+        """Return what an instruction's results depend on, from the same of its operands."""
+        if operation == ca.OP_CALL:
+            return self.function(node.which_function()) @ operands
+        if operation in _READS_EVERYTHING:
+            return _everything(node.nnz(), operands.shape[0]) @ operands
+        if operation == ca.OP_LOW:
+            table, sought = node.dep(0).nnz(), node.dep(1).nnz()
+            one_by_one = sp.eye_array(sought, dtype=bool)
+            return sp.csr_array(sp.hstack([_everything(sought, table), one_by_one]) @ operands)
+        # by itself, so that its pattern says nothing but what this instruction does
+        symbols = [ca.MX.sym(f"x{i}", node.dep(i).sparsity()) for i in range(node.n_dep())]
+        return _jacobian(ca.Function("f", symbols, node.eval_mx(symbols))) @ operands
+
+    def _map(self, function: ca.Function, repetitions: int) -> sp.sparray:
+        """Return the same of a function that is evaluated with one set of columns after another."""
+        each = sp.eye_array(repetitions, dtype=bool)
+        once = self.function(function)
+        rows = np.split(np.arange(once.shape[0]), _ends(_sizes_out(function))[:-1])
+        columns = np.split(np.arange(once.shape[1]), _ends(_sizes_in(function))[:-1])
+        return sp.block_array([[sp.kron(each, once[r][:, c]) for c in columns] for r in rows])
+
+    def _switch(self, cases: list[ca.Function]) -> sp.sparray:
+        """Return the same of a function whose first argument chooses one of several."""
+        any_case = sum((self.function(case) for case in cases[1:]), self.function(cases[0]))
+        return sp.hstack([_everything(any_case.shape[0], 1), any_case])
+
+
+def _jacobian(function: ca.Function) -> sp.csr_array:
+    """Return the Jacobian's pattern, (nonzeros out, nonzeros in)."""
+    result = sp.lil_array((sum(_sizes_out(function)), sum(_sizes_in(function))), dtype=bool)
+    first_row = 0
+    for o, n_rows in enumerate(_sizes_out(function)):
+        first_column = 0
+        for i, n_columns in enumerate(_sizes_in(function)):
+            rows, columns = function.jac_sparsity(o, i, True).get_triplet()
+            result[first_row + np.array(rows, int), first_column + np.array(columns, int)] = True
+            first_column += n_columns
+        first_row += n_rows
+    return result.tocsr()
+
+
+def _calls(function: ca.Function) -> bool:
+    """Return whether a function of scalar expressions calls others."""
+    operations = (function.instruction_id(k) for k in range(function.n_instructions()))
+    return ca.OP_CALL in operations
+
+
+def _everything(n_rows: int, n_columns: int) -> sp.csr_array:
+    """Return a pattern in which everything depends on everything."""
+    return sp.csr_array(np.ones((n_rows, n_columns), dtype=bool))
+
+
+def _nothing(n_rows: int, n_columns: int) -> sp.csr_array:
+    """Return a pattern in which nothing depends on anything."""
+    return sp.csr_array((n_rows, n_columns), dtype=bool)
+
+
+def _stack(patterns: list[sp.csr_array], n_columns: int) -> sp.csr_array:
+    """Return patterns below each other; there may be none."""
+    return sp.vstack([_nothing(0, n_columns), *patterns], format="csr")
+
+
+def _sizes_in(function: ca.Function) -> list[int]:
+    """Return the number of nonzeros of each argument."""
+    return [function.nnz_in(i) for i in range(function.n_in())]
+
+
+def _sizes_out(function: ca.Function) -> list[int]:
+    """Return the number of nonzeros of each result."""
+    return [function.nnz_out(i) for i in range(function.n_out())]
+
+
+def _ends(sizes: list[int]) -> np.ndarray:
+    """Return where each of several pieces ends that lie one behind the other."""
+    return np.cumsum(np.array(sizes, dtype=int))
