@@ -18,6 +18,7 @@ LAYERS = [
     ["pfsc_drake.control"],
     ["pfsc_drake.robot"],
     ["pfsc_drake.geometry"],
+    ["pfsc_drake.blocks"],
     ["pfsc_drake.compiled", "pfsc_drake.yaml"],
     ["pfsc_drake.jets"],
     ["pfsc_drake.checks", "pfsc_drake.errors"],
@@ -43,6 +44,7 @@ STRANGERS = [
 # packages that a room must not know
 UNKNOWN = {
     "pfsc_drake.jets": ["pydrake", "matplotlib"],
+    "pfsc_drake.blocks": ["pydrake", "matplotlib"],
     "pfsc_drake.geometry": ["pydrake", "casadi", "matplotlib"],
     "pfsc_drake.control": ["pydrake", "matplotlib"],
     "pfsc_drake.physics": ["pydrake", "matplotlib"],

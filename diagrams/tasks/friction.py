@@ -10,7 +10,7 @@ from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, dr
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.friction_compensation import FrictionCompensation
 from pfsc_drake.systems.control.friction_estimator import FrictionEstimator
@@ -96,15 +96,14 @@ def _add_observer(
     """Add an observer of friction, and return the torque and all that it tells."""
     parameters, period = scenario.controller.friction, scenario.controller.sampling_time
     momentum = drive_momentum(robot).with_delay(velocity_delay(scenario))
-    system: DisturbanceObserver | FrictionEstimator
+    system: BlockSystem | FrictionEstimator
     torque = "estimate"
     if parameters.observer == "kalman":
         coefficients = _required(believed, "observer = kalman")
         system = FrictionEstimator(_kalman(parameters, momentum, coefficients, period), period)
         torque = "friction_torque"
     else:
-        first_order = MomentumObserver(momentum, parameters.rate, period)
-        system = DisturbanceObserver(first_order, period)
+        system = BlockSystem(MomentumObserver(momentum, parameters.rate, period), period)
     observer = builder.AddNamedSystem("friction_observer", system)
     for name in ("joint_state", "drive_torque", "velocity"):
         if name in ports and observer.HasInputPort(name):

@@ -10,7 +10,7 @@ from pfsc_drake.control.estimation.generalized_momentum import link_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.tool_wrench import ToolWrench
 
@@ -110,7 +110,7 @@ def _add_observer(
     period = scenario.controller.sampling_time
     model = link_momentum(robot).with_delay(velocity_delay(scenario))
     observer = builder.AddNamedSystem(
-        name, DisturbanceObserver(MomentumObserver(model, rate, period, num_derivatives), period)
+        name, BlockSystem(MomentumObserver(model, rate, period, num_derivatives), period)
     )
     builder.Connect(ports["joint_state"], observer.GetInputPort("joint_state"))
     builder.Connect(ports["drive_torque"], observer.GetInputPort("drive_torque"))

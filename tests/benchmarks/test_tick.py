@@ -34,7 +34,7 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
@@ -125,7 +125,7 @@ class Chain:
             friction = MomentumObserver(drive_momentum(self.robot), 300.0, PERIOD)
             forces = MomentumObserver(link_momentum(self.robot), 100.0, PERIOD, r - 2)
             for observer, port in ((friction, "friction_torque"), (forces, "tau_ext")):
-                system = builder.AddSystem(DisturbanceObserver(observer, PERIOD))
+                system = builder.AddSystem(BlockSystem(observer, PERIOD))
                 for name, source in (
                     ("joint_state", measured.get_output_port()),
                     ("drive_torque", controller.GetOutputPort("drive_torque")),

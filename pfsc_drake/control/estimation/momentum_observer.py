@@ -1,14 +1,20 @@
 """What acts on a robot besides what is known, from how its momentum changes."""
 
+from typing import Any
+
 import casadi as ca
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
-from pfsc_drake.control.estimation.sampled_estimator import SampledEstimator
 from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
 
 
-class MomentumObserver(SampledEstimator):
+class MomentumObserver(Block):
     """Observer of the unknown torque z in ``p' = f + tau + sign z``, sampled.
+
+    With the momenta of :func:`~pfsc_drake.control.estimation.generalized_momentum.drive_momentum`
+    it finds the friction of the drives, with those of ``link_momentum`` the external torques.
 
     The drives hold their torque over an interval, so that between two samples z was on
     average::
@@ -22,12 +28,25 @@ class MomentumObserver(SampledEstimator):
 
         z_hat_k = z_hat_{k-1} + (1 - exp(-L T)) (z_mean - z_hat_{k-1})
 
-    The estimate is z and its derivatives by rows [Nm or N, per s, per s^2], shape
-    ((num_derivatives + 1) N,). A memory of zeros is that of an observer that has seen nothing:
-    the first estimate is zero.
+    The first estimate is zero. After a sample that is not finite it stands still, and the next
+    sample starts a new interval.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        drive_torque (input): What the drives are told until the next tick, within their limits
+            [Nm or N], shape (N,).
+        known_torque (input, optional): What else is known to act until then, see
+            :class:`~pfsc_drake.control.estimation.generalized_momentum.MomentumModel`, shape
+            (N,) [Nm or N]; zero if not connected.
+        estimate (output): z and its derivatives by rows, shape ((num_derivatives + 1) N,)
+            [Nm or N, per s, per s^2]. What drives the joints may depend on it.
+
+    State:
+        estimate (predicted for this tick), momentum and forces of the last tick, torques that act
+        since then (``acting``) and before (``acted``); whether there was a sample (``seen``).
 
     Args:
-        model: Momenta and forces; their delay is at most T.
+        model: Momenta and forces of N joints; their delay is at most T.
         rate: L [1/s].
         period: Sampling time T [s].
         num_derivatives: Number of derivatives of the estimate, 0 to 2.
@@ -39,40 +58,47 @@ class MomentumObserver(SampledEstimator):
     def __init__(
         self, model: MomentumModel, rate: float, period: float, num_derivatives: int = 0
     ) -> None:
-        super().__init__(_observer_function(model, rate, period, num_derivatives), model.dimension)
+        n, values = model.dimension, (num_derivatives + 1) * model.dimension
+        self._filter = SignalDerivatives(num_derivatives, rate, period)
+        self._model, self._period = model, period
+        self._momentum = model.function()
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "drive_torque": Port(n, "Nm or N"),
+            "known_torque": Port(n, "Nm or N", optional=True),
+        }
+        self.outputs = {"estimate": Port(values, "Nm or N, per s, per s^2")}
+        of_joints = ("momentum", "forces", "acting", "acted")
+        self.states = {"estimate": values} | dict.fromkeys(of_joints, n) | {"seen": 1}
 
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        model, T = self._model, self._period
+        p, f = self._momentum(u.joint_state)
+        tau = x.acting + model.delay / T * (x.acted - x.acting)
+        z_mean = model.sign * ((p - x.momentum) / T - (f + x.forces) / 2.0 - tau)
+        predicted = self._by_columns(x.estimate)
+        innovation = where(x.seen > 0.0, z_mean - predicted[:, 0], 0.0)
+        return {"estimate": ca.vec(predicted + innovation @ ca.DM(self._filter.gain).T)}
 
-def _observer_function(
-    model: MomentumModel, rate: float, period: float, num_derivatives: int
-) -> ca.Function:
-    """Return ``(memory, state, drive_torque, known_torque) -> (estimate, next memory, check)``.
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        p, f = self._momentum(u.joint_state)
+        acting = ca.DM(self._model.drive_weight) * u.drive_torque
+        if u.known_torque is not None:
+            acting += ca.DM(self._model.known_weight) * u.known_torque
+        predicted = self._by_columns(y.estimate) @ ca.DM(self._filter.transition).T
+        sampled = {
+            "estimate": ca.vec(predicted),
+            "momentum": p,
+            "forces": f,
+            "acting": acting,
+            "acted": x.acting,
+        }
+        good = all_finite(*sampled.values())
+        kept = {name: where(good, value, getattr(x, name)) for name, value in sampled.items()}
+        return kept | {"seen": good}
 
-    The check is finite only if the next memory is: a sum is finite only if all its terms are.
-    """
-    n, rows = model.dimension, num_derivatives + 1
-    filter_ = SignalDerivatives(num_derivatives, rate, period)
-    memory = ca.SX.sym("memory", (rows + 4) * n + 1)
-    drive, known = ca.SX.sym("drive_torque", n), ca.SX.sym("known_torque", n)
-    predicted = ca.reshape(memory[: rows * n], n, rows)
-    p, f, last, before = ca.vertsplit(memory[rows * n : -1], n)
-    acting = last + model.delay / period * (before - last)
-    change = (model.momentum - p) / period
-    mean = model.sign * (change - (model.forces + f) / 2.0 - acting)
-    innovation = ca.if_else(memory[-1] > 0.0, mean - predicted[:, 0], 0.0)
-    estimate = predicted + innovation @ ca.DM(filter_.gain).T
-    following = ca.vertcat(
-        ca.vec(estimate @ ca.DM(filter_.transition).T),
-        model.momentum,
-        model.forces,
-        ca.DM(model.drive_weight) * drive + ca.DM(model.known_weight) * known,
-        last,
-        1.0,
-    )
-    results = [ca.vec(estimate), following, ca.sum1(following)]
-    return ca.Function(
-        "momentum_observer",
-        [memory, model.state, drive, known],
-        ca.cse([ca.densify(result) for result in results]),
-        ["memory", "state", "drive_torque", "known_torque"],
-        ["estimate", "next", "check"],
-    )
+    def _by_columns(self, estimate: Any) -> Any:
+        """Return torque, first derivative, .. as columns."""
+        return ca.reshape(estimate, self._model.dimension, -1)

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.estimation.generalized_momentum import (
     MomentumModel,
     drive_momentum,
@@ -21,11 +22,14 @@ DRIVES = np.array([120.0, -300.0, 80.0]) * np.linspace(1.0, 2.0, COUNT)[:, None]
 
 def observe(observer, states, drives, known=None):
     """Return the estimates at all samples, shape (samples, values)."""
-    memory, estimates = np.zeros(observer.memory_size), []
-    for state, drive in zip(states, [*drives, drives[-1]], strict=True):
-        estimates.append(observer.estimate(memory, state).copy())
-        observer.remember(memory, state, drive, known)
-    return np.array(estimates)
+    torques = {} if known is None else {"known_torque": known}
+    stepper = Stepper(observer, tuple(torques))
+    return np.array(
+        [
+            stepper.step(joint_state=state, drive_torque=drive, **torques)["estimate"]
+            for state, drive in zip(states, [*drives, drives[-1]], strict=True)
+        ]
+    )
 
 
 @pytest.mark.parametrize("kind", ["rigid", "elastic", "mixed"])

@@ -8,7 +8,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain, ZeroOr
 
 from pfsc_drake.control.estimation.generalized_momentum import drive_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
-from pfsc_drake.systems.control.disturbance_observer import DisturbanceObserver
+from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD, RATE, FRICTION = 1e-3, 200.0, np.array([20.0, -35.0, 9.0])
 Q = np.array([0.3, 1.2, -0.5])
@@ -18,7 +18,7 @@ AT_REST = np.concatenate([Q, np.zeros(3), Q, np.zeros(3)])
 @pytest.fixture(name="system")
 def fixture_system(arm):
     observer = MomentumObserver(drive_momentum(arm.chain), RATE, PERIOD)
-    return DisturbanceObserver(observer, PERIOD)
+    return BlockSystem(observer, PERIOD)
 
 
 def test_drives_may_depend_on_the_estimate(arm, system):

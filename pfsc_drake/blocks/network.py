@@ -1,0 +1,270 @@
+"""Blocks, one or many, as functions between ports, states and wires."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.dependencies import dependencies
+
+
+class Source(NamedTuple):
+    """Where an argument comes from.
+
+    Attributes:
+        kind: ``input``, ``state``, ``wire`` or ``tick``.
+        name: Which.
+    """
+
+    kind: str
+    name: str
+
+
+TICK = Source("tick", "tick")
+
+
+@dataclass(frozen=True)
+class Node:
+    """A function in a network.
+
+    Attributes:
+        function: The function; vectors in, vectors out.
+        sources: Of its arguments.
+        results: Names of wires, or of states.
+    """
+
+    function: ca.Function
+    sources: tuple[Source, ...]
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Network:
+    """What one block does, or many that are wired.
+
+    Attributes:
+        inputs: Ports at the border; none that is optional is left open.
+        outputs: Wires that are led out, by port.
+        units: Of these ports.
+        states: Sizes by name.
+        wires: Sizes by name.
+        nodes: What evaluates wires, each by one node.
+        updates: What evaluates states at the next tick; others stay.
+        initials: What evaluates states at the start; others are zero.
+    """
+
+    inputs: Mapping[str, Port]
+    outputs: Mapping[str, str]
+    units: Mapping[str, str]
+    states: Mapping[str, int]
+    wires: Mapping[str, int]
+    nodes: tuple[Node, ...]
+    updates: tuple[Node, ...] = ()
+    initials: tuple[Node, ...] = ()
+
+    @classmethod
+    def of(cls, block: Block, unconnected: Collection[str] = ()) -> "Network":
+        """Return the network that a block is.
+
+        Args:
+            block: The block.
+            unconnected: Optional inputs that nothing is connected to.
+
+        Raises:
+            ValueError: If the block's methods return what it has not declared.
+        """
+        # the same nodes whatever is connected
+        groups = [node.results for node in cls.of(block).nodes] if unconnected else []
+        inputs = {name: p for name, p in block.inputs.items() if name not in unconnected}
+        x, u = _symbols(block.states), _symbols({name: p.size for name, p in inputs.items()})
+        y = _symbols({name: p.size for name, p in block.outputs.items()})
+        t = ca.MX.sym("t")
+        of_x, of_y = Values(**x), Values(**y)
+        of_u = Values(**u, **dict.fromkeys(unconnected))
+        known = {Source("input", name): symbol for name, symbol in u.items()}
+        known[TICK] = t
+        begin = block.initial(of_u, t)
+        _check(block, "initial", begin, block.states)
+        initials = _nodes(block, "initial", known, begin, [tuple(begin)])
+        known |= {Source("state", name): symbol for name, symbol in x.items()}
+        outputs = block.output(of_x, of_u, t)
+        sizes = {name: p.size for name, p in block.outputs.items()}
+        _check(block, "output", outputs, sizes, every=True)
+        nodes = _nodes(block, "output", known, outputs, groups)
+        known |= {Source("wire", name): symbol for name, symbol in y.items()}
+        later = block.update(of_x, of_u, of_y, t)
+        _check(block, "update", later, block.states)
+        updates = _nodes(block, "update", known, later, [tuple(later)])
+        return cls(
+            inputs,
+            {name: name for name in block.outputs},
+            {name: p.unit for name, p in block.outputs.items()},
+            dict(block.states),
+            sizes,
+            nodes,
+            updates,
+            initials,
+        )
+
+
+@dataclass
+class Wiring:
+    """How blocks are wired.
+
+    Attributes:
+        networks: By name.
+        connections: What feeds an input: ``(name, input)`` of an output ``(name, output)``, or the
+            name of an input at the border.
+        outputs: Ports at the border, and which output ``(name, output)`` they are.
+    """
+
+    networks: dict[str, Network] = field(default_factory=dict)
+    connections: dict[tuple[str, str], tuple[str, str] | str] = field(default_factory=dict)
+    outputs: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def network(self) -> Network:
+        """Return all of them as one; states and wires are called ``block.name``.
+
+        Raises:
+            ValueError: If an input is not fed.
+        """
+        inputs: dict[str, Port] = {}
+        states: dict[str, int] = {}
+        wires: dict[str, int] = {}
+        nodes: list[Node] = []
+        updates: list[Node] = []
+        initials: list[Node] = []
+        for name, part in self.networks.items():
+            fed = {}
+            for port, vector in part.inputs.items():
+                source = self.connections.get((name, port))
+                if source is None:
+                    raise ValueError(f"{name}.{port}: nothing is connected to this input")
+                fed[port] = self._source(source)
+                if isinstance(source, str):
+                    inputs.setdefault(source, replace(vector, optional=False))
+            states |= {f"{name}.{key}": size for key, size in part.states.items()}
+            wires |= {f"{name}.{key}": size for key, size in part.wires.items()}
+            for kind, into in (
+                (part.nodes, nodes),
+                (part.updates, updates),
+                (part.initials, initials),
+            ):
+                into += [_renamed(node, name, fed) for node in kind]
+        outputs = {
+            port: f"{name}.{self.networks[name].outputs[output]}"
+            for port, (name, output) in self.outputs.items()
+        }
+        units = {
+            port: self.networks[name].units.get(output, "")
+            for port, (name, output) in self.outputs.items()
+        }
+        return Network(
+            inputs, outputs, units, states, wires, tuple(nodes), tuple(updates), tuple(initials)
+        )
+
+    def _source(self, source: tuple[str, str] | str) -> Source:
+        if isinstance(source, str):
+            return Source("input", source)
+        name, output = source
+        return Source("wire", f"{name}.{self.networks[name].outputs[output]}")
+
+
+def _renamed(node: Node, prefix: str, fed: Mapping[str, Source]) -> Node:
+    """Return a node of a part as one of the whole."""
+    sources = tuple(
+        fed[source.name]
+        if source.kind == "input"
+        else source
+        if source is TICK or source.kind == "tick"
+        else Source(source.kind, f"{prefix}.{source.name}")
+        for source in node.sources
+    )
+    return Node(node.function, sources, tuple(f"{prefix}.{name}" for name in node.results))
+
+
+def _symbols(sizes: Mapping[str, int]) -> dict[str, ca.MX]:
+    return {name: ca.MX.sym(name, size) for name, size in sizes.items()}
+
+
+def _check(
+    block: Block, method: str, found: dict[str, Any], sizes: Mapping[str, int], every: bool = False
+) -> None:
+    """Refuse what a method returns that has not been declared."""
+    name = type(block).__name__
+    for key, value in found.items():
+        if key not in sizes:
+            raise ValueError(f"{name}.{method}: {key!r} is none of {', '.join(sizes)}")
+        shape = ca.MX(value).shape
+        if shape != (sizes[key], 1):
+            raise ValueError(f"{name}.{method}: {key} is {shape}; declared as ({sizes[key]}, 1)")
+    missing = [key for key in sizes if key not in found]
+    if every and missing:
+        raise ValueError(f"{name}.{method}: {', '.join(missing)} not returned")
+
+
+def _nodes(
+    block: Block,
+    method: str,
+    known: Mapping[Source, ca.MX],
+    found: Mapping[str, Any],
+    groups: Sequence[tuple[str, ...]],
+) -> tuple[Node, ...]:
+    """Return the functions of a method's results.
+
+    Args:
+        block: Whose method it is.
+        method: Its name.
+        known: Symbols of all arguments.
+        found: The results.
+        groups: Which results are one function; if there are none, those that need the same inputs.
+    """
+    if not found:
+        return ()
+    sources, names = list(known), list(found)
+    results = [ca.densify(ca.MX(value)) for value in found.values()]
+    whole = ca.Function(f"{type(block).__name__}_{method}", list(known.values()), results)
+    arguments: list[Any] = list(known.values())
+    expanded = _expanded(whole) if block.expands else None
+    if expanded is not None:
+        whole = expanded
+        arguments = [ca.SX.sym(source.name, *symbol.shape) for source, symbol in known.items()]
+        results = list(whole.call(arguments))
+    needs = dependencies(whole)
+    rows_of = [[names.index(name) for name in group] for group in groups]
+    if not groups:
+        by_needs: dict[frozenset[int], list[int]] = {}
+        outer = [i for i, source in enumerate(sources) if source.kind in ("input", "tick")]
+        for row in range(len(names)):
+            by_needs.setdefault(frozenset(i for i in outer if needs[row, i]), []).append(row)
+        rows_of = list(by_needs.values())
+    return tuple(
+        _node(f"{whole.name()}_{k}", rows, needs, sources, arguments, names, results)
+        for k, rows in enumerate(rows_of)
+    )
+
+
+def _node(
+    title: str,
+    rows: list[int],
+    needs: Any,
+    sources: list[Source],
+    arguments: list[Any],
+    names: list[str],
+    results: list[Any],
+) -> Node:
+    """Return one function of some results, of the arguments that they need."""
+    used = [i for i in range(len(sources)) if any(needs[row, i] for row in rows)]
+    chosen = ca.cse([results[row] for row in rows])
+    function = ca.Function(title, [arguments[i] for i in used], chosen)
+    return Node(function, tuple(sources[i] for i in used), tuple(names[row] for row in rows))
+
+
+def _expanded(function: ca.Function) -> ca.Function | None:
+    """Return a function of scalars, or None if there is none."""
+    try:
+        return function.expand()
+    except RuntimeError:
+        return None

@@ -1,0 +1,316 @@
+"""A network as few functions: stages of outputs, what is remembered, how it begins."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from pfsc_drake.blocks.network import TICK, Network, Node, Source
+from pfsc_drake.errors import InputError
+
+Needs = frozenset[Source]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """All wires that depend on the same inputs.
+
+    Attributes:
+        function: Of ``sources``, then the results of earlier ``stages``; one vector out.
+        inputs: Names of the inputs among its arguments.
+        stages: Numbers of the earlier stages among its arguments.
+        needs: What its results depend on at last: inputs and tick.
+        needs_at_start: The same before the start, when states are what the inputs say.
+        parts: Where in the result wires are.
+    """
+
+    function: ca.Function
+    inputs: tuple[str, ...]
+    stages: tuple[int, ...]
+    needs: Needs
+    needs_at_start: Needs
+    parts: Mapping[str, slice]
+
+
+class Program:
+    """A network as functions of one state vector.
+
+    All functions take ``x`` (all states), ``t`` (the tick), the inputs by name that they need, and
+    ``stage_k`` of the stages that they need. Nothing is evaluated in two of them.
+
+    Args:
+        network: The network.
+        like: Program of the same block with more inputs, whose stages this one is to have.
+
+    Attributes:
+        network: The same.
+        states: Where in ``x`` each state is.
+        size: Of ``x``.
+        stages: In an order in which they can be evaluated.
+        update: ``x`` of the next tick, called ``x_next``.
+        update_inputs, update_stages: What it takes.
+        initial: ``x`` at the start, called ``x_start``, of ``x``, ``preset`` (a number for each
+            state by name; where it is not 0 that of ``x`` stays), ``t`` and ``initial_inputs``.
+
+    Raises:
+        InputError: If outputs depend on themselves within a tick.
+    """
+
+    def __init__(self, network: Network, like: "Program | None" = None) -> None:
+        self.network = network
+        self.states = _slices(network.states)
+        self.size = sum(network.states.values())
+        self._maker = {name: node for node in network.nodes for name in node.results}
+        self._starter = {name: node for node in network.initials for name in node.results}
+        self._x, self._t = ca.MX.sym("x", self.size), ca.MX.sym("t")
+        self._u = {name: ca.MX.sym(name, port.size) for name, port in network.inputs.items()}
+        values = ca.vertsplit(self._x, _ends(network.states)) if self.size else []
+        self._states = dict(zip(self.states, values, strict=True))
+        self._needs: dict[tuple[str, bool], Needs] = {}
+        order = _ordered(network.nodes, self._maker)
+        self.stages, self._stage_of = self._stages(self._grouped(order, like))
+        self._made = [
+            ca.MX.sym(f"stage_{k}", stage.function.numel_out(0))
+            for k, stage in enumerate(self.stages)
+        ]
+        self._make_update()
+        self._make_initial()
+
+    def wire(self, output: str) -> tuple[int, slice]:
+        """Return the stage that evaluates an output at the border, and where it is in it.
+
+        Args:
+            output: Name of the port.
+        """
+        name = self.network.outputs[output]
+        k = self._stage_of[name]
+        return k, self.stages[k].parts[name]
+
+    def step(self) -> ca.Function:
+        """Return one function of a whole tick.
+
+        ``(x, t, inputs ..) -> (x_next, outputs ..)``, by name.
+        """
+        results: list[ca.MX] = []
+        given = {"x": self._x, "t": self._t} | self._u
+        for k, stage in enumerate(self.stages):
+            named = given | {f"stage_{j}": results[j] for j in stage.stages}
+            results.append(_call(self.stages[k].function, named))
+        named = given | {f"stage_{j}": results[j] for j in self.update_stages}
+        outputs = {}
+        for port in self.network.outputs:
+            k, part = self.wire(port)
+            outputs[port] = results[k][part]
+        return ca.Function(
+            "step",
+            list(given.values()),
+            [_call(self.update, named), *outputs.values()],
+            list(given),
+            ["x_next", *outputs],
+        )
+
+    def _grouped(self, order: list[Node], like: "Program | None") -> list[list[Node]]:
+        """Return nodes by what they need, those that need less before."""
+        if like is not None:
+            numbers = range(len(like.stages))
+            return [[n for n in order if like._stage_of[n.results[0]] == k] for k in numbers]
+        groups: dict[Needs, list[Node]] = {}
+        for node in order:
+            groups.setdefault(self._needs_of(node, at_start=False), []).append(node)
+        return [nodes for _, nodes in sorted(groups.items(), key=lambda item: len(item[0]))]
+
+    def _stages(self, groups: list[list[Node]]) -> tuple[list[Stage], dict[str, int]]:
+        """Return the stages of groups of nodes, and the stage of each wire."""
+        stages: list[Stage] = []
+        stage_of: dict[str, int] = {}
+        made: dict[str, ca.MX] = {}
+        vectors: list[ca.MX] = []
+        for nodes in groups:
+            inside: dict[str, ca.MX] = {}
+            for node in nodes:
+                results = node.function.call(
+                    [self._value(source, inside | made) for source in node.sources]
+                )
+                inside |= dict(zip(node.results, results, strict=True))
+            sources = [s for node in nodes for s in node.sources]
+            earlier = sorted(
+                {stage_of[s.name] for s in sources if s.kind == "wire" and s.name not in inside}
+            )
+            inputs = _names(sources, "input")
+            k = len(stages)
+            function = ca.Function(
+                f"stage_{k}",
+                [self._x, self._t, *(self._u[name] for name in inputs)]
+                + [vectors[j] for j in earlier],
+                [ca.vertcat(*inside.values())],
+                ["x", "t", *inputs, *(f"stage_{j}" for j in earlier)],
+                ["result"],
+            )
+            needs, at_start = (
+                frozenset().union(*(self._needs_of(node, at_start=begin) for node in nodes))
+                for begin in (False, True)
+            )
+            parts = _slices({name: self.network.wires[name] for name in inside})
+            stages.append(Stage(function, inputs, tuple(earlier), needs, at_start, parts))
+            vectors.append(ca.MX.sym(f"stage_{k}", function.numel_out(0)))
+            made |= {name: vectors[k][part] for name, part in parts.items()}
+            stage_of |= dict.fromkeys(inside, k)
+        return stages, stage_of
+
+    def _value(self, source: Source, wires: Mapping[str, ca.MX]) -> ca.MX:
+        if source.kind == "state":
+            return self._states[source.name]
+        if source.kind == "input":
+            return self._u[source.name]
+        return self._t if source == TICK else wires[source.name]
+
+    def _needs_of(self, node: Node, *, at_start: bool) -> Needs:
+        """Return the inputs that a node depends on, by way of wires and, at start, of states."""
+        key = node.results[0], at_start
+        if key not in self._needs:
+            needs: set[Source] = set()
+            for source in node.sources:
+                if source.kind in ("input", "tick"):
+                    needs.add(source)
+                elif source.kind == "wire":
+                    needs |= self._needs_of(self._maker[source.name], at_start=at_start)
+                elif at_start and source.name in self._starter:
+                    needs |= self._needs_at_start(self._starter[source.name])
+            self._needs[key] = frozenset(needs)
+        return self._needs[key]
+
+    def _needs_at_start(self, node: Node) -> Needs:
+        needs: set[Source] = set()
+        for source in node.sources:
+            if source.kind == "wire":
+                needs |= self._needs_of(self._maker[source.name], at_start=True)
+            else:
+                needs.add(source)
+        return frozenset(needs)
+
+    def _make_update(self) -> None:
+        nodes = self.network.updates
+        sources = [source for node in nodes for source in node.sources]
+        wires = {s.name for s in sources if s.kind == "wire"}
+        self.update_inputs = _names(sources, "input")
+        self.update_stages = tuple(sorted({self._stage_of[name] for name in wires}))
+        made = {
+            name: self._made[k][self.stages[k].parts[name]]
+            for name, k in self._stage_of.items()
+            if name in wires
+        }
+        later = dict(self._states)
+        for node in nodes:
+            results = node.function.call([self._value(source, made) for source in node.sources])
+            later |= dict(zip(node.results, results, strict=True))
+        self.update = ca.Function(
+            "update",
+            [self._x, self._t, *(self._u[name] for name in self.update_inputs)]
+            + [self._made[k] for k in self.update_stages],
+            [ca.vertcat(*later.values())],
+            ["x", "t", *self.update_inputs, *(f"stage_{k}" for k in self.update_stages)],
+            ["x_next"],
+        )
+
+    def _make_initial(self) -> None:
+        preset = ca.MX.sym("preset", len(self.states))
+        flags = dict(zip(self.states, ca.vertsplit(preset), strict=True)) if self.states else {}
+        begun: dict[str, ca.MX] = {}
+        wires: dict[str, ca.MX] = {}
+        on_the_way: set[str] = set()
+        used: set[str] = set()
+
+        def evaluated(node: Node) -> list[ca.MX]:
+            arguments = []
+            for source in node.sources:
+                if source.kind == "state":
+                    arguments.append(start_of(source.name))
+                elif source.kind == "wire":
+                    arguments.append(wire_of(source.name))
+                else:
+                    used.update({source.name} if source.kind == "input" else ())
+                    arguments.append(self._value(source, {}))
+            return list(node.function.call(arguments))
+
+        def wire_of(name: str) -> ca.MX:
+            if name not in wires:
+                if name in on_the_way:
+                    raise InputError(
+                        f"{name}: depends on itself at the start, through {', '.join(on_the_way)}"
+                    )
+                on_the_way.add(name)
+                node = self._maker[name]
+                wires.update(zip(node.results, evaluated(node), strict=True))
+                on_the_way.discard(name)
+            return wires[name]
+
+        def start_of(name: str) -> ca.MX:
+            if name not in begun:
+                node = self._starter.get(name)
+                size = self.network.states[name]
+                if node is None:
+                    found = {name: ca.MX(ca.DM.zeros(size))}
+                else:
+                    found = dict(zip(node.results, evaluated(node), strict=True))
+                for key, value in found.items():
+                    begun[key] = ca.if_else(flags[key], self._states[key], value)
+            return begun[name]
+
+        start = [start_of(name) for name in self.states]
+        self.initial_inputs = tuple(name for name in self._u if name in used)
+        self.initial = ca.Function(
+            "initial",
+            [self._x, preset, self._t, *(self._u[name] for name in self.initial_inputs)],
+            [ca.vertcat(*start)],
+            ["x", "preset", "t", *self.initial_inputs],
+            ["x_start"],
+        )
+
+
+def _ordered(nodes: Iterable[Node], maker: Mapping[str, Node]) -> list[Node]:
+    """Return nodes such that each comes after those that it takes wires of.
+
+    Raises:
+        InputError: If there is a loop.
+    """
+    order: dict[int, Node] = {}
+    way: list[Node] = []
+
+    def visit(node: Node) -> None:
+        if id(node) in order:
+            return
+        if any(node is other for other in way):
+            names = [other.results[0] for other in way]
+            raise InputError(f"algebraic loop of outputs: {' -> '.join([*names, names[0]])}")
+        way.append(node)
+        for source in node.sources:
+            if source.kind == "wire":
+                visit(maker[source.name])
+        way.pop()
+        order[id(node)] = node
+
+    for node in nodes:
+        visit(node)
+    return list(order.values())
+
+
+def _call(function: ca.Function, named: Mapping[str, ca.MX]) -> ca.MX:
+    """Return the only result of a function of named arguments."""
+    return function.call([named[name] for name in function.name_in()])[0]
+
+
+def _names(sources: Iterable[Source], kind: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(source.name for source in sources if source.kind == kind))
+
+
+def _ends(sizes: Mapping[str, int]) -> list[int]:
+    """Return where each of consecutive vectors begins, and the last ends."""
+    ends = [0]
+    for size in sizes.values():
+        ends.append(ends[-1] + size)
+    return ends
+
+
+def _slices(sizes: Mapping[str, int]) -> dict[str, slice]:
+    ends = _ends(sizes)
+    return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}

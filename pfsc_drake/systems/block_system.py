@@ -1,0 +1,209 @@
+"""A block, or a network of them, as a Drake system."""
+
+import math
+from collections.abc import Iterable
+
+import casadi as ca
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import (
+    BasicVector,
+    CacheEntry,
+    Context,
+    DependencyTicket,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+    ValueProducer,
+)
+
+from pfsc_drake.blocks.block import Block
+from pfsc_drake.blocks.network import TICK, Network
+from pfsc_drake.blocks.program import Program, Stage
+from pfsc_drake.compiled.bound_function import BoundFunction
+
+_ROUNDING = 1e-6  # of a period
+_STARTED = 0
+
+
+class BlockSystem(LeafSystem):
+    """A block in a diagram: its ports, its states, and its methods as compiled functions.
+
+    At every tick, from time zero on, it remembers what the block's ``update`` says. Between ticks
+    outputs follow the inputs. Before the simulation begins, states are what the block's
+    ``initial`` says of the inputs at that moment; so whatever starts from another block's output
+    starts from what that puts out at its own start, in whatever order Drake initializes them. A
+    state that :meth:`set_state` has set before stays as it is.
+
+    Ports:
+        Those of the block.
+
+    State:
+        Discrete: whether the system has started, which states were set before that, and the states
+        (:attr:`states` says where).
+
+    Args:
+        block: The block or network.
+        period: Sampling time [s].
+
+    Attributes:
+        block: The same; None of a network.
+        period: Sampling time [s].
+        states: Where in the discrete state each state is.
+    """
+
+    def __init__(self, block: Block | Network, period: float) -> None:
+        super().__init__()
+        self.block = block if isinstance(block, Block) else None
+        self.period = period
+        whole = block if isinstance(block, Network) else Network.of(block)
+        declared = Program(whole)
+        self._programs: dict[frozenset[str], _Functions] = {}
+        self._declared = declared
+        # [started, which are set, states]
+        first = 1 + len(declared.states)
+        self._preset, self._x = slice(1, first), slice(first, first + declared.size)
+        self.states = {
+            name: slice(first + part.start, first + part.stop)
+            for name, part in declared.states.items()
+        }
+        memory = self.DeclareDiscreteState(first + declared.size)
+        self._inputs = {
+            name: self.DeclareVectorInputPort(name, port.size)
+            for name, port in whole.inputs.items()
+        }
+        self._optional = [name for name, port in whole.inputs.items() if port.optional]
+        self._stages: list[CacheEntry] = []
+        always = {self.discrete_state_ticket(memory)}
+        for k, stage in enumerate(declared.stages):
+            self._stages.append(self._declare_stage(k, stage, always))
+        for port in whole.outputs:
+            self._declare_output(port)
+        self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
+        if declared.size:
+            self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def state(self, context: Context, name: str) -> np.ndarray:
+        """Return a state, as it is set or remembered.
+
+        Args:
+            context: The system's own.
+            name: Of the state.
+        """
+        return context.get_discrete_state_vector().value()[self.states[name]].copy()
+
+    def set_state(self, context: Context, name: str, value: np.ndarray) -> None:
+        """Set a state; before the start it stays when the simulation begins.
+
+        Args:
+            context: The system's own.
+            name: Of the state.
+            value: Of the state.
+        """
+        memory = context.get_discrete_state_vector().value().copy()
+        memory[self.states[name]] = value
+        memory[1 + list(self.states).index(name)] = 1.0
+        context.SetDiscreteState(memory)
+
+    def start(self, context: Context) -> None:
+        """Begin, as a simulation does, for whoever evaluates a context without one.
+
+        Args:
+            context: The system's own.
+        """
+        context.SetDiscreteState(self._begun(context))
+
+    def _declare_stage(self, k: int, stage: Stage, always: set[DependencyTicket]) -> CacheEntry:
+        def calc(context: Context, value: Value) -> None:
+            functions = self._program(context)
+            stage = functions.program.stages[k]
+            made = [(j, self._stages[j].Eval(context)) for j in stage.stages]
+            self._given(context, functions, stage.inputs)
+            for j, values in made:
+                functions.made[j][:] = values
+            functions.stages[k].evaluate()
+            value.set_value(functions.stages[k].results["result"].copy())
+
+        needs = stage.needs | stage.needs_at_start
+        sources = {self._inputs[s.name].ticket() for s in needs if s.kind == "input"}
+        if TICK in needs:
+            sources.add(self.time_ticket())
+        size = stage.function.numel_out(0)
+        producer = ValueProducer(allocate=lambda: Value(np.zeros(size)), calc=calc)
+        return self.DeclareCacheEntry(f"stage {k}", producer, always | sources)
+
+    def _declare_output(self, port: str) -> None:
+        k, part = self._declared.wire(port)
+        stage = self._stages[k]
+
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(stage.Eval(context)[part])
+
+        self.DeclareVectorOutputPort(
+            port, part.stop - part.start, calc, prerequisites_of_calc={stage.ticket()}
+        )
+
+    def _program(self, context: Context) -> "_Functions":
+        """Return the functions for what is connected."""
+        left = frozenset(n for n in self._optional if not self._inputs[n].HasValue(context))
+        if left not in self._programs:
+            program = self._declared
+            if left:
+                assert self.block is not None  # a network leaves no input open
+                program = Program(Network.of(self.block, left), self._declared)
+            self._programs[left] = _Functions(program)
+        return self._programs[left]
+
+    def _given(self, context: Context, functions: "_Functions", inputs: Iterable[str]) -> None:
+        """Write states, tick and inputs into the functions' arguments."""
+        memory = context.get_discrete_state_vector().value()
+        functions.x[:] = (memory if memory[_STARTED] else self._begun(context))[self._x]
+        functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
+        for name in inputs:
+            functions.u[name][:] = self._inputs[name].Eval(context)
+
+    def _begun(self, context: Context) -> np.ndarray:
+        """Return the discrete state as it is at the start."""
+        functions = self._program(context)
+        given = [self._inputs[name].Eval(context) for name in functions.program.initial_inputs]
+        for name, value in zip(functions.program.initial_inputs, given, strict=True):
+            functions.u[name][:] = value
+        before = context.get_discrete_state_vector().value()
+        functions.x[:], functions.preset[:] = before[self._x], before[self._preset]
+        functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
+        functions.initial.evaluate()
+        begun = np.zeros(len(before))
+        begun[_STARTED], begun[self._x] = 1.0, functions.initial.results["x_start"]
+        return begun
+
+    def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
+        state.set_value(self._begun(context))
+        return EventStatus.Succeeded()
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        functions = self._program(context)
+        made = [(k, self._stages[k].Eval(context)) for k in functions.program.update_stages]
+        self._given(context, functions, functions.program.update_inputs)
+        for k, values in made:
+            functions.made[k][:] = values
+        functions.update.evaluate()
+        state.get_mutable_value()[self._x] = functions.update.results["x_next"]
+
+
+class _Functions:
+    """The functions of a program, bound to one set of arrays."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.x, self.t = np.zeros(program.size), np.zeros(1)
+        self.preset = np.zeros(len(program.states))
+        self.u = {name: np.zeros(port.size) for name, port in program.network.inputs.items()}
+        self.made = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
+        arrays = {"x": self.x, "t": self.t, "preset": self.preset} | self.u
+        arrays |= {f"stage_{k}": values for k, values in enumerate(self.made)}
+        self.stages = [_bound(stage.function, arrays) for stage in program.stages]
+        self.update, self.initial = _bound(program.update, arrays), _bound(program.initial, arrays)
+
+
+def _bound(function: ca.Function, arrays: dict[str, np.ndarray]) -> BoundFunction:
+    return BoundFunction(function, **{name: arrays[name] for name in function.name_in()})
