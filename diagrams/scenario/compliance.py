@@ -13,6 +13,7 @@ from diagrams.scenario.checks import (
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
 from pfsc_drake.control.compliance.press import PressParameters
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
+from pfsc_drake.control.compliance.still_components import STILL_TIME
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
@@ -135,9 +136,11 @@ class SensorParameters:
             tool that has mass behind it.
         measurement_range: Largest magnitude that is measured, shape (6,).
         bias: Reading without load, shape (6,).
-        noise: Standard deviation of one sample, shape (6,).
+        noise: Standard deviation of one sample, shape (6,). A sensor that has some and repeats
+            itself to the last bit is lost; 0 where its steps are larger than that.
         bandwidth: Of the sensor's filter, and of the tool compensation's [Hz].
-        delay: Until the controller has what is measured [s], a multiple of its sampling time.
+        delay: Until the controller has what is measured [s], a multiple of its sampling time,
+            shorter than taring and than what a sensor may stand still.
         seed: Of the noise.
         inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
         unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
@@ -175,7 +178,10 @@ class SensorParameters:
         # accelerations are known to no component of the station
         known = self.inertia in ("differentiated", "none")
         require(known, "inertia", self.inertia, "differentiated, none")
-        require(0.0 <= self.delay <= 1.0, "delay", self.delay, "0 to 1 s")
+        # until something comes there is nothing to tare, and a sensor that says nothing is lost
+        longest = min(STILL_TIME, self.taring_time)
+        allowed = f"at least 0 and below {longest:g} s"
+        require(0.0 <= self.delay < longest, "delay", self.delay, allowed)
         require_not_negative("unknown_mass", self.unknown_mass)
         self.transducer()
         self.compensation()
@@ -200,4 +206,5 @@ class SensorParameters:
             taring_bias=self.taring_bias,
             force_dead_band=self.force_dead_band,
             torque_dead_band=self.torque_dead_band,
+            noise=self.noise,
         )

@@ -152,8 +152,10 @@ def test_a_force_sensor(six_axes, kind):
     check_rest(station, result, times, log)
 
 
-def test_a_component_of_a_force_sensor_that_stands_still(six_axes):
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_force_sensor_that_stands_still(six_axes, whole):
     failure = six_axes.simulation.force_sensor_failure
+    failure.whole_joint = whole
     six_axes.forces = [ForcePulse(begin=0.2, end=9.0, ramp=0.05, frame="world", force=[0, 20, 0])]
     failure.time, failure.kind, failure.component = 0.45, "frozen", 1
     station, result, times, log = go_on(six_axes, 1.0)

@@ -8,7 +8,10 @@ from pfsc_drake.control.compliance.tool_load import SensorFault
 
 
 def guarded_compensation(
-    compensation: ca.Function, measurement_range: np.ndarray, still_samples: int
+    compensation: ca.Function,
+    measurement_range: np.ndarray,
+    still_samples: int,
+    noise: np.ndarray,
 ) -> ca.Function:
     """Return a compensation that gives nothing before taring and after a fault.
 
@@ -17,6 +20,7 @@ def guarded_compensation(
         measurement_range: Of the sensor, shape (6,) [N, Nm].
         still_samples: For how many samples a component must have stood still to be lost, see
             :func:`~pfsc_drake.control.compliance.still_components.stands_still`.
+        noise: Standard deviation of a sample as it is believed, shape (6,) [N, Nm].
 
     Returns:
         ``(motion, measured, bias, known, tared, fault, state) -> result`` with the flat
@@ -33,7 +37,9 @@ def guarded_compensation(
     x = {name: ca.SX.sym(name, sizes.get(name, 1)) for name in names}
     at_range = ca.fabs(x["measured"]) >= measurement_range
     filtered, watched = ca.vertsplit(x["state"], [0, of_filter, sizes["state"]])
-    still, next_watched = stands_still(x["measured"], watched, at_range, still_samples)
+    still, next_watched = stands_still(
+        x["measured"], watched, at_range, still_samples, np.asarray(noise) > 0.0
+    )
     wrench, residual, next_filtered = compensation(
         x["motion"], filtered, x["known"], x["measured"], x["bias"]
     )

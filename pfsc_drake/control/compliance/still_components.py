@@ -1,6 +1,7 @@
-"""Components of a measurement that stand still while others move, as those of a broken sensor."""
+"""Components of a measurement that stand still and should not, as those of a broken sensor."""
 
 import casadi as ca
+import numpy as np
 
 # s, for which a component has to move first, and to stand still then
 STILL_TIME = 0.05
@@ -14,14 +15,16 @@ def memory_size(size: int) -> int:
 
 
 def stands_still(
-    measured: ca.SX, memory: ca.SX, at_range: ca.SX, samples: int
+    measured: ca.SX, memory: ca.SX, at_range: ca.SX, samples: int, noisy: np.ndarray
 ) -> tuple[ca.SX, ca.SX]:
-    """Return whether a component of a sensor stands still while others move.
+    """Return whether components of a sensor stand still that should not.
 
-    A component counts that changed at each of as many samples in a row before: what is exactly
-    constant anyway, as without noise, never did. It stands still when it has been the same, to the
-    last bit, for so many samples, while at least three others that count changed within the last
-    three. A sensor at rest with coarse steps repeats its values, too, but in all components.
+    One stands still when it has been the same, to the last bit, for so many samples. With noise
+    larger than its steps none ever does, so the sensor is broken if more than three do that have
+    some. One is enough if at least three others changed within the last three samples; there only
+    components count that changed at each of as many samples in a row before. What is constant
+    anyway, as without noise, never did; and a sensor at rest with coarse steps repeats its values,
+    too, but in all components.
 
     Args:
         measured: The measurement, shape (n,).
@@ -29,6 +32,7 @@ def stands_still(
             of each component, shape (3n,); zero before the first.
         at_range: Whether each is at the end of its range, where it stays, shape (n,).
         samples: Number of samples.
+        noisy: Whether each is believed to have noise larger than its steps, shape (n,).
 
     Returns:
         0 or 1, and the next memory.
@@ -41,5 +45,6 @@ def stands_still(
     changed = ca.if_else(counts, changed, ca.if_else(same, 0.0, changed + 1.0))
     moving = ca.logic_and(counts, stayed < _LATELY)
     still = ca.logic_and(counts, stayed >= samples)
-    found = ca.logic_and(ca.sum1(still) > 0, ca.sum1(moving) >= _OTHERS)
-    return found, ca.vertcat(measured, stayed, changed)
+    one = ca.logic_and(ca.sum1(still) > 0, ca.sum1(moving) >= _OTHERS)
+    most = ca.dot(stayed >= samples, ca.DM(np.asarray(noisy, dtype=float))) > _OTHERS
+    return ca.logic_or(one, most), ca.vertcat(measured, stayed, changed)

@@ -247,6 +247,8 @@ class ToolCompensationParameters:
             on the tool, or another tool, must not become a bias.
         force_dead_band: [N].
         torque_dead_band: [Nm].
+        noise: Standard deviation of a sample as it is believed, shape (6,) [N, Nm]: a sensor that
+            has some and repeats itself to the last bit is lost. 0 where steps are larger.
     """
 
     inertia: str = "differentiated"
@@ -256,6 +258,7 @@ class ToolCompensationParameters:
     taring_bias: np.ndarray = field(default_factory=lambda: np.repeat([50.0, 2.0], 3))
     force_dead_band: float = 0.0
     torque_dead_band: float = 0.0
+    noise: np.ndarray = field(default_factory=lambda: np.zeros(6))
 
     def __post_init__(self) -> None:
         if self.inertia not in _INERTIA:
@@ -268,6 +271,9 @@ class ToolCompensationParameters:
             value = np.asarray(getattr(self, key), dtype=float)
             if value.shape != (6,) or not np.all(value > 0.0):
                 raise InputError(f"{key} = {value.tolist()}: must be 6 positive numbers")
+        noise = np.asarray(self.noise, dtype=float)
+        if noise.shape != (6,) or not np.all((noise >= 0.0) & np.isfinite(noise)):
+            raise InputError(f"noise = {noise.tolist()}: must be 6 numbers, zero or positive")
 
 
 def _require_sign(key: str, value: float, *, zero_allowed: bool) -> None:

@@ -116,7 +116,10 @@ class ToolCompensation(LeafSystem):
         self._memory = blank.copy()
         step = BoundFunction(
             guarded_compensation(
-                function, np.asarray(measurement_range), max(10, round(STILL_TIME / period))
+                function,
+                np.asarray(measurement_range),
+                max(10, round(STILL_TIME / period)),
+                parameters.noise,
             ),
             **{name: self._memory[part] for name, part in _MEMORY.items()},
         )

@@ -13,6 +13,7 @@ from pfsc_drake.physics.transducer import transducer_function
 RANGE = np.array([10.0, 20.0, 30.0, 1.0, 2.0, 3.0])
 BIAS = np.array([0.5, -0.5, 0.0, 0.1, 0.0, -0.1])
 STILL = 20  # samples
+NOISELESS = np.zeros(6)
 
 
 @pytest.fixture(name="transducer")
@@ -85,7 +86,7 @@ def compensation():
 @pytest.mark.parametrize("latched", [SensorFault.NONE, SensorFault.LOST])
 @pytest.mark.parametrize("case", ["good", "saturated", "negative", "lost motion", "lost sensor"])
 def test_guard(tared, latched, case):
-    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL))
+    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL, NOISELESS))
     x, rng = function.arguments, np.random.default_rng(3)
     for name in ("motion", "measured", "bias"):
         x[name][:] = rng.uniform(-0.9, 0.9, 6)
@@ -116,9 +117,9 @@ def test_guard(tared, latched, case):
     np.testing.assert_allclose(result[14:], after, rtol=0, atol=1e-15)
 
 
-def watch(readings):
+def watch(readings, noise=NOISELESS):
     """Return the fault at each reading of a sensor, shape (samples,)."""
-    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL))
+    function = BoundFunction(guarded_compensation(compensation(), RANGE, STILL, noise))
     x, faults = function.arguments, []
     for reading in readings:
         x["measured"][:] = reading
@@ -155,3 +156,24 @@ def test_what_stands_still_without_being_broken_is_not_lost():
     clipped = noise.copy()
     clipped[200:, 3] = RANGE[3]
     assert set(watch(clipped)[200:]) == {SensorFault.SATURATED}
+
+
+def test_a_sensor_with_noise_that_stands_still_as_a_whole_is_lost():
+    noise = np.repeat([0.1, 0.004], 3)
+    readings = np.random.default_rng(3).normal(0.0, noise, (400, 6))
+    assert not watch(readings, noise).any()
+    # as it seems to rest without noise
+    resting = readings.copy()
+    resting[200:] = resting[199]
+    assert np.flatnonzero(watch(resting, noise))[0] == 199 + STILL
+    assert not watch(resting).any()
+    # most of it, too few others being left to tell
+    most = readings.copy()
+    most[200:, :4] = most[199, :4]
+    assert np.flatnonzero(watch(most, noise))[0] == 199 + STILL
+    assert not watch(most).any()
+    # from the start
+    assert np.flatnonzero(watch(np.zeros((100, 6)), noise))[0] == STILL - 1
+    # only half of it is known to have noise, and steps three times as large as noise hide some
+    assert not watch(resting, np.where(np.arange(6) < 3, noise, 0.0)).any()
+    assert not watch(np.round(readings / (3.0 * noise)) * 3.0 * noise, noise).any()

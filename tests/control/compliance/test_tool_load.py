@@ -268,6 +268,8 @@ def test_a_bias_that_is_too_large_is_not_believed():
         ("torque_dead_band", np.inf),
         ("taring_spread", np.ones(3)),
         ("taring_bias", np.zeros(6)),
+        ("noise", np.full(6, -0.1)),
+        ("noise", np.array([0.1, 0.1, 0.1, 0.0, 0.0, np.inf])),
     ],
 )
 def test_parameters_out_of_range(key, value):
