@@ -76,15 +76,22 @@ class Program:
         self._make_update()
         self._make_initial()
 
-    def wire(self, output: str) -> tuple[int, slice]:
+    def output(self, output: str) -> tuple[int, slice]:
         """Return the stage that evaluates an output at the border, and where it is in it.
 
         Args:
             output: Name of the port.
         """
-        name = self.network.outputs[output]
-        k = self._stage_of[name]
-        return k, self.stages[k].parts[name]
+        return self.place(self.network.outputs[output])
+
+    def place(self, wire: str) -> tuple[int, slice]:
+        """Return the stage that evaluates a wire, and where it is in it.
+
+        Args:
+            wire: Its name.
+        """
+        k = self._stage_of[wire]
+        return k, self.stages[k].parts[wire]
 
     def step(self) -> ca.Function:
         """Return one function of a whole tick.
@@ -99,7 +106,7 @@ class Program:
         named = given | {f"stage_{j}": results[j] for j in self.update_stages}
         outputs = {}
         for port in self.network.outputs:
-            k, part = self.wire(port)
+            k, part = self.output(port)
             outputs[port] = results[k][part]
         return ca.Function(
             "step",

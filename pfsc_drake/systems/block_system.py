@@ -48,6 +48,7 @@ class BlockSystem(LeafSystem):
 
     Attributes:
         block: The same; None of a network.
+        network: What it does, all inputs connected.
         period: Sampling time [s].
         states: Where in the discrete state each state is.
     """
@@ -56,7 +57,7 @@ class BlockSystem(LeafSystem):
         super().__init__()
         self.block = block if isinstance(block, Block) else None
         self.period = period
-        whole = block if isinstance(block, Network) else Network.of(block)
+        whole = self.network = block if isinstance(block, Network) else Network.of(block)
         declared = Program(whole)
         self._programs: dict[frozenset[str], _Functions] = {}
         self._declared = declared
@@ -105,6 +106,17 @@ class BlockSystem(LeafSystem):
         memory[1 + list(self.states).index(name)] = 1.0
         context.SetDiscreteState(memory)
 
+    def wire(self, context: Context, name: str) -> np.ndarray:
+        """Return what a block puts out, at the border or inside.
+
+        Args:
+            context: The system's own.
+            name: Of the output; in a network ``block.output``.
+        """
+        k, part = self._declared.place(name)
+        value: np.ndarray = self._stages[k].Eval(context)[part]
+        return value
+
     def start(self, context: Context) -> None:
         """Begin, as a simulation does, for whoever evaluates a context without one.
 
@@ -133,7 +145,7 @@ class BlockSystem(LeafSystem):
         return self.DeclareCacheEntry(f"stage {k}", producer, always | sources)
 
     def _declare_output(self, port: str) -> None:
-        k, part = self._declared.wire(port)
+        k, part = self._declared.output(port)
         stage = self._stages[k]
 
         def calc(context: Context, output: BasicVector) -> None:

@@ -78,11 +78,11 @@ def test_what_is_not_connected_is_no_input():
 
 def test_outputs_need_what_their_expressions_have():
     program = Program(Network.of(Lag()))
-    needs = {name: program.stages[program.wire(name)[0]].needs for name in ("lagged", "rate")}
+    needs = {name: program.stages[program.output(name)[0]].needs for name in ("lagged", "rate")}
     assert needs["lagged"] == frozenset()
     assert [source.name for source in needs["rate"]] == ["value"]
     # before the start the state is what the inputs say
-    assert [s.name for s in program.stages[program.wire("lagged")[0]].needs_at_start] == ["value"]
+    assert [s.name for s in program.stages[program.output("lagged")[0]].needs_at_start] == ["value"]
 
 
 def wired():

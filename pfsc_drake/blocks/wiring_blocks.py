@@ -1,0 +1,127 @@
+"""Blocks that only lead vectors from one place to another."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Block, Port, Values
+
+
+class Collect(Block):
+    """Several vectors as one.
+
+    Ports:
+        (inputs): One for each part.
+        all (output): The parts one after another.
+
+    Args:
+        sizes: Of the parts, by the names of their ports.
+
+    Attributes:
+        rows: Where each part is in the whole.
+    """
+
+    def __init__(self, sizes: Mapping[str, int]) -> None:
+        ends = np.cumsum([0, *sizes.values()]).tolist()
+        self.rows = {
+            name: slice(a, b) for name, a, b in zip(sizes, ends[:-1], ends[1:], strict=True)
+        }
+        self.inputs = {name: Port(size) for name, size in sizes.items()}
+        self.outputs, self.states = {"all": Port(ends[-1])}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"all": ca.vertcat(*(getattr(u, name) for name in self.inputs))}
+
+
+class Rows(Block):
+    """Some elements of a vector.
+
+    Ports:
+        whole (input): The vector, shape (size,).
+        part (output): The elements, shape (len(rows),).
+
+    Args:
+        size: Of the whole vector.
+        rows: Which elements.
+    """
+
+    def __init__(self, size: int, rows: Sequence[int]) -> None:
+        self._rows = [int(row) for row in rows]
+        self.inputs, self.outputs = {"whole": Port(size)}, {"part": Port(len(self._rows))}
+        self.states = {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"part": u.whole[self._rows]}
+
+
+class Sum(Block):
+    """The sum of vectors of one size.
+
+    Ports:
+        term_0, term_1, .. (input): The terms.
+        sum (output): Their sum, from the first to the last.
+
+    Args:
+        count: Number of terms.
+        size: Of each.
+    """
+
+    def __init__(self, count: int, size: int) -> None:
+        self.inputs = {f"term_{k}": Port(size) for k in range(count)}
+        self.outputs, self.states = {"sum": Port(size)}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        terms = [getattr(u, name) for name in self.inputs]
+        return {"sum": sum(terms[1:], terms[0])}
+
+
+class Constant(Block):
+    """A vector that stays.
+
+    Ports:
+        value (output): The vector.
+
+    Args:
+        value: The vector.
+    """
+
+    def __init__(self, value: Sequence[float] | np.ndarray) -> None:
+        self._value = ca.DM(np.array(value, dtype=float))
+        self.inputs, self.states = {}, {}
+        self.outputs = {"value": Port(self._value.numel())}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"value": self._value}
+
+
+class Hold(Block):
+    """A zero-order hold: what came in at the last tick.
+
+    Ports:
+        value (input): The vector.
+        held (output): That of the last tick, zero before; without direct feedthrough.
+
+    State:
+        held
+
+    Args:
+        size: Of the vector.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.inputs, self.outputs = {"value": Port(size)}, {"held": Port(size)}
+        self.states = {"held": size}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"held": x.held}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"held": u.value}

@@ -1,0 +1,63 @@
+"""What blocks remember and put out, by name, whether they are one system or many."""
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram
+
+from pfsc_drake.systems.block_system import BlockSystem
+
+
+class BlockAccess:
+    """Reads and sets what the blocks of a diagram remember.
+
+    Args:
+        diagram: The diagram, with its blocks as systems of their own or fused.
+    """
+
+    def __init__(self, diagram: Diagram) -> None:
+        self._states: dict[str, tuple[BlockSystem, str]] = {}
+        self._wires: dict[str, tuple[BlockSystem, str]] = {}
+        for system in diagram.GetSystems():
+            if not isinstance(system, BlockSystem):
+                continue
+            prefix = "" if system.block is None else f"{system.get_name()}."
+            self._states |= {f"{prefix}{name}": (system, name) for name in system.states}
+            self._wires |= {f"{prefix}{name}": (system, name) for name in system.network.wires}
+
+    def has_output(self, name: str) -> bool:
+        """Return whether there is an output.
+
+        Args:
+            name: ``block.output``.
+        """
+        return name in self._wires
+
+    def output(self, root: Context, name: str) -> np.ndarray:
+        """Return what a block puts out.
+
+        Args:
+            root: Context of the diagram.
+            name: ``block.output``.
+        """
+        system, wire = self._wires[name]
+        return system.wire(system.GetMyContextFromRoot(root), wire)
+
+    def state(self, root: Context, name: str) -> np.ndarray:
+        """Return what a block remembers.
+
+        Args:
+            root: Context of the diagram.
+            name: ``block.state``.
+        """
+        system, state = self._states[name]
+        return system.state(system.GetMyContextFromRoot(root), state)
+
+    def set_state(self, root: Context, name: str, value: np.ndarray) -> None:
+        """Set what a block remembers; see :meth:`BlockSystem.set_state`.
+
+        Args:
+            root: Context of the diagram.
+            name: ``block.state``.
+            value: Of the state.
+        """
+        system, state = self._states[name]
+        system.set_state(system.GetMyMutableContextFromRoot(root), state, value)

@@ -1,0 +1,150 @@
+"""The blocks of a diagram as one system."""
+
+from collections.abc import Collection, Mapping
+
+from pydrake.systems.framework import (
+    Diagram,
+    DiagramBuilder,
+    InputPort,
+    InputPortIndex,
+    OutputPort,
+    OutputPortIndex,
+    System,
+)
+
+from pfsc_drake.blocks.network import Network, Wiring
+from pfsc_drake.errors import InputError
+from pfsc_drake.systems.block_system import BlockSystem
+
+Connections = Mapping[tuple[System, InputPortIndex], tuple[System, OutputPortIndex]]
+
+
+def fuse(diagram: Diagram) -> BlockSystem:
+    """Return one system that does what a diagram of blocks does, with the same ports.
+
+    Its states and wires are called ``block.name``.
+
+    Args:
+        diagram: The diagram; all its systems are blocks of one sampling time, or such diagrams.
+
+    Raises:
+        InputError: If one is not.
+    """
+    period = _period(diagram)
+    if period is None:
+        raise InputError(
+            f"diagram {diagram.get_name()}: must consist of blocks with one sampling time"
+        )
+    return BlockSystem(_network(diagram), period)
+
+
+def fuse_blocks(builder: DiagramBuilder, name: str = "blocks") -> list[BlockSystem]:
+    """Replace all blocks in a builder by one system, or one for each sampling time.
+
+    What stands between other systems and blocks is connected to the new system's ports, which are
+    called ``block.port``. Ports that the builder has exported must be those of other systems.
+
+    Args:
+        builder: The builder, with everything connected.
+        name: Of the new system.
+
+    Returns:
+        What has been added.
+    """
+    by_period: dict[float, list[System]] = {}
+    for system in builder.GetSystems():
+        period = _period(system)
+        if period is not None:
+            by_period.setdefault(period, []).append(system)
+    added = []
+    for k, (period, systems) in enumerate(sorted(by_period.items())):
+        title = name if k == 0 else f"{name}_{k}"
+        added.append(_replace(builder, systems, period, title))
+    return added
+
+
+def _replace(
+    builder: DiagramBuilder, systems: list[System], period: float, name: str
+) -> BlockSystem:
+    connections, inside = builder.connection_map(), set(systems)
+    wiring = Wiring()
+    # of what stays: the ports that feed the new system, and those that it feeds
+    sources: dict[str, OutputPort] = {}
+    targets: list[tuple[InputPort, str]] = []
+    for system in systems:
+        fed = {port for other, port in connections if other is system}
+        left = [
+            system.get_input_port(i).get_name()
+            for i in range(system.num_input_ports())
+            if InputPortIndex(i) not in fed
+        ]
+        wiring.networks[system.get_name()] = _network(system, left)
+    for (target, i), (source, o) in connections.items():
+        output, port = source.get_output_port(o), target.get_input_port(i)
+        origin = source.get_name(), output.get_name()
+        if target in inside:
+            key = ".".join(origin)
+            wiring.connections[target.get_name(), port.get_name()] = (
+                origin if source in inside else key
+            )
+            if source not in inside:
+                sources[key] = output
+        elif source in inside:
+            wiring.outputs[".".join(origin)] = origin
+            targets.append((port, ".".join(origin)))
+    fused = BlockSystem(wiring.network(), period)
+    for system in systems:
+        builder.RemoveSystem(system)
+    builder.AddNamedSystem(name, fused)
+    for key, output in sources.items():
+        if fused.HasInputPort(key):
+            builder.Connect(output, fused.GetInputPort(key))
+    for port, key in targets:
+        builder.Connect(fused.GetOutputPort(key), port)
+    return fused
+
+
+def _period(system: System) -> float | None:
+    """Return the sampling time of a block, or of all blocks of a diagram; None of others."""
+    if isinstance(system, BlockSystem):
+        return system.period
+    if not isinstance(system, Diagram):
+        return None
+    periods = {_period(part) for part in system.GetSystems()}
+    return periods.pop() if len(periods) == 1 else None
+
+
+def _network(system: System, unconnected: Collection[str] = ()) -> Network:
+    """Return what a block or a diagram of blocks does.
+
+    Args:
+        system: The system.
+        unconnected: Names of its input ports that nothing is connected to.
+    """
+    if isinstance(system, BlockSystem):
+        if system.block is None:
+            return system.network
+        return Network.of(system.block, unconnected)
+    assert isinstance(system, Diagram)
+    wiring = Wiring()
+    connections: Connections = system.connection_map()
+    for (target, i), (source, o) in connections.items():
+        wiring.connections[target.get_name(), target.get_input_port(i).get_name()] = (
+            source.get_name(),
+            source.get_output_port(o).get_name(),
+        )
+    for i in range(system.num_input_ports()):
+        port = system.get_input_port(i).get_name()
+        if port in unconnected:
+            continue
+        for part, index in system.GetInputPortLocators(InputPortIndex(i)):
+            wiring.connections[part.get_name(), part.get_input_port(index).get_name()] = port
+    for part in system.GetSystems():
+        names = [part.get_input_port(i).get_name() for i in range(part.num_input_ports())]
+        left = [name for name in names if (part.get_name(), name) not in wiring.connections]
+        wiring.networks[part.get_name()] = _network(part, left)
+    for o in range(system.num_output_ports()):
+        part, index = system.get_output_port_locator(OutputPortIndex(o))
+        output = part.get_output_port(index).get_name()
+        wiring.outputs[system.get_output_port(o).get_name()] = part.get_name(), output
+    return wiring.network()
