@@ -1,8 +1,10 @@
 """The posture reference of joints beyond the number of outputs, as it yields and is pulled."""
 
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.compliance.null_space_impedance import NullSpaceImpedance
 from pfsc_drake.control.law.decoupling import free_torque, scale_of
 from pfsc_drake.control.law.posture import Posture
@@ -55,14 +57,9 @@ class YieldingPosture:
         self.impedance, self._n = impedance, robot.dimension
         self.size = (impedance.relative_degree + 1) * self._n
         self._pulls = pull_stiffness if potential else 0.0
-        self._inertial, self._scale = posture.weight is None, posture.scale
-        function = BoundFunction(
-            free_motion_function(robot, manifold, potential, inertial=self._inertial)
+        self._free = BoundFunction(
+            _free_torques_function(robot, manifold, posture, potential, self._pulls)
         )
-        self._q, self._point = function.arguments["q"], function.arguments["manifold_point"]
-        self._evaluate, self._pull = function.evaluate, function.results["pull"]
-        self._A = function.results["A"].reshape((len(manifold.coordinates), -1), order="F")
-        self._weight = function.results["weight"]
         speed = _LARGEST_SPEED * robot.gather("velocity_limit")
         self._largest = impedance.parameters.damping * speed
 
@@ -106,14 +103,33 @@ class YieldingPosture:
 
         NaN if not finite, each (N,).
         """
-        self._q[:], self._point[:] = q, point
-        self._evaluate()
-        nothing = np.zeros(self._n)
-        given = nothing if torque is None else torque
-        if not np.isfinite(self._A.sum() + self._pull.sum() + given.sum()):
-            return np.full(self._n, np.nan), nothing
-        scale = scale_of(self._weight.reshape((self._n, -1))) if self._inertial else self._scale
-        free = nothing if torque is None else free_torque(self._A, torque, scale)
-        if not self._pulls:
-            return free, nothing
-        return free, free_torque(self._A, self._pulls * self._pull, scale)
+        arguments, results = self._free.arguments, self._free.results
+        arguments["q"][:], arguments["manifold_point"][:] = q, point
+        arguments["torque"][:] = 0.0 if torque is None else torque
+        self._free.evaluate()
+        return results["free"].copy(), results["pulled"].copy()
+
+
+def _free_torques_function(
+    robot: RobotModel, manifold: Manifold, posture: Posture, potential: str, stiffness: float
+) -> ca.Function:
+    """Return ``(q, manifold_point, torque) -> (free, pulled)``, the last three (N,).
+
+    They are the parts of external torques and pull that do no work on the outputs; the first is of
+    NaN, the second zero, if something is not finite.
+    """
+    q, torque = ca.SX.sym("q", robot.dimension), ca.SX.sym("torque", robot.dimension)
+    point = ca.SX.sym("manifold_point", manifold.layout.size)
+    inertial = posture.weight is None
+    A, pull, weight = free_motion_function(robot, manifold, potential, inertial=inertial)(q, point)
+    scale = scale_of(weight) if inertial else posture.scale
+    finite = all_finite(A, pull, torque)
+    free = where(finite, free_torque(A, torque, scale), np.nan)
+    pulled = where(finite, free_torque(A, stiffness * pull, scale), 0.0)
+    return ca.Function(
+        "free_torques",
+        [q, point, torque],
+        ca.cse([ca.densify(free), ca.densify(pulled)]),
+        ["q", "manifold_point", "torque"],
+        ["free", "pulled"],
+    )

@@ -1,13 +1,13 @@
 """The one place that inverts a decoupling matrix."""
 
-import math
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
-from scipy.linalg import lapack
 
+from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.control.linear_algebra import cholesky, householder, solve, solve_upper
 from pfsc_drake.errors import InputError
 
 # of a posture's coordinate, by which part of itself it must move with the outputs at rest
@@ -24,8 +24,8 @@ class Restraint(NamedTuple):
         speeds: Largest of the joints, shape (N,), infinite for any.
     """
 
-    rest: np.ndarray
-    velocity: np.ndarray | None
+    rest: ca.SX
+    velocity: ca.SX | None
     settling: float
     speeds: np.ndarray
 
@@ -35,18 +35,18 @@ class Spare(NamedTuple):
 
     Attributes:
         wish: Highest joint derivative that is wanted, shape (N,).
-        scale: ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which deviations
-            from the wish are judged; None for the identity.
+        scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which
+            deviations from the wish are judged, see :func:`scale_of`; None for the identity.
         slope: Of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
             none.
         rate: ``h q^(r)`` that this coordinate is to have.
         restraint: By what all of this is held back; None for nothing.
     """
 
-    wish: np.ndarray
-    scale: np.ndarray | None = None
-    slope: np.ndarray | None = None
-    rate: float = 0.0
+    wish: ca.SX
+    scale: ca.SX | None = None
+    slope: ca.SX | None = None
+    rate: ca.SX | float = 0.0
     restraint: Restraint | None = None
 
 
@@ -55,19 +55,20 @@ class DecouplingSolution(NamedTuple):
 
     Attributes:
         x: Highest joint derivative, shape (N,); NaN where A is singular.
-        rcond: Reciprocal condition number of A in [0, 1]: estimated in the 1-norm; where A has
-            more columns than rows, or damping may set in, ``m / (|A| |A^+|)`` (Frobenius), which
-            changes as smoothly as A does.
-        residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves; None where
-            nothing is damped.
-        rest: The same without what joints are to do beside the outputs, as far as they are held
-            back, shape (N,); None where they are not.
+        rcond: Reciprocal condition number of A in [0, 1], 0 if A is singular or not finite: in the
+            1-norm; where A has more columns than rows, or damping may set in, ``m / (|A| |A^+|)``
+            (Frobenius), which changes as smoothly as A does.
+        usable: Whether the solution may be used, 1 or 0.
+        residual: ``rhs - A x``, shape (m,), that damping near a singular A leaves, else zeros.
+        rest: The same as x without what joints are to do beside the outputs, as far as they are
+            held back, shape (N,); None where they are not.
     """
 
-    x: np.ndarray
-    rcond: float
-    residual: np.ndarray | None = None
-    rest: np.ndarray | None = None
+    x: ca.SX
+    rcond: ca.SX
+    usable: ca.SX
+    residual: ca.SX
+    rest: ca.SX | None = None
 
 
 @dataclass(frozen=True)
@@ -110,10 +111,8 @@ class DecouplingInverse:
                 f"{self.min_rcond:g} and 1"
             )
 
-    def solve(
-        self, A: np.ndarray, rhs: np.ndarray, spare: Spare | None = None
-    ) -> DecouplingSolution:
-        """Solve the linear system.
+    def solve(self, A: ca.SX, rhs: ca.SX, spare: Spare | None = None) -> DecouplingSolution:
+        """Return the solution of the linear system as expressions.
 
         Args:
             A: Decoupling matrix, shape (m, N).
@@ -121,60 +120,44 @@ class DecouplingInverse:
             spare: What joints beyond the number of outputs are to do; needed if N > m.
         """
         if spare is not None or self.damped_below:
-            return self._solve_next_to(A, rhs, spare or Spare(np.zeros(A.shape[1])))
-        lu, _, x, info = lapack.dgesv(A, rhs)
-        if info != 0:
-            return DecouplingSolution(np.full(len(rhs), np.nan), 0.0)
-        rcond, _ = lapack.dgecon(lu, lapack.dlange("1", A))
-        return DecouplingSolution(x, float(rcond))
+            return self._solve_next_to(A, rhs, spare or Spare(ca.SX(A.shape[1], 1)))
+        x, rcond = solve(A, rhs)
+        return DecouplingSolution(x, rcond, rcond >= self.min_rcond, ca.SX(*rhs.shape))
 
-    def accepts(self, solution: DecouplingSolution) -> bool:
-        """Return whether the solution may be used."""
-        # written so that NaN is refused
-        return solution.rcond >= self.min_rcond or solution.residual is not None
-
-    def _solve_next_to(self, A: np.ndarray, rhs: np.ndarray, spare: Spare) -> DecouplingSolution:
+    def _solve_next_to(self, A: ca.SX, rhs: ca.SX, spare: Spare) -> DecouplingSolution:
         """Solve a system with a wish, or with damping."""
-        wish, scale = spare.wish, spare.scale
-        Q, R = _factors(A if scale is None else A @ scale)
-        # conditioning is that of the outputs, whatever the weight
-        rcond = _rcond(A, R if scale is None else _factors(A)[1])
-        if rcond < self.damped_below:
-            return self._damped(A, rhs, rcond, spare)
-        z, info = lapack.dtrtrs(R, _sides(A, rhs, spare), trans=1)
-        if info != 0:
-            return DecouplingSolution(np.full(len(wish), np.nan), 0.0)
-        x, rest, _ = _restrained(Q, Q @ z, spare)
-        return DecouplingSolution(x, rcond, rest=rest)
-
-    def _damped(
-        self, A: np.ndarray, rhs: np.ndarray, rcond: float, spare: Spare
-    ) -> DecouplingSolution:
-        """Solve with damping; of a matrix that is not finite nothing is known."""
         B = A if spare.scale is None else A @ spare.scale
-        norm = float(np.linalg.norm(B))
-        if not math.isfinite(norm + float(rhs.sum())):
-            return DecouplingSolution(np.full(A.shape[1], np.nan), math.nan)
-        square = (self.damped_below**2 - rcond**2) * norm**2
-        gram = B @ B.T
-        gram[np.diag_indices(len(rhs))] += square
-        z = lapack.dposv(gram, _sides(A, rhs, spare))[1]
-        x, rest, share = _restrained(_factors(B)[0], B.T @ z, spare)
-        missed = square * z[:, 0] if rest is None else square * (z[:, :2] @ [share, 1.0 - share])
-        return DecouplingSolution(x, rcond, missed, rest)
+        sides = _sides(A, rhs, spare)
+        Q, R = householder(B.T)
+        # conditioning is that of the outputs, whatever the weight
+        rcond = _rcond(A, R if spare.scale is None else householder(A.T)[1])
+        y, damped = Q @ solve_upper(R, sides, transposed=True), ca.SX(0)
+        missed = ca.SX(*sides.shape)
+        if self.damped_below:
+            damped = ca.logic_and(rcond < self.damped_below, all_finite(B, rhs))
+            square = ca.fmax(self.damped_below**2 - rcond**2, 0.0) * ca.sumsqr(B)
+            U = cholesky(B @ B.T + square * ca.SX.eye(B.shape[0]))
+            z = solve_upper(U, solve_upper(U, sides, transposed=True))
+            y, missed = where(damped, B.T @ z, y), where(damped, square * z, 0.0)
+        x, rest, share = _restrained(Q, y, spare)
+        x = where(ca.logic_or(rcond > 0.0, damped), x, np.nan)
+        residual = missed[:, 0]
+        if rest is not None:
+            residual = share * residual + (1.0 - share) * missed[:, 1]
+        usable = ca.logic_or(rcond >= self.min_rcond, damped)
+        return DecouplingSolution(x, rcond, usable, residual, rest)
 
 
-def scale_of(weight: np.ndarray) -> np.ndarray:
-    """Return ``S`` with ``S S' = W^-1`` of a symmetric positive definite W, shape (N, N).
+def scale_of(weight: ca.SX) -> ca.SX:
+    """Return the upper triangular ``S`` with ``S S' = W^-1``, shape (N, N).
 
     Args:
-        weight: ``W``, shape (N, N); if it is not positive definite, S is of NaN.
+        weight: ``W``, symmetric, shape (N, N); if it is not positive definite, S is of NaN.
     """
-    upper, info = lapack.dpotrf(weight)
-    return lapack.dtrtri(upper)[0] if info == 0 else np.full_like(weight, np.nan)
+    return solve_upper(cholesky(weight), ca.SX.eye(weight.shape[0]))
 
 
-def free_torque(A: np.ndarray, torque: np.ndarray, scale: np.ndarray | None = None) -> np.ndarray:
+def free_torque(A: ca.SX, torque: ca.SX, scale: ca.SX | None = None) -> ca.SX:
     """Return the part of joint torques that does no work on the outputs, shape (N,).
 
     That is ``N' tau`` with ``N = I - W^-1 A' (A W^-1 A')^-1 A``.
@@ -182,38 +165,28 @@ def free_torque(A: np.ndarray, torque: np.ndarray, scale: np.ndarray | None = No
     Args:
         A: Decoupling matrix, shape (m, N) with N > m.
         torque: ``tau``, shape (N,).
-        scale: ``S`` with ``S S' = W^-1``, shape (N, N); None for the identity.
+        scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N); None for the identity.
     """
     if scale is None:
-        Q = _factors(A)[0]
-        return torque - Q @ (Q.T @ torque)
-    Q, scaled = _factors(A @ scale)[0], scale.T @ torque
-    return np.linalg.solve(scale.T, scaled - Q @ (Q.T @ scaled))
+        return _beside(householder(A.T)[0], torque)
+    free = _beside(householder((A @ scale).T)[0], scale.T @ torque)
+    return solve_upper(scale, free, transposed=True)
 
 
-def _factors(B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``Q, R`` of ``B' = Q R``; Q has orthonormal columns, shapes (N, m) and (m, m)."""
-    qr, tau, _, _ = lapack.dgeqrf(B.T)
-    Q, _, _ = lapack.dorgqr(qr, tau)
-    return Q, qr[: len(B)]
+def _beside(Q: ca.SX, x: ca.SX) -> ca.SX:
+    """Return what is left of a vector beside the span of orthonormal columns."""
+    return x - Q @ (Q.T @ x)
 
 
-def _rcond(B: np.ndarray, R: np.ndarray) -> float:
+def _rcond(B: ca.SX, R: ca.SX) -> ca.SX:
     """Return ``m / (|B| |R^-1|)``, Frobenius, of ``B' = Q R``; 0 if B is singular or not finite."""
-    inverse, info = lapack.dtrtri(R)
-    if info != 0:
-        return 0.0
-    square = float(np.vdot(B, B)) * float(np.vdot(inverse * _upper(len(R)), inverse))
-    return len(R) / math.sqrt(square) if 0.0 < square < math.inf else 0.0
+    m = B.shape[0]
+    square = ca.sumsqr(B) * ca.sumsqr(solve_upper(R, ca.SX.eye(m)))
+    regular = ca.logic_and(square > 0.0, all_finite(square))
+    return where(regular, m / ca.sqrt(where(regular, square, 1.0)), 0.0)
 
 
-@cache
-def _upper(size: int) -> np.ndarray:
-    """Return ones on and above the diagonal; below, LAPACK keeps other things."""
-    return np.triu(np.ones((size, size)))
-
-
-def _next_to(Q: np.ndarray, y: np.ndarray, spare: Spare) -> np.ndarray:
+def _next_to(Q: ca.SX, y: ca.SX, spare: Spare) -> ca.SX:
     """Return ``wish + S y``, with the rate of the spare coordinate where it can move alone.
 
     Args:
@@ -221,34 +194,29 @@ def _next_to(Q: np.ndarray, y: np.ndarray, spare: Spare) -> np.ndarray:
         y: What the outputs ask for beyond the wish, shape (N,).
         spare: The wish.
     """
-    scale = spare.scale
-    x = spare.wish + (y if scale is None else scale @ y)
+    scale = ca.SX.eye(Q.shape[0]) if spare.scale is None else spare.scale
+    x = spare.wish + scale @ y
     if spare.slope is None:
         return x
-    whole = spare.slope if scale is None else scale.T @ spare.slope
-    alone = whole - Q @ (Q.T @ whole)
-    square = float(alone @ alone)
+    whole = scale.T @ spare.slope
+    alone = _beside(Q, whole)
     # continuous: a coordinate that can hardly move alone is given up
-    divisor = max(square, _LEAST_SHARE**2 * float(whole @ whole))
-    if divisor == 0.0:
-        return x
-    step = alone * ((spare.rate - float(spare.slope @ x)) / divisor)
-    return x + (step if scale is None else scale @ step)
+    divisor = ca.fmax(ca.sumsqr(alone), _LEAST_SHARE**2 * ca.sumsqr(whole))
+    missing = (spare.rate - ca.dot(spare.slope, x)) / where(divisor > 0.0, divisor, 1.0)
+    return x + scale @ (alone * missing)
 
 
-def _sides(A: np.ndarray, rhs: np.ndarray, spare: Spare) -> np.ndarray:
+def _sides(A: ca.SX, rhs: ca.SX, spare: Spare) -> ca.SX:
     """Return what is left to the outputs beside the wish, the rest and nothing, as columns."""
     sides, restraint = [rhs - A @ spare.wish], spare.restraint
     if restraint is not None:
         sides.append(rhs - A @ restraint.rest)
         if restraint.velocity is not None:
             sides.append(A @ restraint.velocity)
-    return np.column_stack(sides)
+    return ca.horzcat(*sides)
 
 
-def _restrained(
-    Q: np.ndarray, y: np.ndarray, spare: Spare
-) -> tuple[np.ndarray, np.ndarray | None, float]:
+def _restrained(Q: ca.SX, y: ca.SX, spare: Spare) -> tuple[ca.SX, ca.SX | None, ca.SX]:
     """Return the solution, the one of joints that come to rest, and the share beyond that.
 
     Args:
@@ -256,14 +224,14 @@ def _restrained(
         y: Of each side of :func:`_sides`, as columns.
         spare: What joints are to do.
     """
-    x, restraint, scale = _next_to(Q, y[:, 0], spare), spare.restraint, spare.scale
+    x, restraint = _next_to(Q, y[:, 0], spare), spare.restraint
     if restraint is None:
-        return x, None, 1.0
-    others = y[:, 1:] if scale is None else scale @ y[:, 1:]
+        return x, None, ca.SX(1)
+    others = y[:, 1:] if spare.scale is None else spare.scale @ y[:, 1:]
     rest = restraint.rest + others[:, 0]
-    taken = np.abs(rest if restraint.velocity is None else others[:, 1])
-    beyond = np.abs(x - rest) / restraint.settling
-    left = np.maximum(restraint.speeds - taken, 0.0)
+    taken = ca.fabs(rest if restraint.velocity is None else others[:, 1])
+    beyond = ca.fabs(x - rest) / restraint.settling
+    left = ca.fmax(restraint.speeds - taken, 0.0)
     fast = beyond > left
-    share = float(np.min(left[fast] / beyond[fast])) if fast.any() else 1.0
-    return x if share == 1.0 else rest + share * (x - rest), rest, share
+    share = ca.mmin(where(fast, left / where(fast, beyond, 1.0), 1.0))
+    return where(share < 1.0, rest + share * (x - rest), x), rest, share

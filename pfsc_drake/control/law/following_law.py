@@ -1,31 +1,26 @@
 """The following law as a function of measurement, manifold point and reference."""
 
-import math
-
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.law.decoupling import (
-    DecouplingInverse,
-    DecouplingSolution,
-    Restraint,
-    Spare,
-    scale_of,
+from pfsc_drake.control.cases import all_finite
+from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
+from pfsc_drake.control.law.law_functions import (
+    Aim,
+    LawInputs,
+    aim_and_drives,
+    coming_to_rest,
+    judged,
+    left_to_outputs,
+    spare_of,
 )
-from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.law_functions import completion_function, law_function
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
-
-# attributes of an enumeration are looked up slowly
-_NO_FAULT, _NOT_CONVERGED = Fault.NONE, float(ProjectionStatus.NOT_CONVERGED)
-# rad, of an error angle; from there on (3.38) is not defined
-_LARGEST_ANGLE = math.pi / 2.0
 
 
 class LawLayout:
@@ -71,8 +66,7 @@ class FollowingLaw:
     reference that turns on and on is followed. An error angle of 90 deg or more is a fault,
     because (3.38) is not defined there.
 
-    Evaluation writes into buffers that are made once; the object holds no state
-    of the controlled system.
+    The law is one function without state; everything it remembers is told to it.
 
     Args:
         robot: The robot.
@@ -89,6 +83,8 @@ class FollowingLaw:
 
     Attributes:
         layout: Layout of the results.
+        function: The law as a CasADi function of :class:`LawInputs` by name; its result is laid
+            out by ``layout``.
         robot: The robot.
         inverse: Inverts the decoupling matrix.
         safe_state: What the drives do after a fault.
@@ -137,7 +133,6 @@ class FollowingLaw:
         self.stabilization = stabilization
         self.limits = np.asarray(limits, dtype=float)
         self.posture, self.inverse = posture, inverse
-        self._max_alpha = max_alpha
         self._tells_velocity = tells_reference_velocity
         self.layout = LawLayout(
             n,
@@ -146,40 +141,50 @@ class FollowingLaw:
             n if tells_reference_velocity else 0,
             linearization.num_outputs if inverse.damped_below else 0,
         )
-        self.function = law_function(
-            robot, linearization, stabilization, posture, damped=inverse.damped_below > 0.0
-        )
-        self._completion = completion_function(linearization, self.limits)
-        self._fault_index = self.layout.status.start
-        self._alpha_index = linearization.manifold.layout.alpha.start
-        self._status_index = linearization.manifold.layout.status.start
-        self._bind_buffers()
+        self.function = self._compose(max_alpha)
+        self._bound = BoundFunction(self.function)
 
-    def _bind_buffers(self) -> None:
-        """Give both functions one set of arrays, so that nothing is copied between them."""
-        first = BoundFunction(self.function)
-        arrays = first.arguments | first.results
-        second = BoundFunction(self._completion, **arrays)
-        arrays |= second.arguments | second.results
-        self._linearize, self._complete = first.evaluate, second.evaluate
-        self._state, self._point = arrays["state"], arrays["manifold_point"]
-        self._reference, self._integral = arrays["reference"], arrays["integral"]
-        self._tau_ext, self._last_held = arrays["tau_ext"], arrays["last_held"]
-        self._friction = arrays["friction"]
-        self._lead, self._rhs = arrays["lead"], arrays["rhs"]
-        # CasADi stores by columns
-        self._A = arrays["A"].reshape((self.linearization.num_outputs, -1), order="F")
-        self._solution, self._rcond = arrays["solution"], arrays["rcond"]
-        self._result, self._check = arrays["result"], arrays["check"]
-        self._last_output, self._angle = arrays["last_output"], arrays["angle"]
-        self._posture = arrays.get("posture", np.zeros(0))
-        self._wish, self._slope = arrays.get("wish"), arrays.get("slope")
-        self._weight, self._rate = arrays.get("weight"), arrays.get("rate", np.zeros(1))
-        self._rest, self._velocity = arrays.get("rest"), arrays.get("velocity")
-        n = self.linearization.num_joints
-        self._gain = arrays["gain"].reshape((n, n), order="F")
-        self._drift, self._offset = arrays["drift"], arrays["offset"]
-        self._scale = None if self.posture is None else self.posture.scale
+    def _compose(self, max_alpha: float) -> ca.Function:
+        """Return the law as one function: inputs by :class:`LawInputs`, results by the layout."""
+        linearization, inverse = self.linearization, self.inverse
+        u = LawInputs.symbols(linearization, has_posture=self.posture is not None)
+        aim, drives = aim_and_drives(u, linearization, self.stabilization)
+        spare = None
+        if self.posture is not None:
+            spare = spare_of(self.posture, self.robot, aim, u.posture)
+        elif inverse.damped_below:
+            spare = coming_to_rest(self.stabilization, ca.horzsplit(aim.motion))
+        solution = inverse.solve(aim.A, aim.rhs, spare)
+        x = left_to_outputs(drives, self.limits, solution)
+        wanted = drives.input(x)
+        drive = ca.fmin(ca.fmax(wanted, -self.limits), self.limits)
+        saturated = ca.sum1(ca.fabs(wanted) > self.limits)
+        told = ca.vertcat(ca.vec(aim.Y), aim.v)
+        # limits turn NaN into numbers
+        finite = all_finite(wanted, told, solution.rcond, u.state, u.tau_ext)
+        usable = ca.logic_and(solution.usable, finite)
+        fault = judged(u, linearization, max_alpha, aim.angle, usable)
+        result = [drive, told, fault, solution.rcond, saturated, drives.held(x)]
+        if self._tells_velocity:
+            result.append(self._reference_velocity(u, aim, spare))
+        if inverse.damped_below:
+            result.append(solution.residual)
+        return ca.Function(
+            "following_law",
+            list(u),
+            ca.cse([ca.densify(ca.vertcat(*result))]),
+            list(u._fields),
+            ["result"],
+        )
+
+    def _reference_velocity(self, u: LawInputs, aim: Aim, spare: Spare | None) -> ca.SX:
+        """Return the joint velocities that the reference asks for, shape (N,)."""
+        n, moving = self.linearization.num_joints, u.state[self.linearization.velocity]
+        error = aim.Y[:, 1] - aim.Y_p[:, 1]
+        if self.posture is None or spare is None:
+            return moving - self.inverse.solve(aim.A, error).x
+        next_to = Spare(u.posture[n : 2 * n], spare.scale)
+        return self.inverse.solve(aim.A, aim.A @ moving - error, next_to).x
 
     @property
     def gains(self) -> LoopGains:
@@ -220,109 +225,13 @@ class FollowingLaw:
         Returns:
             New array laid out by ``layout``. With a fault, its ``drive`` must not be used.
         """
-        self._state[:] = state
-        self._point[:] = point
-        self._reference[:] = reference
-        self._integral[:] = integral
-        _assign(self._tau_ext, tau_ext)
-        _assign(self._last_output, last_output)
-        _assign(self._friction, friction)
-        _assign(self._posture, posture)
-        self._linearize()
-        solution = self.inverse.solve(self._A, self._rhs, self._spare())
-        self._rcond[0] = solution.rcond
-        if last_held is None:
-            self._lead[0] = 0.0
-        else:
-            self._lead[0] = self.linearization.lead
-            self._last_held[:] = last_held
-        self._solution[:] = solution.x
-        if solution.rest is not None:
-            self._leave_to_outputs(solution.rest)
-        self._complete()
-        result = self._result.copy()
-        result[self._fault_index] = self._judge(solution)
-        if self._tells_velocity:
-            result = np.append(result, self._reference_velocity())
-        if self.inverse.damped_below:
-            missed = solution.residual
-            result = np.append(result, np.zeros(len(self._rhs)) if missed is None else missed)
-        return result
-
-    def _spare(self) -> Spare | None:
-        """Return what joints are to do that the outputs leave free."""
-        if self._wish is None:
-            return None
-        if self._weight is not None:
-            self._scale = scale_of(self._weight.reshape((len(self._wish), -1)))
-        restraint = None
-        posture = self.posture
-        if posture is not None and posture.speeds is not None and self._rest is not None:
-            restraint = Restraint(self._rest, self._velocity, posture.settling, posture.speeds)
-        if self._slope is None:
-            return Spare(self._wish, self._scale, restraint=restraint)
-        return Spare(self._wish, self._scale, self._slope, self._rate.item(), restraint)
-
-    def _leave_to_outputs(self, rest: np.ndarray) -> None:
-        """Hold a posture back as far as drives would be at their limits for it.
-
-        Drives are affine in the highest joint derivative: between that with which joints come to
-        rest as far as the outputs let them and the one that is asked for, the largest share is
-        taken that they can do.
-
-        Args:
-            rest: The former, shape (N,).
-        """
-        wanted = self._drive(self._solution)
-        beyond = np.abs(wanted) > self.limits
-        if not beyond.any():
-            return
-        least = self._drive(rest)
-        step = (wanted - least)[beyond]
-        room = self.limits[beyond] - np.sign(step) * least[beyond]
-        share = np.divide(room, np.abs(step), out=np.ones_like(room), where=step != 0.0)
-        # where the outputs alone ask for too much, a posture does not add to it
-        self._solution[:] = rest + min(max(float(share.min()), 0.0), 1.0) * (self._solution - rest)
-
-    def _drive(self, solution: np.ndarray) -> np.ndarray:
-        """Return the drive input of a highest joint derivative, without limits, shape (N,)."""
-        held, lead = self._gain @ solution + self._drift, self._lead.item()
-        return held + lead * (held - self._last_held) + self._offset + self._friction
-
-    def _reference_velocity(self) -> np.ndarray:
-        """Return the joint velocities that the reference asks for, shape (N,)."""
-        m, velocity = self.linearization.num_outputs, self.linearization.velocity
-        error = self._result[self.layout.manifold_state][m : 2 * m]
-        if not self.linearization.manifold.follows_time:
-            error = error - self._reference[m : 2 * m]
-        moving = self._state[velocity]
-        if self.posture is None:
-            return moving - self.inverse.solve(self._A, error).x
-        n = len(moving)
-        spare = Spare(self._posture[n : 2 * n], self._scale)
-        return self.inverse.solve(self._A, self._A @ moving - error, spare).x
-
-    def _judge(self, solution: DecouplingSolution) -> Fault:
-        """Return what forbids the use of a result, the root cause first."""
-        alpha, status = self._point[self._alpha_index], self._point[self._status_index]
-        # written so that NaN is a fault
-        if (
-            self.inverse.accepts(solution)
-            and alpha < self._max_alpha
-            and status != _NOT_CONVERGED
-            and math.isfinite(self._check[0])
-            and self._angle[0] < _LARGEST_ANGLE
-        ):
-            return _NO_FAULT
-        inputs = [self._state, self._reference, self._integral, self._tau_ext, self._friction]
-        inputs.append(self._posture)
-        if not all(np.isfinite(values).all() for values in inputs):
-            return Fault.INPUT_NOT_FINITE
-        if status == _NOT_CONVERGED:
-            return Fault.PROJECTION_FAILED
-        if self._angle[0] >= _LARGEST_ANGLE:
-            return Fault.ORIENTATION_ERROR
-        return Fault.SINGULAR if alpha < self._max_alpha else Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD
+        known = float(last_held is not None)
+        given = (state, point, reference, integral, last_held, known)
+        told = (tau_ext, friction, last_output, posture)
+        for argument, values in zip(self._bound.arguments.values(), given + told, strict=True):
+            argument[:] = 0.0 if values is None else values
+        self._bound.evaluate()
+        return self._bound.results["result"].copy()
 
     def error(self, result: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the error of the virtual output, which is to vanish, shape (m,).
@@ -335,11 +244,3 @@ class FollowingLaw:
         y = result[self.layout.manifold_state][:m]
         # where the point moves with time, the virtual output is the error
         return y if self.linearization.manifold.follows_time else y - reference[:m]
-
-
-def _assign(argument: np.ndarray, values: np.ndarray | None) -> None:
-    """Overwrite an argument, by zeros if there are no values."""
-    if values is None:
-        argument.fill(0.0)
-    else:
-        argument[:] = values

@@ -1,149 +1,244 @@
-"""What a law computes before and after the decoupling matrix is inverted, as CasADi functions."""
+"""The parts of a law as expressions: what is wanted, what drives do for it, what forbids it."""
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.control.law.decoupling import DecouplingSolution, Restraint, Spare, scale_of
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture, posture_expressions
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
 
+# rad, of an error angle; from there on (3.38) is not defined
+_LARGEST_ANGLE = math.pi / 2.0
 
-def law_function(
-    robot: RobotModel,
-    linearization: Linearization,
-    stabilization: Stabilization,
-    posture: Posture | None,
-    *,
-    damped: bool = False,
-) -> ca.Function:
-    """Return everything up to the decoupling matrix's inverse as one function.
+
+class LawInputs(NamedTuple):
+    """What a law is told, as expressions.
+
+    Attributes:
+        state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        manifold_point: Laid out by the manifold's layout.
+        reference: Derivatives 0..r of the virtual output's reference by rows, shape ((r + 1) m,).
+        integral: Integral of the virtual output's error, shape (m,).
+        last_held: Part of the last tick's drive input that is extrapolated, shape (N,).
+        known: Whether there was one, 1 or 0.
+        tau_ext: External joint torques and derivatives up to order r - 2 by rows [Nm or N, per s,
+            ..], shape (N max(r - 1, 0),).
+        friction: ``tau_f`` that the drives are to overcome besides [Nm or N], shape (N,).
+        last_output: Virtual output of the last tick, shape (m,), from which angles go on.
+        posture: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,), or (0,) of
+            a law without posture.
+    """
+
+    state: ca.SX
+    manifold_point: ca.SX
+    reference: ca.SX
+    integral: ca.SX
+    last_held: ca.SX
+    known: ca.SX
+    tau_ext: ca.SX
+    friction: ca.SX
+    last_output: ca.SX
+    posture: ca.SX
+
+    @classmethod
+    def symbols(cls, linearization: Linearization, *, has_posture: bool) -> "LawInputs":
+        """Return symbols for a law.
+
+        Args:
+            linearization: The relation between drives and virtual output.
+            has_posture: Whether joints beyond the number of outputs have a posture reference.
+        """
+        n, m = linearization.num_joints, linearization.num_outputs
+        r = linearization.relative_degree
+        point = linearization.manifold.layout.size
+        posture = (r + 1) * n if has_posture else 0
+        sizes = (4 * n, point, (r + 1) * m, m, n, 1, n * max(r - 1, 0), n, m, posture)
+        return cls(*[ca.SX.sym(name, k) for name, k in zip(cls._fields, sizes, strict=True)])
+
+
+class Aim(NamedTuple):
+    """What a law wants of the virtual output.
+
+    Attributes:
+        Y: Derivatives 0..r-1 of the virtual output in columns, shape (m, r).
+        Y_p: Those of the reference from which errors count, shape (m, r).
+        v: Its r-th derivative that is wanted, shape (m,).
+        A: Decoupling matrix, shape (m, N).
+        rhs: ``v - b``, shape (m,).
+        motion: Derivatives 0..r-1 of the joint coordinates in columns, shape (N, r).
+        angle: Largest error angle [rad].
+    """
+
+    Y: ca.SX
+    Y_p: ca.SX
+    v: ca.SX
+    A: ca.SX
+    rhs: ca.SX
+    motion: ca.SX
+    angle: ca.SX
+
+
+class Drives(NamedTuple):
+    """Drive inputs as an affine function of the highest joint derivative ``x = q^(r)``.
+
+    ``held = gain x + drift`` is extrapolated by ``lead`` ticks, ``offset`` is added.
+
+    Attributes:
+        gain: Shape (N, N).
+        drift: Shape (N,).
+        offset: What is not extrapolated, shape (N,).
+        lead: In ticks.
+        last_held: Of the last tick, shape (N,).
+    """
+
+    gain: ca.SX
+    drift: ca.SX
+    offset: ca.SX
+    lead: ca.SX
+    last_held: ca.SX
+
+    def held(self, x: ca.SX) -> ca.SX:
+        """Return what is extrapolated, shape (N,)."""
+        return self.gain @ x + self.drift
+
+    def input(self, x: ca.SX) -> ca.SX:
+        """Return the drive input without limits, shape (N,)."""
+        held = self.held(x)
+        return held + self.lead * (held - self.last_held) + self.offset
+
+
+def aim_and_drives(
+    u: LawInputs, linearization: Linearization, stabilization: Stabilization
+) -> tuple[Aim, Drives]:
+    """Return what is wanted of the virtual output, and how drives act.
 
     Args:
-        robot: The robot.
-        linearization: The relation between its drives and the virtual output.
+        u: What the law is told.
+        linearization: The relation between drives and virtual output.
         stabilization: Gains of the virtual output.
-        posture: What joints beyond the number of outputs do; None if there are none.
-        damped: Whether the inverse is damped near singular postures: joints that the outputs
-            do not move there come to rest.
     """
-    n, m = linearization.num_joints, linearization.num_outputs
-    r = linearization.relative_degree
-    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    point = ca.SX.sym("manifold_point", linearization.manifold.layout.size)
-    reference, integral = ca.SX.sym("reference", (r + 1) * m), ca.SX.sym("integral", m)
-    y_p = ca.vertsplit(reference, m)
-    progress = []
+    m, r = linearization.num_outputs, linearization.relative_degree
+    y_p, progress = ca.vertsplit(u.reference, m), []
     if linearization.manifold.follows_time:
         # the reference point moves with time, and the errors from it shall vanish
         along = indices(linearization.manifold.coordinates, Kind.TANGENTIAL)
         progress = [ca.vertcat(*[y[along] for y in y_p])]
         y_p = [ca.SX(m, 1)] * (r + 1)
-    Y, A, b, gain, drift, offset, motion = linearization.function(state, tau_ext, point, *progress)
-    last_output, angle = ca.SX.sym("last_output", m), ca.SX(0.0)
+    Y, A, b, gain, drift, offset, motion = linearization.function(
+        u.state, u.tau_ext, u.manifold_point, *progress
+    )
+    angle = ca.SX(0.0)
     turning = indices(linearization.manifold.coordinates, Kind.ROTATIONAL)
     if turning.stop:
-        Y[turning, 0] += _whole_turns(last_output[turning] - Y[turning, 0])
+        Y[turning, 0] += _whole_turns(u.last_output[turning] - Y[turning, 0])
         angle = ca.mmax(ca.fabs(Y[turning, 0] - y_p[0][turning]))
-    v = stabilization.virtual_input(ca.horzsplit(Y), y_p, integral)
-    arguments = {
-        "state": state,
-        "manifold_point": point,
-        "reference": reference,
-        "integral": integral,
-        "tau_ext": tau_ext,
-        "last_output": last_output,
-    }
-    results = {
-        "Y": Y,
-        "v": v,
-        "A": A,
-        "rhs": v - b,
-        "gain": gain,
-        "drift": drift,
-        "offset": offset,
-        "angle": angle,
-    }
-    if posture is not None:
-        arguments["posture"] = ca.SX.sym("posture", (r + 1) * n)
-        wanted = ca.vertsplit(arguments["posture"], n)
-        wishes = posture_expressions(posture, robot, ca.horzsplit(motion), wanted)
-        results |= {name: x for name, x in wishes._asdict().items() if x.numel()}
-        if r > 1:
-            results["velocity"] = motion[:, 1]
-    elif damped:
-        results["wish"] = _coming_to_rest(stabilization, ca.horzsplit(motion))
-    return ca.Function(
-        "following_law",
-        list(arguments.values()),
-        [ca.densify(result) for result in results.values()],
-        list(arguments),
-        list(results),
+    v = stabilization.virtual_input(ca.horzsplit(Y), y_p, u.integral)
+    lead = where(u.known, linearization.lead, 0.0)
+    aim = Aim(Y, ca.horzcat(*y_p[:r]), v, A, v - b, motion, angle)
+    return aim, Drives(gain, drift, offset + u.friction, lead, u.last_held)
+
+
+def spare_of(posture: Posture, robot: RobotModel, aim: Aim, reference: ca.SX) -> Spare:
+    """Return what joints are to do that the outputs leave free.
+
+    Args:
+        posture: What a law wants of them.
+        robot: The robot.
+        aim: What it wants of the outputs.
+        reference: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,).
+    """
+    n, restraint = robot.dimension, None
+    wishes = posture_expressions(
+        posture, robot, ca.horzsplit(aim.motion), ca.vertsplit(reference, n)
     )
+    if posture.speeds is not None:
+        velocity = aim.motion[:, 1] if aim.motion.shape[1] > 1 else None
+        restraint = Restraint(wishes.rest, velocity, posture.settling, posture.speeds)
+    scale = posture.scale
+    scale = scale_of(wishes.weight) if wishes.weight.numel() else scale
+    if not wishes.slope.numel():
+        return Spare(wishes.wish, scale, restraint=restraint)
+    return Spare(wishes.wish, scale, wishes.slope, wishes.rate, restraint)
 
 
-def _coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> ca.SX:
-    """Return the highest joint derivative that brings joints to rest wherever they are.
+def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spare:
+    """Return the wish that joints come to rest wherever they are.
 
     With the gains of the first coordinate but the one of its position; what is left of an error
     dynamics with real poles is stable.
+
+    Args:
+        stabilization: Gains of the virtual output.
+        motion: Derivatives 0..r-1 of the joint coordinates, each (N,).
     """
     wish = ca.SX(motion[0].numel(), 1)
     for gains, derivative in zip(stabilization.proportional[1:], motion[1:], strict=True):
         wish -= gains[0] * derivative
-    return wish
+    return Spare(wish)
+
+
+def left_to_outputs(drives: Drives, limits: np.ndarray, solution: DecouplingSolution) -> ca.SX:
+    """Return the highest joint derivative, a posture held back as far as drives demand it.
+
+    Between that with which joints come to rest as far as the outputs let them and the one that is
+    asked for, the largest share is taken that drives can do.
+
+    Args:
+        drives: What they do.
+        limits: Of their inputs, shape (N,).
+        solution: What is asked for.
+    """
+    x, rest = solution.x, solution.rest
+    if rest is None:
+        return x
+    wanted, least = drives.input(x), drives.input(rest)
+    step, beyond = wanted - least, ca.fabs(wanted) > limits
+    room = ca.DM(limits) - ca.sign(step) * least
+    held_back = ca.logic_and(beyond, step != 0.0)
+    share = where(held_back, room / where(held_back, ca.fabs(step), 1.0), 1.0)
+    # where the outputs alone ask for too much, a posture does not add to it
+    share = ca.fmin(ca.fmax(ca.mmin(share), 0.0), 1.0)
+    return where(any_of(beyond), rest + share * (x - rest), x)
+
+
+def judged(
+    u: LawInputs, linearization: Linearization, max_alpha: float, angle: ca.SX, usable: ca.SX
+) -> ca.SX:
+    """Return the :class:`Fault` that forbids the use of a result, the root cause first.
+
+    Args:
+        u: What the law is told.
+        linearization: The relation between drives and virtual output.
+        max_alpha: Where the feasible neighbourhood (3.9) ends for the controller.
+        angle: Largest error angle [rad].
+        usable: Whether the decoupling matrix could be inverted, and all results are finite.
+    """
+    layout = linearization.manifold.layout
+    alpha, status = u.manifold_point[layout.alpha], u.manifold_point[layout.status]
+    not_converged = status == float(ProjectionStatus.NOT_CONVERGED)
+    # written so that NaN is a fault
+    inside = alpha < max_alpha
+    told = all_finite(u.state, u.reference, u.integral, u.tau_ext, u.friction, u.posture)
+    return first_of(
+        (all_of(usable, inside, ca.logic_not(not_converged), angle < _LARGEST_ANGLE), Fault.NONE),
+        (ca.logic_not(told), Fault.INPUT_NOT_FINITE),
+        (not_converged, Fault.PROJECTION_FAILED),
+        (angle >= _LARGEST_ANGLE, Fault.ORIENTATION_ERROR),
+        (inside, Fault.SINGULAR),
+        otherwise=Fault.OUTSIDE_FEASIBLE_NEIGHBOURHOOD,
+    )
 
 
 def _whole_turns(angle: ca.SX) -> ca.SX:
     """Return the multiple of 2 pi nearest to each angle [rad]."""
     return 2.0 * math.pi * ca.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-def completion_function(linearization: Linearization, limits: np.ndarray) -> ca.Function:
-    """Return everything after the decoupling matrix's inverse as one function.
-
-    Args:
-        linearization: The relation between drives and virtual output.
-        limits: Of the drives, shape (N,).
-
-    Its second result is finite only if all that went in and came out is: a sum is finite only if
-    all its terms are, and the limits of the drives turn NaN into numbers.
-    """
-    n, m = linearization.num_joints, linearization.num_outputs
-    r = linearization.relative_degree
-    state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
-    solution, drift, offset, last_held, friction = (ca.SX.sym(name, n) for name in "xdolf")
-    gain, Y = ca.SX.sym("gain", n, n), ca.SX.sym("Y", m, r)
-    v, rcond, lead = ca.SX.sym("v", m), ca.SX.sym("rcond"), ca.SX.sym("lead")
-    held = gain @ solution + drift
-    wanted = held + lead * (held - last_held) + offset + friction
-    drive = ca.fmin(ca.fmax(wanted, -limits), limits)
-    saturated = ca.sum1(ca.fabs(wanted) > limits)
-    # the fault is judged outside
-    result = ca.vertcat(drive, ca.vec(Y), v, 0.0, rcond, saturated, held)
-    check = sum(ca.sum1(part) for part in (wanted, result, state, tau_ext))
-    arguments = {
-        "solution": solution,
-        "gain": gain,
-        "drift": drift,
-        "offset": offset,
-        "friction": friction,
-        "last_held": last_held,
-        "lead": lead,
-        "Y": Y,
-        "v": v,
-        "rcond": rcond,
-        "state": state,
-        "tau_ext": tau_ext,
-    }
-    return ca.Function(
-        "completion",
-        list(arguments.values()),
-        [ca.densify(result), ca.densify(check)],
-        list(arguments),
-        ["result", "check"],
-    )

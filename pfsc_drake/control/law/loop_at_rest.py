@@ -124,17 +124,16 @@ class LoopAtRest:
             posture, self._robot, [symbol, *rest[1:]], [symbol, *rest]
         )
         values = ca.Function("rest", [symbol], [expressions.weight, expressions.slope])(q)
-        weight, slope = (np.array(x) for x in values)
-        scale = scale_of(weight) if weight.size else posture.scale
-        self._slope = slope.ravel() if slope.size else None
-
-        def answer(rhs: np.ndarray, wish: np.ndarray, rate: float = 0.0) -> np.ndarray:
-            return gain @ inverse.solve(A, rhs, Spare(wish, scale, self._slope, rate)).x
-
-        no_rhs, no_wish = np.zeros(m), np.zeros(n)
-        self._per_output = np.array([answer(e, no_wish) for e in np.eye(m)]).T
-        self._per_wish = np.array([answer(no_rhs, e) for e in np.eye(n)]).T
-        self._per_rate = answer(no_rhs, no_wish, 1.0)
+        weight, slope = (ca.SX(x) for x in values)
+        scale = scale_of(weight) if weight.numel() else posture.scale
+        self._slope = np.array(values[1]).ravel() if slope.numel() else None
+        rhs, wish, rate = ca.SX.sym("rhs", m), ca.SX.sym("wish", n), ca.SX.sym("rate")
+        spare = Spare(wish, scale, slope if slope.numel() else None, rate)
+        answer = ca.SX(gain) @ inverse.solve(ca.SX(A), rhs, spare).x
+        # it is linear in all of them
+        slopes = [ca.evalf(ca.jacobian(answer, x)) for x in (rhs, wish, rate)]
+        self._per_output, self._per_wish, per_rate = (np.array(slope) for slope in slopes)
+        self._per_rate = per_rate.ravel()
 
     def _posture_answer(self, gains: Stabilization) -> np.ndarray:
         """Return the slopes of the drives that the posture adds, shape (N, 4N)."""

@@ -63,12 +63,8 @@ class CourseFinder:
     ) -> None:
         self._n, self._order = robot.dimension, manifold.layout.order
         self._memory, self._projection = manifold.layout.memory, projection
-        self._inverse, self._posture = inverse, posture
         self._pose = BoundFunction(pose_function(robot))
-        self._output = BoundFunction(_output_function(robot, manifold))
-        self._wish = None
-        if posture is not None:
-            self._wish = BoundFunction(_wish_function(robot, posture, self._order))
+        self._correction = BoundFunction(_correction_function(robot, manifold, inverse, posture))
 
     def find(
         self, start: CourseStart, reference: np.ndarray, times: np.ndarray, *, still: bool = False
@@ -105,57 +101,36 @@ class CourseFinder:
         self, q: np.ndarray, q_0: np.ndarray | None, wanted: np.ndarray, memory: np.ndarray
     ) -> np.ndarray:
         """Correct the derivatives in their place, and return the memory of the place found."""
-        derivatives = self._output.arguments["derivatives"]
-        Y, A = self._output.results["Y"], self._output.results["A"]
-        outputs = wanted.shape[1]
-        A = A.reshape((outputs, -1), order="F")
-        Y = Y.reshape((-1, outputs))
-        still, point = np.zeros(self._n), None
-        scale = None if self._posture is None else self._posture.scale
+        arguments, results = self._correction.arguments, self._correction.results
+        arguments["wanted"][:], point = wanted.ravel(), None
+        steps = results["steps"].reshape((-1, self._n))
 
-        def solve(rhs: np.ndarray, spare: Spare) -> np.ndarray:
-            solution = self._inverse.solve(A, rhs, None if self._wish is None else spare)
-            if not self._inverse.accepts(solution):
-                raise InputError(f"singular, reciprocal condition number {solution.rcond:.2g}")
-            return solution.x
+        def correct(k: int, *, led: bool = False) -> np.ndarray:
+            arguments["derivatives"][:] = q.ravel()
+            self._correction.evaluate()
+            if not results["usable"][0]:
+                rcond = results["rcond"][0]
+                raise InputError(f"singular, reciprocal condition number {rcond:.2g}")
+            step = results["led"] if led else steps[k]
+            q[k] += step
+            return step
 
         for _ in range(_STEPS):
             self._pose.arguments["q"][:] = q[0]
             self._pose.evaluate()
             point = self._projection(self._pose.results["pose"][:3], memory)
-            self._output.arguments["manifold_point"][:] = point
-            derivatives[:] = q.ravel()
-            self._output.evaluate()
-            step = solve(wanted[0] - Y[0], Spare(still, scale))
-            q[0] += step
-            if not np.max(np.abs(step)) > _FOUND:
+            arguments["manifold_point"][:] = point
+            if not np.max(np.abs(correct(0))) > _FOUND:
                 break
         else:
             raise InputError("not reached")
-        for k in range(1, self._order + 1):
-            spare = Spare(still, scale)
-            if k == self._order:
-                q[k] = 0.0
-                if q_0 is not None and self._wish is not None:
-                    spare = self._spare(q, q_0, scale)
-            derivatives[:] = q.ravel()
-            self._output.evaluate()
-            q[k] += solve(wanted[k] - Y[k], spare)
+        for k in range(1, self._order):
+            correct(k)
+        q[self._order] = 0.0
+        if q_0 is not None:
+            arguments["posture"][: self._n] = q_0
+        correct(self._order, led=q_0 is not None)
         return point[self._memory].copy()
-
-    def _spare(self, q: np.ndarray, q_0: np.ndarray, scale: np.ndarray | None) -> Spare:
-        """Return what the posture wishes of the r-th derivative."""
-        wish = self._wish
-        assert wish is not None
-        wish.arguments["motion"][:] = q[:-1].ravel()
-        wish.arguments["posture"][: self._n] = q_0
-        wish.evaluate()
-        results = wish.results
-        if "weight" in results:
-            scale = scale_of(results["weight"].reshape((self._n, -1)))
-        if "slope" in results:
-            return Spare(results["wish"], scale, results["slope"], results["rate"].item())
-        return Spare(results["wish"], scale)
 
 
 def _rests(q: np.ndarray, reference: np.ndarray) -> bool:
@@ -175,14 +150,29 @@ def _advance(order: int, step: float) -> np.ndarray:
     )
 
 
-def _output_function(robot: RobotModel, manifold: PlaceManifold) -> ca.Function:
-    """Return ``(derivatives, manifold_point) -> (Y, A)``, shapes ((r + 1) N,), (size,), (m, r + 1).
+def _correction_function(
+    robot: RobotModel,
+    manifold: PlaceManifold,
+    inverse: DecouplingInverse,
+    posture: Posture | None,
+) -> ca.Function:
+    """Return by what derivatives of joints are to change, if the virtual output is to be wanted.
 
-    ``Y`` holds derivatives 0..r of the virtual output in its columns.
+    Its arguments are ``derivatives`` 0..r of the joints and of the output that is ``wanted``, by
+    rows, shapes ((r + 1) N,) and ((r + 1) m,), the ``manifold_point`` and the ``posture``
+    reference, shape ((r + 1) N,).
+
+    The columns of ``steps``, shape (N, r + 1), are corrections of each order of which those below
+    are right; joints beyond the outputs move as little as they can. ``led``, shape (N,), is the
+    one of order r by which they follow the posture. ``rcond`` and ``usable`` are those of
+    :class:`DecouplingSolution`.
     """
     n, order = robot.dimension, manifold.layout.order
+    m = len(manifold.coordinates)
     derivatives = ca.SX.sym("derivatives", (order + 1) * n)
     point, rate = ca.SX.sym("manifold_point", manifold.layout.size), ca.SX.sym("rate", n)
+    wanted = ca.SX.sym("wanted", (order + 1) * m)
+    reference = ca.SX.sym("posture", (order + 1) * n)
     q = ca.vertsplit(derivatives, n)
 
     def output(motion: list[ca.SX]) -> list:
@@ -190,27 +180,32 @@ def _output_function(robot: RobotModel, manifold: PlaceManifold) -> ca.Function:
         return manifold.virtual_output(y, R_e, point, [])
 
     found = output(q)
-    Y = ca.horzcat(*[ca.vertcat(*[y.derivative(k) for y in found]) for k in range(order + 1)])
     slopes = ca.vertcat(*[y.coefficients[1] for y in output([q[0], rate])])
+    A = ca.jacobian(slopes, rate)
+    missing = [
+        y_p - ca.vertcat(*[y.derivative(k) for y in found])
+        for k, y_p in enumerate(ca.vertsplit(wanted, m))
+    ]
+    still = led = None
+    if posture is not None:
+        wishes = posture_expressions(posture, robot, q[:-1], ca.vertsplit(reference, n))
+        still = Spare(ca.SX(n, 1), posture.scale)
+        scale = scale_of(wishes.weight) if wishes.weight.numel() else posture.scale
+        led = Spare(wishes.wish, scale)
+        if wishes.slope.numel():
+            led = led._replace(slope=wishes.slope, rate=wishes.rate)
+    steps = [inverse.solve(A, rhs, still) for rhs in missing]
+    last = inverse.solve(A, missing[-1], led)
+    results = {
+        "steps": ca.horzcat(*[solution.x for solution in steps]),
+        "led": last.x,
+        "rcond": last.rcond,
+        "usable": last.usable,
+    }
     return ca.Function(
         "course",
-        [derivatives, point],
-        [ca.densify(e) for e in ca.cse([Y, ca.jacobian(slopes, rate)])],
-        ["derivatives", "manifold_point"],
-        ["Y", "A"],
-    )
-
-
-def _wish_function(robot: RobotModel, posture: Posture, order: int) -> ca.Function:
-    """Return ``(motion, posture) -> (wish, ..)``, see :func:`posture_expressions`."""
-    n = robot.dimension
-    motion, wanted = ca.SX.sym("motion", order * n), ca.SX.sym("posture", (order + 1) * n)
-    wishes = posture_expressions(posture, robot, ca.vertsplit(motion, n), ca.vertsplit(wanted, n))
-    results = {name: ca.densify(x) for name, x in wishes._asdict().items() if x.numel()}
-    return ca.Function(
-        "posture_wish",
-        [motion, wanted],
-        list(results.values()),
-        ["motion", "posture"],
+        [derivatives, point, wanted, reference],
+        [ca.densify(e) for e in ca.cse(list(results.values()))],
+        ["derivatives", "manifold_point", "wanted", "posture"],
         list(results),
     )

@@ -1,17 +1,57 @@
 """The one place that inverts a decoupling matrix."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from pfsc_drake.control.law import decoupling
 from pfsc_drake.control.law.decoupling import (
     DecouplingInverse,
     DecouplingSolution,
     Restraint,
     Spare,
-    free_torque,
-    scale_of,
 )
 from pfsc_drake.errors import InputError
+
+
+def on_numbers(expression, *arrays):
+    """Return an expression's results, of arrays that it is not built with."""
+    symbols = [None if x is None else ca.SX.sym("x", *np.shape(x)) for x in arrays]
+    results = expression(*symbols)
+    kept = [i for i, x in enumerate(results) if x is not None]
+    given = [(symbol, x) for symbol, x in zip(symbols, arrays, strict=True) if x is not None]
+    function = ca.Function("f", [s for s, _ in given], [ca.densify(results[i]) for i in kept])
+    values = iter(function.call([x for _, x in given]))
+    shaped = (np.array(next(values)) if i in kept else None for i in range(len(results)))
+    return [x if x is None or x.shape[1] > 1 else x.ravel() for x in shaped]
+
+
+def solve(inverse, A, rhs, spare=None):
+    """Return the solution of numbers."""
+
+    def expression(A, rhs, wish, scale, slope, rate, rest, velocity):
+        if wish is None:
+            return inverse.solve(A, rhs)
+        held = None
+        if rest is not None:
+            held = Restraint(rest, velocity, spare.restraint.settling, spare.restraint.speeds)
+        return inverse.solve(A, rhs, Spare(wish, scale, slope, rate, held))
+
+    spare = spare or Spare(None, rate=None)
+    restraint = spare.restraint or Restraint(None, None, 0.0, None)
+    parts = on_numbers(expression, A, rhs, *spare[:4], restraint.rest, restraint.velocity)
+    x, rcond, usable, residual, rest = parts
+    return DecouplingSolution(x, rcond.item(), bool(usable.item()), residual, rest)
+
+
+def scale_of(W):
+    """Return the weight's root as numbers."""
+    return on_numbers(lambda W: [decoupling.scale_of(W)], W)[0]
+
+
+def free_torque(A, torque, scale=None):
+    """Return the free torque as numbers."""
+    return on_numbers(lambda *x: [decoupling.free_torque(*x)], A, torque, scale)[0]
 
 
 def test_solution_and_condition_match_numpy():
@@ -20,41 +60,26 @@ def test_solution_and_condition_match_numpy():
     for n in (3, 6):
         for _ in range(20):
             A, rhs = rng.normal(size=(n, n)), rng.normal(size=n)
-            solution = inverse.solve(A, rhs)
+            solution = solve(inverse, A, rhs)
             condition = np.linalg.cond(A, 1)
             assert np.allclose(solution.x, np.linalg.solve(A, rhs), rtol=1e-11 * condition)
-            # an estimate from below of the norm of the inverse, rarely off by more than three
-            assert 1.0 - 1e-9 < solution.rcond * condition < 10.0
-
-
-def test_neither_argument_is_changed():
-    A, rhs = np.asfortranarray(np.diag([2.0, 4.0, 8.0])), np.ones(3)
-    A[0, 2] = 1.0
-    before = A.copy()
-    DecouplingInverse().solve(A, rhs)
-    assert np.array_equal(A, before)
-    assert np.array_equal(rhs, np.ones(3))
-
-
-def test_the_matrix_is_not_transposed():
-    A = np.array([[1.0, 2.0], [0.0, 1.0]])
-    for ordered in (np.ascontiguousarray(A), np.asfortranarray(A)):
-        assert np.allclose(DecouplingInverse().solve(ordered, np.array([5.0, 2.0])).x, [1.0, 2.0])
+            assert solution.rcond == pytest.approx(1.0 / condition, rel=1e-9)
+            assert not solution.residual.any()
 
 
 @pytest.mark.parametrize("A", [np.zeros((3, 3)), np.diag([1.0, 0.0, 1.0])])
 def test_a_singular_matrix_is_not_accepted(A):
     inverse = DecouplingInverse(1e-12)
-    solution = inverse.solve(A, np.ones(3))
+    solution = solve(inverse, A, np.ones(3))
     assert np.all(np.isnan(solution.x))
     assert solution.rcond == 0.0
-    assert not inverse.accepts(solution)
+    assert not solution.usable
 
 
 def test_a_nearly_singular_matrix_is_not_accepted():
     inverse = DecouplingInverse(1e-12)
     A = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]])
-    assert not inverse.accepts(inverse.solve(A, np.ones(3)))
+    assert not solve(inverse, A, np.ones(3)).usable
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -62,15 +87,14 @@ def test_a_matrix_that_is_not_finite_is_not_accepted(bad):
     A = np.eye(3)
     A[1, 2] = bad
     inverse = DecouplingInverse()
-    assert not inverse.accepts(inverse.solve(A, np.ones(3)))
+    assert not solve(inverse, A, np.ones(3)).usable
 
 
 def test_the_limit_of_the_condition_number():
     # A diagonal matrix's reciprocal condition number is the ratio of its extremes
     A, rhs = np.diag([1.0, 0.5, 0.01]), np.ones(3)
-    assert DecouplingInverse(0.009).accepts(DecouplingInverse(0.009).solve(A, rhs))
-    assert not DecouplingInverse(0.011).accepts(DecouplingInverse(0.011).solve(A, rhs))
-    assert not DecouplingInverse(0.5).accepts(DecouplingSolution(rhs, np.nan))
+    assert solve(DecouplingInverse(0.009), A, rhs).usable
+    assert not solve(DecouplingInverse(0.011), A, rhs).usable
 
 
 @pytest.mark.parametrize("min_rcond", [0.0, 1.0, -1.0, np.nan])
@@ -94,28 +118,28 @@ def test_the_solution_next_to_a_wish_is_the_weighted_least_squares_one(size, wei
         A, rhs, wish, W = redundant(seed, *size)
         W_inv = np.linalg.inv(W) if weighted else np.eye(size[1])
         scale = scale_of(W) if weighted else None
-        solution = DecouplingInverse().solve(A, rhs, Spare(wish, scale))
+        solution = solve(DecouplingInverse(), A, rhs, Spare(wish, scale))
         expected = wish + W_inv @ A.T @ np.linalg.solve(A @ W_inv @ A.T, rhs - A @ wish)
         assert np.allclose(solution.x, expected, rtol=1e-10, atol=1e-11)
         # conditioning is that of A, whatever the weight
         frobenius = np.linalg.norm(A) * np.linalg.norm(np.linalg.pinv(A))
         assert solution.rcond == pytest.approx(len(A) / frobenius, rel=1e-9)
-        assert solution.residual is None
+        assert not solution.residual.any()
 
 
 def test_the_root_of_a_weight():
     _, _, _, W = redundant(3)
     scale = scale_of(W)
     assert np.allclose(scale @ scale.T, np.linalg.inv(W), rtol=1e-10)
-    assert np.isnan(scale_of(-np.eye(3))).all()
+    assert np.isnan(np.diag(scale_of(-np.eye(3)))).all()
 
 
 @pytest.mark.parametrize("weighted", [False, True])
 def test_a_spare_coordinate_gets_its_rate_and_the_outputs_theirs(weighted):
     A, rhs, wish, W = redundant(5, 3, 6)
     slope, scale = np.arange(1.0, 7.0), scale_of(W) if weighted else None
-    plain = DecouplingInverse().solve(A, rhs, Spare(wish, scale)).x
-    x = DecouplingInverse().solve(A, rhs, Spare(wish, scale, slope, 0.7)).x
+    plain = solve(DecouplingInverse(), A, rhs, Spare(wish, scale)).x
+    x = solve(DecouplingInverse(), A, rhs, Spare(wish, scale, slope, 0.7)).x
     assert np.allclose(A @ x, rhs, atol=1e-12)
     assert slope @ x == pytest.approx(0.7, abs=1e-12)
     # of all that do both it is nearest to the one without
@@ -129,9 +153,9 @@ def test_a_coordinate_that_the_outputs_fix_is_given_up_smoothly(share):
     A, rhs, wish, _ = redundant(6)
     free, fixed = np.linalg.svd(A)[2][-1], A[0] / np.linalg.norm(A[0])
     slope = share * free + np.sqrt(1.0 - share**2) * fixed
-    x = DecouplingInverse().solve(A, rhs, Spare(wish, None, slope, 100.0)).x
+    x = solve(DecouplingInverse(), A, rhs, Spare(wish, None, slope, 100.0)).x
     assert np.allclose(A @ x, rhs, atol=1e-9)
-    plain = DecouplingInverse().solve(A, rhs, Spare(wish)).x
+    plain = solve(DecouplingInverse(), A, rhs, Spare(wish)).x
     missing = 100.0 - slope @ plain
     gain = share / max(share**2, 1e-2)
     assert np.allclose(x - plain, gain * missing * free, atol=1e-8)
@@ -156,12 +180,12 @@ def test_damping_bounds_the_solution_and_tells_what_is_missed(spare):
     inverse = DecouplingInverse(1e-3, 0.1)
     for smallest in (0.0, 1e-9, 1e-3, 0.02):
         A = u @ np.diag([1.0, 0.9, 0.8, 0.7, 0.6, smallest]) @ v
-        solution = inverse.solve(A, rhs, wish)
-        assert inverse.accepts(solution)
+        solution = solve(inverse, A, rhs, wish)
+        assert solution.usable
         assert np.allclose(rhs - A @ solution.x, solution.residual, atol=1e-10)
         # lambda is at least 0.05, and x at most |rhs| / (2 lambda)
         assert np.linalg.norm(solution.x) < np.linalg.norm(rhs) / (2.0 * 0.05)
-        undamped = DecouplingInverse(1e-14).solve(A, rhs, wish)
+        undamped = solve(DecouplingInverse(1e-14), A, rhs, wish)
         if smallest == 1e-9:
             assert not np.linalg.norm(undamped.x) < 1e6
 
@@ -171,7 +195,7 @@ def test_damping_is_least_squares_with_a_weight_that_follows_the_matrix(size):
     """``min |A x - rhs|^2 + lambda^2 |x|^2`` as one system, whatever the matrix's units."""
     A = size * np.array([[1.0, 0.4, 0.0], [0.9, 0.41, 0.01], [0.0, 0.3, 1.0]])
     rhs, c_0 = size * np.array([0.3, -0.2, 0.5]), 0.2
-    solution = DecouplingInverse(1e-6, c_0).solve(A, rhs)
+    solution = solve(DecouplingInverse(1e-6, c_0), A, rhs)
     assert 0.0 < solution.rcond < c_0
     weight = np.sqrt((c_0**2 - solution.rcond**2) * np.sum(A**2))
     stacked = np.vstack([A, weight * np.eye(3)])
@@ -185,12 +209,12 @@ def test_damping_sets_in_continuously(spare):
     rng = np.random.default_rng(9)
     A, rhs = rng.normal(size=(6, n)), rng.normal(size=6)
     # one that is looked at for damping and needs none
-    plain = DecouplingInverse(1e-4, 1e-3).solve(A, rhs, wish)
-    just = DecouplingInverse(1e-4, plain.rcond * (1.0 + 1e-9)).solve(A, rhs, wish)
-    assert just.residual is not None
-    assert plain.residual is None
+    plain = solve(DecouplingInverse(1e-4, 1e-3), A, rhs, wish)
+    just = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 + 1e-9)), A, rhs, wish)
+    assert just.residual.any()
+    assert not plain.residual.any()
     assert np.allclose(just.x, plain.x, rtol=1e-5)
-    above = DecouplingInverse(1e-4, plain.rcond * (1.0 - 1e-9)).solve(A, rhs, wish)
+    above = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 - 1e-9)), A, rhs, wish)
     assert np.array_equal(above.x, plain.x)
 
 
@@ -200,8 +224,8 @@ def test_what_is_not_finite_is_refused_with_joints_to_spare(bad, damped_below):
     A, rhs, wish, _ = redundant(10)
     inverse = DecouplingInverse(1e-3, damped_below)
     A[2, 3] = bad
-    assert not inverse.accepts(inverse.solve(A, rhs, Spare(wish)))
-    assert not inverse.accepts(DecouplingInverse(1e-3).solve(np.zeros((6, 7)), rhs, Spare(wish)))
+    assert not solve(inverse, A, rhs, Spare(wish)).usable
+    assert not solve(DecouplingInverse(1e-3), np.zeros((6, 7)), rhs, Spare(wish)).usable
 
 
 @pytest.mark.parametrize("damped_below", [1e-3, 1.0, -0.1, np.nan])
@@ -217,14 +241,14 @@ def held_back(settling, speeds, velocity=True, scale=None, slope=None, damped_be
     v = rng.normal(size=7) if velocity else None
     restraint = Restraint(-5.0 * v if velocity else np.zeros(7), v, settling, speeds)
     spare = Spare(wish, scale, slope, 30.0, restraint)
-    return A, rhs, v, spare, DecouplingInverse(damped_below=damped_below).solve(A, rhs, spare)
+    return A, rhs, v, spare, solve(DecouplingInverse(damped_below=damped_below), A, rhs, spare)
 
 
 @pytest.mark.parametrize("scale", [None, np.diag(np.linspace(0.5, 2.0, 7))])
 @pytest.mark.parametrize("slope", [None, np.arange(7.0)])
 def test_joints_that_may_be_as_fast_as_they_like_are_not_held_back(scale, slope):
     A, rhs, _, spare, solution = held_back(3.0, np.full(7, np.inf), scale=scale, slope=slope)
-    free = DecouplingInverse().solve(A, rhs, spare._replace(restraint=None))
+    free = solve(DecouplingInverse(), A, rhs, spare._replace(restraint=None))
     np.testing.assert_allclose(solution.x, free.x, rtol=1e-12)
 
 
@@ -255,5 +279,5 @@ def test_outputs_that_need_all_the_speed_leave_none():
 def test_what_damping_misses_is_told_of_joints_that_are_held_back():
     for speeds in (np.full(7, 5.0), np.full(7, np.inf)):
         A, rhs, _, _, solution = held_back(3.0, speeds, damped_below=0.9)
-        assert solution.residual is not None
+        assert solution.residual.any()
         np.testing.assert_allclose(rhs - A @ solution.x, solution.residual, atol=1e-10)
