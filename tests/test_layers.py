@@ -45,7 +45,7 @@ STRANGERS = [
 UNKNOWN = {
     "pfsc_drake.jets": ["pydrake", "matplotlib"],
     "pfsc_drake.blocks": ["pydrake", "matplotlib"],
-    "pfsc_drake.geometry": ["pydrake", "casadi", "matplotlib"],
+    "pfsc_drake.geometry": ["pydrake", "matplotlib"],
     "pfsc_drake.control": ["pydrake", "matplotlib"],
     "pfsc_drake.physics": ["pydrake", "matplotlib"],
     "pfsc_drake": ["matplotlib", "diagrams", "experiments", "identification", "reporting"],

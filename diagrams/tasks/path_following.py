@@ -21,7 +21,12 @@ from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import quaternion_to_matrix, shape_report, zyx_to_matrix
+from pfsc_drake.geometry import (
+    ProjectionStatus,
+    quaternion_to_matrix,
+    shape_report,
+    zyx_to_matrix,
+)
 from pfsc_drake.geometry.paths.target import PathTarget
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
@@ -153,16 +158,18 @@ class PathTask(Task):
         max_alpha = self._scenario.controller.max_alpha
         theta = self.path.arc_length.parameter(eta)
         layout = self.place.layout
-        on_path = self.path.evaluator(layout.order).evaluate_at(theta)
+        evaluator = self.path.evaluator(layout.order)
+        on_path = evaluator.evaluate_at(theta)
         axes = self.place.axes(on_path)
         beside = start.offset[0] * axes[:, 1], start.offset[1] * axes[:, 2]
         y_t = on_path[layout.position][:3] + beside[0] + beside[1] + shift
-        projection = self.path.projector.project(y_t.tolist(), theta)
-        if not (projection.converged and projection.alpha < max_alpha):
+        point = evaluator(y_t.tolist(), theta)
+        alpha = point[layout.alpha].item()
+        if point[layout.status] == ProjectionStatus.NOT_CONVERGED or not alpha < max_alpha:
             raise InputError(
                 f"start.offset: {start.offset} m at eta = {eta:g} m, "
                 f"{np.round(y_t, 6).tolist()} m, is outside the feasible neighbourhood of the path"
-                f", alpha = {projection.alpha:.3g}; alpha must be below {max_alpha:g}"
+                f", alpha = {alpha:.3g}; alpha must be below {max_alpha:g}"
             )
         R_e = None
         if self.path.orientation is not None:
@@ -170,7 +177,7 @@ class PathTask(Task):
             R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
         tool = self.place.tool
         target = ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis)
-        return StartPoint(target, np.array([projection.theta]))
+        return StartPoint(target, point[layout.memory])
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""

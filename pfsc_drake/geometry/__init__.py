@@ -16,7 +16,7 @@ from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.point import PathPointLayout
-from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
+from pfsc_drake.geometry.paths.projection import Projection, Projector
 from pfsc_drake.geometry.paths.shape_report import ShapeReport, shape_report
 from pfsc_drake.geometry.paths.taught import Picking, pick_waypoints
 from pfsc_drake.geometry.paths.waypoint_file import (
@@ -129,7 +129,6 @@ __all__ = [
     "path_from_waypoints",
     "pick_waypoints",
     "plane",
-    "project_globally",
     "quaternion_to_matrix",
     "quaternion_to_zyx",
     "quaternion_to_zyz",

@@ -164,7 +164,7 @@ def virtual_output():
     """Return the outputs of a tool pose from the path alone, ``(eta, xi_1, xi_2[, phi])``."""
 
     def calc(path, y_t, R_e):
-        theta = path.project_globally(y_t).theta
+        theta = path.nearest(y_t)
         sigma, slope = path.position.derivatives(theta, 1)
         e_par, e_perp = slope / np.linalg.norm(slope), path.frame.normals(theta)[0]
         offset = y_t - sigma

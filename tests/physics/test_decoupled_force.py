@@ -27,7 +27,7 @@ def test_only_the_arc_length_is_accelerated():
     curve = FourierCurve.circle(center, 0.12, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
     path = Path(curve, OrientationCurve.fixed([0.2, 0.1, 0.9, 0.3], curve.domain))
     manifold = PathManifold(1, oriented=True)
-    point = path.evaluator(1)(y_t.tolist(), path.project_globally(y_t).theta)
+    point = path.evaluator(1)(y_t.tolist(), path.nearest(y_t))
 
     wrench = np.array(decoupled_force_function(chain, manifold)(q, point)).ravel()
     J = plant.CalcJacobianSpatialVelocity(

@@ -1,67 +1,57 @@
 """What a path tells the controller at each tick."""
 
 import math
-from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.foot import FootFinder
+from pfsc_drake.geometry.nearest_samples import nearest_samples
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.point import PathPointLayout
-from pfsc_drake.geometry.paths.projection import Projection, Projector
-from pfsc_drake.geometry.paths.run_out import Continuation, JoinedCurve, continuations
+from pfsc_drake.geometry.paths.run_out import Continuation, continuations
 from pfsc_drake.geometry.paths.table import PathTable, tabulate
 from pfsc_drake.geometry.paths.turned_frame import Frame
+from pfsc_drake.geometry.piece_table import PieceTable
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 
-_BEYOND_END = float(ProjectionStatus.BEYOND_END)
-_NOT_CONVERGED = float(ProjectionStatus.NOT_CONVERGED)
-
-# All relative to the length of the domain: the longest step from one tick to the next, ...
-_NEAR = 1.0 / 128.0
-# ... a step of third order after which none of more than the tolerance follows, ...
-_SETTLED = 1e-6
-_TOLERANCE = 1e-12
-# ... and how far a polynomial may be used beyond its piece.
-_SLACK = 1e-13
-# The foot lies on the piece of the guess, or on the next.
-_MAX_PIECES = 3
-_MAX_STEPS = 6
-# Of the normal over the laps, rad: the holonomy of a plane curve is a rounding error.
+# Of the domain.
+_LONGEST_STEP = 1.0 / 32.0
+# Of the normal in a lap, rad: the holonomy of a plane curve is a rounding error.
 _NO_TURN = 1e-14
-
-Foot = tuple[int, float, int]
+# For the first search.
+_FEWEST_SAMPLES, _SAMPLES_PER_SEGMENT = 256, 16
+_VALLEY = 1.0 / 16.0
 
 
 class PathEvaluator:
     """Projects a point on a path and evaluates everything a law of one order needs there.
 
-    It has no memory: the same input gives the same output. `Path.evaluator` makes it.
+    All quantities of the path point are polynomials on the pieces of one table. The foot is found
+    by `FootFinder` on the table's position; an open path goes on beyond its ends, see
+    `paths.run_out`. There is no memory: the same input gives the same output.
 
-    All quantities of the path point are polynomials of u = theta - theta_s on the pieces of
-    one table, so one product of a matrix with the powers of u evaluates them all. The slope of
-    half the squared distance from a point y,
-
-        f(u) = (sigma_t(theta_s + u) - y) . sigma_t'(theta_s + u),
-
-    is a polynomial too, with coefficients affine in y. From the last tick's parameter
-    Halley's steps, of third order, find its root in a few scalar operations. What they find
-    is checked on the path itself; whatever is not quick and plain (a far guess, an end of an
-    open path, a point near the centre of curvature) is left to the `Projector`.
+    Calling the object evaluates ``evaluate``. `Path.evaluator` makes it.
 
     Args:
         position: Curve sigma_t in R^3.
         orientation: Curve of quaternions, or None.
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
-        projector: Projector onto `position`.
         order: Relative degree r of the law.
 
     Attributes:
-        layout: Where the quantities lie in the arrays returned.
+        layout: Where the quantities lie in the path point.
+        evaluate: ``(y_t, memory) -> manifold_point``, the path next to a point [m], shape (3,);
+            memory is the unwrapped parameter of the last tick. All values but ``status`` are NaN if
+            either is not finite.
+        at: ``memory -> manifold_point``, the path at an unwrapped parameter, with alpha zero.
     """
 
     def __init__(
@@ -70,75 +60,61 @@ class PathEvaluator:
         orientation: OrientationCurve | None,
         arc_length: ArcLength,
         frame: Frame,
-        projector: Projector,
         order: int,
     ) -> None:
         self.layout = PathPointLayout(order, orientation is not None, frame.turns)
         table = tabulate(position, orientation, arc_length, frame, self.layout)
-        # An open path goes on beyond its ends, before its first piece and after its last.
-        self._project_beyond: Callable[[Sequence[float], float], Projection] | None = None
-        self._first_piece, self._last_piece = 0, len(table.rows) - 1
         if not position.closed:
             before, after = continuations(position, orientation, arc_length, frame, order)
-            self._first_piece, table = _extended(before, table, after, self.layout)
-            self._last_piece += self._first_piece
-            whole = JoinedCurve([before.position, position, after.position])
-            self._project_beyond = Projector(whole).project
-        self._rows, self._slopes = list(table.rows), list(table.slopes)
-        self._starts = table.breakpoints[:-1].tolist()
-        self._widths = np.diff(table.breakpoints).tolist()
-        self._interior = table.breakpoints[1:-1].tolist()
+            table = _extended(before, table, after, self.layout)
+        self._table = PieceTable(table.breakpoints, table.rows)
+        self._domain, self._closed = position.domain, position.closed
         # Of the table, which may be one or two laps long.
         self._begin, self._end = float(table.breakpoints[0]), float(table.breakpoints[-1])
-        self._period = self._end - self._begin
-        laps = round(self._period / position.period)
+        laps = round((self._end - self._begin) / position.period)
         self._length, self._turn = laps * arc_length.length, laps * frame.holonomy
-        self._domain, self._closed = position.domain, position.closed
-        self._project = projector.project
-        length = position.period
-        self._near, self._settled = _NEAR * length, _SETTLED * length
-        self._tolerance, self._slack = _TOLERANCE * length, _SLACK * length
+        self._position = position
+        self._finder = FootFinder(
+            self._position_terms, [(self._begin, self._end)], [position.closed], _LONGEST_STEP
+        )
+        y, theta = ca.MX.sym("y_t", 3), ca.MX.sym("memory")
+        self.evaluate = ca.Function(
+            "path_point",
+            [y, theta],
+            [self._at_foot(y, theta)],
+            ["y_t", "memory"],
+            ["manifold_point"],
+        )
+        self.at = ca.Function(
+            "path_at", [theta], [self._on_path(theta)], ["memory"], ["manifold_point"]
+        )
+
+    @cached_property
+    def find(self) -> ca.Function:
+        """``y_t -> memory``, the nearest point of the whole path, on the first lap if closed."""
+        y, apart = ca.MX.sym("y_t", 3), np.array([_VALLEY * self._position.period])
+        starts = nearest_samples(y, *_samples(self._position), apart)
+        nearest = self._finder.nearest(y, starts)
+        if self._closed:
+            (begin, _), period = self._domain, self._position.period
+            nearest -= period * ca.floor((nearest - begin) / period)
+        return ca.Function("path_place", [y], [nearest], ["y_t"], ["memory"])
 
     def __call__(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
-        """Path quantities at the projection of a point.
+        """Return the path point next to a point, new array [layout.size].
 
         Args:
-            point: y_t, [3], m. A list or tuple of floats is faster than an array.
+            point: y_t, [3], m.
             theta_guess: Unwrapped parameter of the last tick.
-
-        Returns:
-            New array [layout.size], see `PathPointLayout`. All its values but `status` are
-            NaN if the point or the guess is not finite.
         """
-        x, y, z = point
-        foot = self._find_foot(x, y, z, theta_guess)
-        if foot is None:
-            return self._at_projection(point, theta_guess)
-        piece, u, laps = foot
-        u2 = u * u
-        u3 = u2 * u
-        u4 = u2 * u2
-        out = self._rows[piece].dot((1.0, u, u2, u3, u4, u2 * u3, u3 * u3, u3 * u4))
-        px, py, pz, dx, dy, dz, cx, cy, cz = out[7:16].tolist()
-        x -= px
-        y -= py
-        z -= pz
-        square = dx * dx + dy * dy + dz * dz
-        bend = x * cx + y * cy + z * cz
-        curvature = square - bend
-        slope = x * dx + y * dy + z * dz
-        if not abs(slope) < self._tolerance * curvature:
-            return self._at_projection(point, theta_guess)
-        out[0] = self._starts[piece] + u + slope / curvature
-        out[2] = bend / square
-        if laps:
-            self._add_laps(out, laps)
-        elif not self._first_piece <= piece <= self._last_piece:
-            out[3] = _BEYOND_END
-        return out
+        function = self._bound_evaluate
+        function.arguments["y_t"][:] = point
+        function.arguments["memory"][0] = theta_guess
+        function.evaluate()
+        return function.results["manifold_point"].copy()
 
     def evaluate_at(self, theta: float) -> np.ndarray:
-        """Path quantities at a point on the path, for set-up.
+        """Return the path point at a point on the path, for set-up.
 
         Args:
             theta: Unwrapped parameter.
@@ -152,125 +128,106 @@ class PathEvaluator:
         begin, end = self._domain
         if not math.isfinite(theta) or (not self._closed and not begin <= theta <= end):
             raise InputError(f"theta: {theta:.9g}; the path is defined on [{begin:.9g}, {end:.9g}]")
-        return self._at(float(theta))
+        function = self._bound_at
+        function.arguments["memory"][0] = theta
+        function.evaluate()
+        return function.results["manifold_point"].copy()
 
-    def _find_foot(self, x: float, y: float, z: float, theta: float) -> Foot | None:
-        """Root of the slope next to a guess: piece, u, and number of the table's lap.
+    @cached_property
+    def _bound_evaluate(self) -> BoundFunction:
+        return BoundFunction(self.evaluate)
 
-        Every step must be shorter than a quarter of the one before, as it is near a root;
-        None if it is not, or if the way leads out of an open path.
-        """
-        laps, reach = 0, self._near
-        settled, slack = self._settled, self._slack
-        for _ in range(_MAX_PIECES):
-            if not self._begin <= theta <= self._end:
-                if not self._closed or not math.isfinite(theta):
-                    return None
-                more = math.floor((theta - self._begin) / self._period)
-                theta -= more * self._period
-                laps += more
-            piece = bisect_right(self._interior, theta)
-            start, width = self._starts[piece], self._widths[piece]
-            c0, c1, c2, c3, c4, c5, c6, c7 = self._slopes[piece].dot((1.0, x, y, z)).tolist()
-            u = theta - start
-            for _ in range(_MAX_STEPS):
-                # Horner's scheme for the slope f, its derivative d = f' and g = f''/2 at u.
-                g = d = c7
-                f = c6 + u * c7
-                d = f + u * d
-                g = d + u * g
-                f = c5 + u * f
-                d = f + u * d
-                g = d + u * g
-                f = c4 + u * f
-                d = f + u * d
-                g = d + u * g
-                f = c3 + u * f
-                d = f + u * d
-                g = d + u * g
-                f = c2 + u * f
-                d = f + u * d
-                g = d + u * g
-                f = c1 + u * f
-                d = f + u * d
-                f = c0 + u * f
-                divisor = d * d - f * g
-                if not (d > 0.0 and divisor > 0.0):
-                    return None
-                step = -f * d / divisor
-                if not -reach < step < reach:
-                    return None
-                u += step
-                if not -slack <= u <= width + slack:
-                    break
-                if -settled < step < settled:
-                    return piece, u, laps
-                reach = abs(step) / 4.0
-            reach = max(abs(step) / 4.0, settled)
-            theta = start + u
-        return None
+    @cached_property
+    def _bound_at(self) -> BoundFunction:
+        return BoundFunction(self.at)
 
-    def _at_projection(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
-        """The same as calling the object, by the projector."""
-        theta, alpha, at_end, _, converged = self._project(point, theta_guess)
-        beyond = at_end
-        if at_end and self._project_beyond is not None:
-            theta, alpha, at_end, _, converged = self._project_beyond(point, theta_guess)
-            beyond = not self._domain[0] <= theta <= self._domain[1]
-        if alpha != alpha:
-            out = np.full(self.layout.size, math.nan)
-            out[3] = _NOT_CONVERGED
-            return out
-        out = self._at(theta)
-        if not at_end:
-            out[2] = alpha
-            if beyond:
-                out[3] = _BEYOND_END
-            if not converged:
-                out[3] = _NOT_CONVERGED
-            return out
-        out[3] = _BEYOND_END
-        layout = self.layout
-        out[13 : layout.position.stop] = 0.0
-        out[layout.quaternion][4:] = 0.0
-        out[layout.turn] = 0.0
-        x, y, z, dx, dy, dz = out[7:13].tolist()
-        along = (point[0] - x) * dx + (point[1] - y) * dy + (point[2] - z) * dz
-        out[1] += along / math.sqrt(dx * dx + dy * dy + dz * dz)
-        return out
+    def _wrapped(self, theta: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Parameter within the table, and the number of the table's lap."""
+        if not self._closed:
+            return theta, ca.MX(0.0)
+        period = self._end - self._begin
+        laps = ca.floor((theta - self._begin) / period)
+        return theta - laps * period, laps
 
-    def _at(self, theta: float) -> np.ndarray:
-        """Path point at a finite unwrapped parameter, with alpha zero and status OK."""
-        laps = 0
-        if self._closed and not self._begin <= theta <= self._end:
-            laps = math.floor((theta - self._begin) / self._period)
-        wrapped = theta - laps * self._period
-        piece = bisect_right(self._interior, wrapped)
-        u = wrapped - self._starts[piece]
-        out = self._rows[piece].dot([u**j for j in range(8)])
-        if laps:
-            self._add_laps(out, laps)
-        out[0] = theta
-        return out
+    def _position_terms(self, theta: ca.MX) -> ca.MX:
+        """sigma_t and its first two derivatives as columns."""
+        values = self._table(self._wrapped(theta)[0], self.layout.position.start, 9)
+        return ca.reshape(values, 3, 3)
 
-    def _add_laps(self, out: np.ndarray, laps: int) -> None:
-        """Move a path point by laps of the table."""
-        out[0] += laps * self._period
-        out[1] += laps * self._length
-        turn = laps * self._turn
-        if abs(turn) > _NO_TURN:
-            x, y, z = out[4:7].tolist()
-            tx, ty, tz = out[10:13].tolist()
-            c, s = math.cos(turn), math.sin(turn) / math.sqrt(tx * tx + ty * ty + tz * tz)
-            out[4] = c * x + s * (ty * z - tz * y)
-            out[5] = c * y + s * (tz * x - tx * z)
-            out[6] = c * z + s * (tx * y - ty * x)
+    def _on_path(self, theta: ca.MX) -> ca.MX:
+        """Path point at an unwrapped parameter, with alpha zero and status OK."""
+        wrapped, laps = self._wrapped(theta)
+        point = self._table(wrapped)
+        if not self._closed:
+            return ca.vertcat(theta, point[1:])
+        normal = point[self.layout.normal]
+        if abs(self._turn) > _NO_TURN:
+            slope = point[self.layout.position][3:6]
+            normal = _turn_function()(normal, slope, laps * self._turn)
+        eta = point[self.layout.eta] + laps * self._length
+        return ca.vertcat(theta, eta, point[2:4], normal, point[self.layout.normal.stop :])
+
+    def _at_foot(self, y: ca.MX, guess: ca.MX) -> ca.MX:
+        """Path point at the foot of a point."""
+        foot = self._finder.find(y, guess)
+        point = self._on_path(foot.theta)
+        terms = ca.reshape(point[self.layout.position][:9], 3, 3)
+        alpha = _bend_function()(y, terms)
+        begin, end = self._domain
+        beyond = ca.MX(0.0)
+        if not self._closed:
+            beyond = ca.logic_or(foot.theta < begin, foot.theta > end)
+            beyond = ca.logic_or(beyond, foot.beyond_end)
+            point = ca.if_else(foot.beyond_end, self._straight_on(point, y), point)
+        status = ca.if_else(
+            foot.converged,
+            ca.if_else(beyond, float(ProjectionStatus.BEYOND_END), float(ProjectionStatus.OK)),
+            float(ProjectionStatus.NOT_CONVERGED),
+        )
+        alpha = ca.if_else(foot.beyond_end, 0.0, alpha)
+        # What is not finite has no foot.
+        place = ca.if_else(foot.known, ca.vertcat(point[:2], alpha, point[4:]), math.nan)
+        return ca.vertcat(place[:3], status, place[3:])
+
+    def _straight_on(self, point: ca.MX, y: ca.MX) -> ca.MX:
+        """Path point beyond the last end: eta goes on along the tangent, the rest stays."""
+        sigma, slope = ca.vertsplit(point[self.layout.position][:6], 3)
+        along = ca.dot(y - sigma, slope) / ca.norm_2(slope)
+        kept = np.ones(self.layout.size)
+        kept[self.layout.position][6:] = 0.0
+        kept[self.layout.quaternion][4:] = 0.0
+        kept[self.layout.turn] = 0.0
+        still = point * kept
+        return ca.vertcat(still[0], still[1] + along, still[2:])
+
+
+def _samples(position: Curve) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters, [n, 1], and points [n, 3] of a path, for the first search."""
+    count = max(_FEWEST_SAMPLES, _SAMPLES_PER_SEGMENT * (len(position.breakpoints) - 1))
+    theta = np.linspace(*position.domain, count, endpoint=not position.closed)
+    return theta[:, None], position.derivatives(theta, 0)[:, 0]
+
+
+def _bend_function() -> ca.Function:
+    """``(y, terms) -> alpha`` (3.9)."""
+    y, terms = ca.SX.sym("y", 3), ca.SX.sym("terms", 3, 3)
+    sigma, slope, bend = ca.horzsplit(terms)
+    alpha = ca.dot(y - sigma, bend) / ca.dot(slope, slope)
+    return ca.Function("alpha", [y, terms], [alpha])
+
+
+def _turn_function() -> ca.Function:
+    """``(normal, slope, angle) -> normal`` turned about the tangent, which it is normal to."""
+    normal, slope, angle = ca.SX.sym("normal", 3), ca.SX.sym("slope", 3), ca.SX.sym("angle")
+    across = ca.cross(slope, normal) / ca.norm_2(slope)
+    turned = ca.cos(angle) * normal + ca.sin(angle) * across
+    return ca.Function("turn_of_laps", [normal, slope, angle], [turned])
 
 
 def _extended(
     before: Continuation, table: PathTable, after: Continuation, layout: PathPointLayout
-) -> tuple[int, PathTable]:
-    """Table of a path with what is beyond its ends, and how many pieces are before its begin."""
+) -> PathTable:
+    """Table of a path with what is beyond its ends."""
     tables = []
     for part in (before, after):
         own = tabulate(part.position, part.orientation, part.arc_length, part.frame, layout)
@@ -278,9 +235,7 @@ def _extended(
         tables.append(own)
     joined = [tables[0], table, tables[1]]
     breakpoints = [part.breakpoints[:-1] for part in joined]
-    whole = PathTable(
+    return PathTable(
         np.concatenate([*breakpoints, tables[1].breakpoints[-1:]]),
         np.concatenate([part.rows for part in joined]),
-        np.concatenate([part.slopes for part in joined]),
     )
-    return len(tables[0].rows), whole

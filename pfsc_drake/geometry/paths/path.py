@@ -13,7 +13,6 @@ from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
-from pfsc_drake.geometry.paths.projection import Projection, Projector, project_globally
 from pfsc_drake.geometry.paths.turned_frame import Frame
 
 _IRREGULAR = 1e-6
@@ -51,7 +50,6 @@ class Path:
         orientation: The curve of quaternions, or None.
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
-        projector: Projector onto `position`.
         waypoints: What the path was made of, or None.
 
     Raises:
@@ -78,7 +76,6 @@ class Path:
         self.waypoints = waypoints
         self.arc_length = ArcLength(position)
         self.frame = frame or ParallelTransportFrame(position, initial_normal)
-        self.projector = Projector(position)
         self._evaluators: dict[int, PathEvaluator] = {}
 
     @property
@@ -132,13 +129,13 @@ class Path:
         """
         if order not in self._evaluators:
             self._evaluators[order] = PathEvaluator(
-                self.position, self.orientation, self.arc_length, self.frame, self.projector, order
+                self.position, self.orientation, self.arc_length, self.frame, order
             )
         return self._evaluators[order]
 
-    def project_globally(self, point: ArrayLike, samples: int | None = None) -> Projection:
-        """Closest point of the whole path (3.6), see the function of the same name."""
-        return project_globally(self.position, point, samples)
+    def nearest(self, point: ArrayLike) -> float:
+        """Return the parameter of the path's point that is nearest to a point, [3], m."""
+        return float(self.evaluator(1).find(np.asarray(point, dtype=float)))
 
     def pose(self, eta: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Reference pose at an arc length.

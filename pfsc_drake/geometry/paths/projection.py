@@ -5,9 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 
 _MAX_ITERATIONS = 60
@@ -16,10 +14,6 @@ _TOLERANCE = 1e-12
 _STALLED = 1e-8
 _COARSE = 1e-7
 _MAX_STEP = 1.0 / 32.0
-
-_MIN_SAMPLES = 256
-_SAMPLES_PER_SEGMENT = 16
-_MAX_STARTS = 6
 
 
 class Projection(NamedTuple):
@@ -106,49 +100,6 @@ class Projector:
         # Near alpha = 1 rounding errors of the slope can exceed the tolerance.
         stalled = abs(step) < _STALLED * length and alpha < 1.0
         return Projection(theta, alpha, False, _MAX_ITERATIONS, stalled)
-
-
-def project_globally(curve: Curve, point: ArrayLike, samples: int | None = None) -> Projection:
-    """Closest point of the whole curve, (3.6), by sampling and Newton's method (section 3.7.1).
-
-    Args:
-        curve: Curve of class C^2, any dimension.
-        point: y, [dimension], m.
-        samples: Number of samples over the domain; by default 16 on each segment, at
-            least 256.
-
-    Returns:
-        The projection, with theta in the domain.
-
-    Raises:
-        InputError: the point has the wrong dimension, or `samples` is below 4.
-    """
-    y = np.asarray(point, dtype=float)
-    if y.shape != (curve.dimension,):
-        raise InputError(f"point: shape {y.shape}; ({curve.dimension},) is required")
-    if samples is not None and samples < 4:
-        raise InputError(f"samples: {samples}; at least 4 are required")
-    count = samples or max(_MIN_SAMPLES, _SAMPLES_PER_SEGMENT * (len(curve.breakpoints) - 1))
-    theta = np.linspace(*curve.domain, count, endpoint=not curve.closed)
-    cost = np.sum((y - curve.derivatives(theta, 0)[:, 0]) ** 2, axis=1)
-    if curve.closed:
-        before, after = np.roll(cost, 1), np.roll(cost, -1)
-    else:
-        before, after = np.append(np.inf, cost[:-1]), np.append(cost[1:], np.inf)
-    valleys = np.flatnonzero((cost <= before) & (cost <= after))
-    starts = valleys[np.argsort(cost[valleys], kind="stable")][:_MAX_STARTS]
-    projector = Projector(curve)
-    values = y.tolist()
-    results = [projector.project(values, float(theta[start])) for start in starts]
-    if not results:
-        return Projection(curve.domain[0], math.nan, False, 0, False)
-
-    def distance(result: Projection) -> tuple[bool, float]:
-        reached = curve.derivatives(result.theta, 0)[0]
-        return not result.converged, float(np.sum((y - reached) ** 2))
-
-    best = min(results, key=distance)
-    return best._replace(theta=float(curve.wrap(best.theta)))
 
 
 Terms = Callable[[float, Sequence[float]], tuple[float, float, float, float]]

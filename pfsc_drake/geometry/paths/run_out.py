@@ -1,14 +1,11 @@
 """Where an open path goes on beyond its ends, so that a hand can pull the tool over them."""
 
 import math
-from bisect import bisect_right
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from pfsc_drake.geometry.curves.curve import Curve, Sampler
+from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.curves.run_out import RunOut, straightening_length
 from pfsc_drake.geometry.paths.arc_length import ArcLength
@@ -20,40 +17,6 @@ _LONGEST = 0.1
 # How much a term of the Taylor series may turn the quaternion, relative to its length, or the
 # frame, rad.
 _TURN = 0.15
-
-
-class JoinedCurve(Curve):
-    """Curves one after the other as one.
-
-    Args:
-        parts: Open curves of one dimension; each begins where the one before ends.
-    """
-
-    def __init__(self, parts: Sequence[Curve]) -> None:
-        breakpoints = np.concatenate(
-            [parts[0].breakpoints, *[part.breakpoints[1:] for part in parts[1:]]]
-        )
-        smoothness = min(part.smoothness for part in parts)
-        super().__init__(parts[0].dimension, breakpoints, closed=False, smoothness=smoothness)
-        self._parts, self._joints = parts, [part.domain[0] for part in parts[1:]]
-
-    def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
-        values = np.asarray(self._checked(theta))
-        which = np.searchsorted(self._joints, values, side="right")
-        result = np.zeros((*values.shape, order + 1, self.dimension))
-        for i, part in enumerate(self._parts):
-            chosen = which == i
-            if np.any(chosen):
-                inside = np.clip(values[chosen], *part.domain)
-                result[chosen] = part.derivatives(inside, order)
-        return result
-
-    def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
-        samplers = [part.flat_sampler(order) for part in self._parts]
-        joints = self._joints
-        return lambda theta: samplers[bisect_right(joints, theta)](theta)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
-from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, fit_pieces, power_coefficients
+from pfsc_drake.geometry.curves.piecewise_fit import fit_pieces
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.turned_frame import Frame
@@ -30,14 +30,10 @@ class PathTable(NamedTuple):
         breakpoints: theta_s and the last end, [pieces + 1].
         rows: Coefficients of the path point, laid out by `PathPointLayout` with theta,
             alpha and status left zero, [pieces, layout.size, 8], lowest power first.
-        slopes: Map from (1, y) to the coefficients of (sigma_t - y) . sigma_t', the slope of
-            half the squared distance from a point y, [pieces, 8, 4]. It approximates the
-            product of the rows, to about 1e-13 of its largest value.
     """
 
     breakpoints: np.ndarray
     rows: np.ndarray
-    slopes: np.ndarray
 
 
 def tabulate(
@@ -86,8 +82,7 @@ def tabulate(
         tolerance=_TOLERANCE,
     )
     rows = np.ascontiguousarray((coefficients * scale).transpose(0, 2, 1))
-    sigma, tangent = rows[:, layout.position][:, :3], rows[:, layout.position][:, 3:6]
-    return PathTable(breakpoints, rows, _slopes(np.diff(breakpoints), sigma, tangent))
+    return PathTable(breakpoints, rows)
 
 
 def _scale(points: np.ndarray, layout: PathPointLayout) -> np.ndarray:
@@ -138,19 +133,3 @@ def _common_breakpoints(
     inner = merged[(merged > begin + slack) & (merged < end - slack)]
     inner = inner[np.diff(inner, prepend=begin) > slack]
     return np.concatenate([[begin], inner, [end]])
-
-
-def _slopes(lengths: np.ndarray, sigma: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Map `PathTable.slopes` from coefficients of sigma_t and sigma_t', each [pieces, 3, 8]."""
-    count = sigma.shape[2]
-    local = chebyshev_nodes(np.zeros_like(lengths), lengths, count)
-    powers = local[..., None] ** np.arange(count)
-    # Distances from the begin of the piece lose no digits where the path is far from the origin.
-    start = sigma[:, :, :1]
-    moved = np.einsum("sdj,snj->snd", sigma, powers) - start.transpose(0, 2, 1)
-    product = np.sum(moved * np.einsum("sdj,snj->snd", tangent, powers), axis=2, keepdims=True)
-    slopes = np.empty((len(lengths), count, 4))
-    slopes[:, :, :1] = power_coefficients(product, lengths)
-    slopes[:, :, 0] += np.sum(start * tangent, axis=1)
-    slopes[:, :, 1:] = -tangent.transpose(0, 2, 1)
-    return slopes

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pfsc_drake.geometry import Path, PathPointLayout, project_globally
+from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 
@@ -27,6 +27,6 @@ class PathProjector(ManifoldProjector):
         super().__init__(
             self.layout,
             lambda y_t, memory: evaluator(y_t, memory[0]),
-            lambda y_t: np.array([project_globally(path.position, y_t).theta]),
+            lambda y_t: np.array(evaluator.find(y_t)).ravel(),
             period,
         )

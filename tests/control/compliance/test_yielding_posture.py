@@ -27,7 +27,7 @@ def fixture_arm(load_robot, small_path):
     robot = load_robot("franka_emika_panda")
     q = np.array(BENT_7)
     y_t, _ = robot.tool_pose(np.concatenate([q, 0 * q]))
-    point = small_path.evaluator(2)(y_t.tolist(), small_path.project_globally(y_t).theta)
+    point = small_path.evaluator(2)(y_t.tolist(), small_path.nearest(y_t))
     return robot.chain, PathManifold(2, oriented=True), q, point
 
 

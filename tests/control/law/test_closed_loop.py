@@ -92,7 +92,7 @@ def test_euler_angles(name, convention, load_robot, make_law, virtual_output, or
     law = make_law(robot.chain, name, manifold=manifold)
 
     def output(path, y_t, R_e):
-        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        R_d = path.orientation.rotation_matrix(path.nearest(y_t))
         angles = euler_difference(R_e, R_d, convention)
         return np.append(virtual_output(path, y_t, R_e)[:3], angles)
 

@@ -122,7 +122,7 @@ def test_damping_tells_what_it_lets_the_outputs_miss(load_robot, make_law, posit
     q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])
     state = np.concatenate([q, 0.1 * q, q, 0.1 * q])
     y_t, _ = load_robot("comau_racer_1_4").tool_pose(state)
-    theta = position_path.project_globally(y_t).theta
+    theta = position_path.nearest(y_t)
     point = position_path.evaluator(2)(y_t.tolist(), theta)
     reference = np.zeros(9)
     posture = np.concatenate([q, np.zeros(12)])
@@ -153,7 +153,7 @@ def test_a_posture_far_away_asks_for_no_more_than_drives_can_do(
     q = np.array([0.2, 1.6, -0.5, 0.1, 1.2, 0.1])
     state = np.concatenate([q, 0.1 * q, q, 0.1 * q])
     y_t, _ = load_robot("comau_racer_1_4").tool_pose(state)
-    theta = position_path.project_globally(y_t).theta
+    theta = position_path.nearest(y_t)
     point = position_path.evaluator(2)(y_t.tolist(), theta)
 
     def result_of(law, q_0):

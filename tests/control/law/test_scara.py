@@ -81,7 +81,7 @@ def test_outputs_obey_the_predicted_linear_dynamics(
     outputs = []
     for x in states:
         y_t, R_e = robot.tool_pose(loop.state(x))
-        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        R_d = path.orientation.rotation_matrix(path.nearest(y_t))
         turn = Rotation.from_matrix(R_e @ R_d.T).as_rotvec()
         assert np.abs(turn[:2]).max() < 1e-7
         outputs.append([*virtual_output(path, y_t, R_e)[:3], turn[2]])

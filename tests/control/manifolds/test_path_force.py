@@ -34,7 +34,7 @@ def axis_output(virtual_output, C):
     """Return the virtual output with the two angles of the axis ``C e_x``."""
 
     def calc(path, y_t, R_e):
-        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        R_d = path.orientation.rotation_matrix(path.nearest(y_t))
         angles = Rotation.from_matrix(C.T @ R_d.T @ R_e @ C).as_euler("ZYX")
         return np.append(virtual_output(path, y_t, R_e)[:3], angles[:2])
 
@@ -45,7 +45,7 @@ def euler_output(virtual_output, convention):
     """Return the virtual output with differences of Euler angles."""
 
     def calc(path, y_t, R_e):
-        R_d = path.orientation.rotation_matrix(path.project_globally(y_t).theta)
+        R_d = path.orientation.rotation_matrix(path.nearest(y_t))
         angles = euler_difference(R_e, R_d, convention)
         return np.append(virtual_output(path, y_t, R_e)[:3], angles)
 

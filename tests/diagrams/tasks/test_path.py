@@ -82,7 +82,7 @@ def test_waypoints_are_visited(tmp_path, parametrization):
     path = make(shape, folder=tmp_path)
     assert not path.closed
     assert path.orientation is None
-    distance = [np.linalg.norm(positions(path, [path.project_globally(p).theta]) - p)
+    distance = [np.linalg.norm(positions(path, [path.nearest(p)]) - p)
                 for p in POSITIONS]  # fmt: skip
     assert max(distance) < 1e-12
     # a helix between its waypoints, too
@@ -167,7 +167,7 @@ def test_orientation_of_waypoints_or_keyframes(tmp_path):
     columns = ["x", "y", "z", "zyx_1", "zyx_2", "zyx_3"]
     write_csv(tmp_path, columns, np.hstack([POSITIONS, ZYX]))
     path = make(Waypoints("points.csv"), folder=tmp_path)
-    thetas = [path.project_globally(p).theta for p in POSITIONS]
+    thetas = [path.nearest(p) for p in POSITIONS]
     expected = Rotation.from_euler("ZYX", ZYX).as_matrix()
     np.testing.assert_allclose(path.orientation.rotation_matrix(thetas), expected, atol=1e-9)
     keyframe = Keyframe(0.0, [90.0, 0.0, 0.0])

@@ -1,10 +1,11 @@
 """Path quantities at each tick against the parts and quadrature."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from pfsc_drake.errors import InputError
@@ -14,10 +15,10 @@ from pfsc_drake.geometry import (
     Path,
     PathEvaluator,
     PiecewisePolynomialCurve,
-    Projection,
     ProjectionStatus,
     Projector,
     WaypointTable,
+    foot,
     interpolate,
     interpolate_orientation,
     path_from_waypoints,
@@ -92,13 +93,14 @@ def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
     rng = np.random.default_rng(17)
     begin, end = curve.domain
     size = np.abs(curve.derivatives(np.linspace(begin, end, 99), 4)).max(axis=(0, 2))
+    projector = Projector(curve)
     more = 2.0 * curve.period if path.closed else 0.0
     for _ in range(600):
         theta = rng.uniform(begin - more, end + more)
         sigma = curve.derivatives(theta, 0)[0]
         point = (sigma + rng.normal(size=3) * path.length * rng.choice([1e-3, 1e-2, 0.2])).tolist()
         guess = theta + rng.normal() * curve.period * rng.choice([0.0, 1e-6, 1e-3, 1e-2, 0.1])
-        expected = path.projector.project(point, guess)
+        expected = projector.project(point, guess)
         out = evaluator(point, guess)
         assert out[3] == (
             ProjectionStatus.BEYOND_END
@@ -119,16 +121,13 @@ def test_agrees_with_the_projector_wherever_the_guess_is(path: Path) -> None:
 
 @pytest.mark.parametrize("path", [OPEN, CLOSED, CIRCLE], ids=["open", "closed", "circle"])
 @pytest.mark.parametrize("speed", [0.0, 0.1, 1.5, -1.5])
-def test_ticks_of_a_motion_need_no_projector(path: Path, speed: float) -> None:
+def test_ticks_of_a_motion_need_no_long_way(
+    path: Path, speed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """At 1 ms the foot is found to rounding from the last one, piece after piece."""
-
-    class Refusing(Projector):
-        def project(self, point: Sequence[float], theta_guess: float) -> Projection:
-            raise AssertionError(f"theta = {theta_guess}")
-
+    monkeypatch.setattr(foot, "_MAX_STEPS", foot._TICK_STEPS)
     curve = path.position
-    parts = (curve, path.orientation, path.arc_length, path.frame, Refusing(curve))
-    evaluator = PathEvaluator(*parts, 2)
+    evaluator = PathEvaluator(curve, path.orientation, path.arc_length, path.frame, 2)
     eta = (0.5 if abs(speed) < 1.0 else 0.2 if speed > 0.0 else 0.8) * path.length
     theta = path.arc_length.parameter(eta)
     for tick in range(800):
@@ -137,7 +136,9 @@ def test_ticks_of_a_motion_need_no_projector(path: Path, speed: float) -> None:
         sigma = curve.derivatives(truth, 0)[0]
         turn = 0.01 * tick
         point = sigma + 0.01 * math.cos(turn) * e_perp + 0.02 * math.sin(turn) * e_cross
-        theta = evaluator(point.tolist(), theta)[0]
+        out = evaluator(point.tolist(), theta)
+        assert out[3] == ProjectionStatus.OK
+        theta = out[0]
         assert theta == pytest.approx(truth, abs=1e-13 * max(1.0, abs(truth)))
         eta += 1e-3 * speed
 
@@ -262,3 +263,39 @@ def test_the_normal_turns_with_every_lap_of_a_table_of_two(twisted: FourierCurve
         for out in (evaluator(sigma.tolist(), at + 1e-3), evaluator.evaluate_at(at)):
             np.testing.assert_allclose(out[evaluator.layout.normal], expected, atol=1e-10)
             assert out[1] == pytest.approx(path.arc_length(at), abs=1e-10)
+
+
+@pytest.mark.parametrize("path", [OPEN, CLOSED, WILD], ids=["open", "closed", "wild"])
+def test_the_nearest_place_of_all_is_found(path: Path) -> None:
+    evaluator, curve = path.evaluator(1), path.position
+    samples = curve.derivatives(np.linspace(*curve.domain, 4001), 0)[:, 0]
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        point = rng.choice(samples) + rng.normal(size=3) * path.length * rng.choice([1e-3, 0.02])
+        out = evaluator(point.tolist(), float(evaluator.find(point)))
+        reached = np.linalg.norm(point - out[evaluator.layout.position][:3])
+        assert reached < np.linalg.norm(samples - point, axis=1).min() + 1e-6 * path.length
+        if out[3] == ProjectionStatus.OK:
+            assert curve.domain[0] <= out[0] <= curve.domain[1]
+
+
+COORDINATE = st.floats(-0.5, 0.5)
+LEMNISCATE = Path(FourierCurve.bent_lemniscate())
+ALONG = np.linspace(*LEMNISCATE.position.domain, 20001)
+SAMPLES = LEMNISCATE.position.derivatives(ALONG, 0)[:, 0]
+
+
+@given(COORDINATE, COORDINATE, COORDINATE)
+@settings(max_examples=60, deadline=None)
+def test_the_nearest_place_on_a_curve_that_crosses_itself(x: float, y: float, z: float) -> None:
+    # Not on the curve's planes of symmetry, where two minima are equal or merge.
+    point = np.array([0.7013 + x, 0.2007 + y, 1.153 + z])
+    sigma = LEMNISCATE.position.derivatives(LEMNISCATE.nearest(point), 0)[0]
+    least = np.linalg.norm(SAMPLES - point, axis=1).min()
+    assert np.linalg.norm(sigma - point) <= least + 1e-12
+
+
+def test_a_place_is_found_for_what_is_not_finite() -> None:
+    """It must be a number, whichever: the projection tells that the point is nowhere."""
+    for value in (math.nan, math.inf, -math.inf, 1e300):
+        assert math.isfinite(CLOSED.evaluator(1).find([0.0, value, 0.0]))

@@ -121,4 +121,4 @@ def test_initial_normal_and_projection_are_passed_on() -> None:
     line = PiecewisePolynomialCurve.line([0, 0, 0], [2, 0, 0])
     path = Path(line, initial_normal=[0, 1, 0])
     np.testing.assert_allclose(path.evaluator(1).evaluate_at(0.3)[4:7], [0, 1, 0])
-    assert path.project_globally([1.5, 1, 1]).theta == pytest.approx(1.5)
+    assert path.nearest([1.5, 1, 1]) == pytest.approx(1.5)

@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     FourierCurve,
     PiecewisePolynomialCurve,
     Projector,
     interpolate,
-    project_globally,
 )
 from pfsc_drake.geometry.curves.curve import Curve
 
@@ -26,40 +24,6 @@ def _spline(seed: int, closed: bool = False) -> PiecewisePolynomialCurve:
     angle = np.linspace(0, 5.5, 10)
     points = np.stack([np.cos(angle), np.sin(angle), 0.1 * angle], axis=1)
     return interpolate(points + 0.1 * rng.normal(size=points.shape), smoothness=3, closed=closed)
-
-
-def _check_against_samples(curve: Curve, point: np.ndarray) -> None:
-    result = project_globally(curve, point)
-    theta = np.linspace(*curve.domain, 20001)
-    least = np.linalg.norm(curve.derivatives(theta, 0)[:, 0] - point, axis=1).min()
-    sigma, first, second = curve.derivatives(result.theta, 2)
-    found = np.linalg.norm(point - sigma)
-    assert result.converged
-    assert found <= least + 1e-12
-    slope = (point - sigma) @ first / (first @ first)
-    assert result.alpha == pytest.approx((point - sigma) @ second / (first @ first), abs=1e-8)
-    if result.at_end:
-        assert result.theta in curve.domain
-        assert slope * (1.0 if result.theta == curve.domain[1] else -1.0) > 0.0
-    else:
-        assert abs(slope) < 1e-10
-        assert result.alpha < 1.0
-
-
-@given(COORDINATE, COORDINATE, COORDINATE)
-@settings(max_examples=60, deadline=None)
-def test_global_projection_on_the_lemniscate(x: float, y: float, z: float) -> None:
-    # Not on the curve's planes of symmetry, where two minima are equal or merge.
-    point = np.array([0.7013 + x, 0.2007 + y, 1.153 + z])
-    _check_against_samples(LEMNISCATE, point)
-
-
-@given(st.integers(0, 20), COORDINATE, COORDINATE, COORDINATE, st.booleans())
-@settings(max_examples=60, deadline=None)
-def test_global_projection_on_splines(
-    seed: int, x: float, y: float, z: float, closed: bool
-) -> None:
-    _check_against_samples(_spline(seed, closed), np.array([2 * x, 2 * y, z]))
 
 
 def _beside(curve: Curve, theta: float, distance: float, angle: float) -> np.ndarray:
@@ -232,7 +196,7 @@ def test_maximum_is_left() -> None:
 
 def test_other_dimensions() -> None:
     plane = FourierCurve([0.0, 0.0], [[2.0, 0.0]], [[0.0, 1.0]])
-    result = project_globally(plane, [5.0, 0.0])
+    result = Projector(plane).project([5.0, 0.0], 0.3)
     assert result.theta % (2 * math.pi) == pytest.approx(0.0, abs=1e-10)
     four = PiecewisePolynomialCurve.line([0, 0, 0, 0], [1, 1, 1, 1])
     assert Projector(four).project([1.0, 0, 0, 0], 0.1).theta == pytest.approx(0.5, abs=1e-12)
@@ -246,11 +210,3 @@ def test_input_that_is_not_finite_does_not_raise(closed: bool, bad: float) -> No
     assert not projector.project([0.0, bad, 0.0], 1.0).converged
     assert not projector.project([0.0, 0.0, 0.0], bad).converged
     assert not Projector(LEMNISCATE).project([0.0, 0.0, 0.0], bad).converged
-    assert not project_globally(curve, [0.0, bad, 0.0]).converged
-
-
-def test_errors() -> None:
-    with pytest.raises(InputError, match=r"point: shape \(2,\); \(3,\)"):
-        project_globally(LEMNISCATE, [0.0, 0.0])
-    with pytest.raises(InputError, match="samples: 2"):
-        project_globally(LEMNISCATE, [0.0, 0.0, 0.0], samples=2)

@@ -57,7 +57,7 @@ def test_derivatives_are_those_of_the_way(path: Path, order: int, end: int) -> N
     away = sign * inside[layout.position][3:6] * path.position.period
     length = abs(evaluator((inside[layout.position][:3] + away).tolist(), end_theta)[0] - end_theta)
     thetas = end_theta + sign * np.linspace(0.0, length, 401)
-    points = np.array([evaluator._at(theta) for theta in thetas])
+    points = np.array([evaluator.at(theta) for theta in thetas])[..., 0]
     h = thetas[1] - thetas[0]
     for place, size in ((layout.position, 3), (layout.quaternion, 4)):
         rows = points[:, place].reshape(len(thetas), -1, size)
@@ -67,7 +67,7 @@ def test_derivatives_are_those_of_the_way(path: Path, order: int, end: int) -> N
             assert np.abs(slope - rows[1:-1, k + 1]).max() < 2e-3 * scale, (place, k)
 
     def speed(theta: float) -> float:
-        return float(np.linalg.norm(evaluator._at(theta)[layout.position][3:6]))
+        return float(np.linalg.norm(np.array(evaluator.at(theta))[layout.position][3:6]))
 
     way = quad(speed, end_theta, thetas[-1], epsabs=1e-12)[0]
     assert points[-1, 1] - points[0, 1] == pytest.approx(way, abs=1e-10)

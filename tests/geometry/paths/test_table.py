@@ -70,35 +70,7 @@ def test_rows_agree_with_the_parts(
     assert not table.rows[:, [0, 2, 3]].any()
 
 
-@pytest.mark.parametrize("shift", [0.0, 100.0])
-@pytest.mark.parametrize("name", ["twisted", "bumps", "open_spline"])
-def test_slopes_agree_with_the_product(
-    name: str, shift: float, request: pytest.FixtureRequest
-) -> None:
-    """(sigma - y) . sigma' itself, on a path near the origin and on one far away."""
-    curve = request.getfixturevalue(name)
-    if shift and isinstance(curve, FourierCurve):
-        curve = FourierCurve(curve.constant + shift, curve.cosine, curve.sine)
-    elif shift:
-        moved = curve.coefficients.copy()
-        moved[:, 0] += shift
-        curve = PiecewisePolynomialCurve(curve.breakpoints, moved)
-    table, _ = _table(Path(curve), 2)
-    rng = np.random.default_rng(1)
-    theta = rng.uniform(*curve.domain, 1000)
-    sigma, tangent = curve.derivatives(theta, 1).transpose(1, 0, 2)
-    y = sigma + 0.05 * rng.normal(size=sigma.shape)
-    piece = np.searchsorted(table.breakpoints[1:-1], theta, side="right")
-    powers = (theta - table.breakpoints[piece])[:, None] ** np.arange(8)
-    ones_y = np.column_stack([np.ones(len(y)), y])
-    found = np.einsum("mj,mji,mi->m", powers, table.slopes[piece], ones_y)
-    size = np.linalg.norm(tangent, axis=1).max()
-    expected = np.sum((sigma - y) * tangent, axis=1)
-    np.testing.assert_allclose(found, expected, atol=(1e-12 + 1e-14 * shift) * size)
-
-
 def test_a_polynomial_path_is_tabulated_exactly() -> None:
-    """On a spline of degree 4 even the slope, of degree 7, is no approximation."""
     rng = np.random.default_rng(5)
     curve = interpolate(np.cumsum(rng.uniform(0.1, 0.2, (9, 3)), axis=0), smoothness=3)
     table, layout = _table(Path(curve), 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve
+from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, Projector
 from pfsc_drake.geometry.paths.target import PathTarget
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
 
@@ -24,7 +24,7 @@ def test_the_projection_gives_the_coordinates_back(path, target, eta):
     coordinates = np.array([eta, 0.012, -0.02])
     p, _ = target(coordinates, np.zeros(3))
     theta = path.arc_length.parameter(eta)
-    projection = path.projector.project(p.tolist(), theta + 0.01)
+    projection = Projector(path.position).project(p.tolist(), theta + 0.01)
     assert projection.theta == pytest.approx(theta, abs=1e-9)
     sigma, slope = path.position.derivatives(theta, 1)
     assert np.linalg.norm(p - sigma) == pytest.approx(np.hypot(0.012, -0.02), rel=1e-9)
