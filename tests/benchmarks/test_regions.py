@@ -5,6 +5,7 @@ Run with ``pytest tests/benchmarks --benchmark-enable``; otherwise every benchma
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -34,7 +35,7 @@ class Swinging:
     largest_rate = 0.1
 
     def at(self, clock):
-        return 0.02 * math.sin(5.0 * clock)
+        return 0.02 * ca.sin(5.0 * clock)
 
 
 def _hills():

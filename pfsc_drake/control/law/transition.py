@@ -6,7 +6,7 @@ from pfsc_drake.errors import InputError
 
 # from 0 to 1 on a unit interval with four derivatives that vanish at both ends, so that the
 # reference of the elastic law, which needs four (3.67), is steady
-_STEP = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
+RISE = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
 _HIGHEST_ORDER = 4
 
 
@@ -34,7 +34,7 @@ class Transition:
         if not 0 <= order <= _HIGHEST_ORDER:
             raise InputError(f"transition: order {order}; must be 0 to {_HIGHEST_ORDER}")
         self.duration, self.order = duration, order
-        rest = 1.0 - _STEP
+        rest = 1.0 - RISE
         derivatives = [rest.deriv(k).coef if k else rest.coef for k in range(order + 1)]
         # column k holds the k-th derivative's coefficients, in real time
         self._coefficients = np.zeros((rest.coef.size, order + 1))

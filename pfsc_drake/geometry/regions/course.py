@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.errors import InputError
@@ -20,8 +21,8 @@ class Course(Protocol):
 
     largest_rate: float
 
-    def at(self, clock: float) -> float:
-        """Value at a time of the clock [s], m or rad."""
+    def at(self, clock: ca.MX) -> ca.MX:
+        """Value at a time of the clock [s], m or rad, as an expression."""
 
 
 class CurveCourse:
@@ -48,7 +49,8 @@ class CurveCourse:
         self._begin, self._end = curve.domain
         self._period = curve.period
         self._repeat = repeat
-        self._sample = curve.flat_sampler(0)
+        self._breakpoints = ca.DM(curve.breakpoints)
+        self._powers = [ca.DM(powers) for powers in curve.coefficients[..., 0].T]
         ends = curve.derivatives(np.array(curve.domain), 2)[..., 0]
         extent = np.ptp(curve.derivatives(np.linspace(*curve.domain, 1001), 0))
         scales = extent / self._period ** np.arange(3)
@@ -65,11 +67,17 @@ class CurveCourse:
             )
         self.largest_rate = _largest_rate(curve)
 
-    def at(self, clock: float) -> float:
+    def at(self, clock: ca.MX) -> ca.MX:
         """See :class:`Course`."""
         if self._repeat:
-            clock = self._begin + (clock - self._begin) % self._period
-        return float(self._sample(min(max(clock, self._begin), self._end))[0])
+            laps = ca.floor((clock - self._begin) / self._period)
+            clock = clock - laps * self._period
+        clock = ca.fmin(ca.fmax(clock, self._begin), self._end)
+        piece = ca.low(self._breakpoints, clock)
+        u, value = clock - ca.MX(self._breakpoints)[piece], ca.MX(0.0)
+        for coefficient in reversed(self._powers):
+            value = value * u + ca.MX(coefficient)[piece]
+        return value
 
 
 def _largest_rate(curve: PiecewisePolynomialCurve) -> float:

@@ -1,45 +1,57 @@
 """Regions that move as it is prescribed, by a clock of their own."""
 
-import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.geometry.regions.course import Course
-from pfsc_drake.geometry.regions.placement import Triple, axes_along, checked_point
+from pfsc_drake.geometry.regions.placement import axes_along, checked_point
 from pfsc_drake.geometry.regions.region import Distance, Region
 
 
 class MovingRegion(ABC):
-    """An admissible region whose boundary moves.
+    """An admissible region whose boundary moves, as a rigid body that follows a course.
 
-    At any time of its clock the distance is as that of a :class:`Region`.
+    At any time of its clock the distance is as that of a :class:`Region`. What is said of its
+    motion are expressions.
+
+    Args:
+        region: Where it is while its course is zero.
+        course: Over the clock.
     """
 
+    def __init__(self, region: Region, course: Course) -> None:
+        self._region, self._course = region, course
+
     @abstractmethod
-    def distance_at(self, x: float, y: float, z: float, clock: float) -> Distance:
-        """Signed distance to the boundary where it is at a time of the clock.
+    def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
+        """Where a point is, as seen from what moves, while its course is zero, [3], m.
 
         Args:
-            x: Of the tool point, world axes, finite, m.
-            y: See x.
-            z: See x.
+            point: World axes, [3], m.
             clock: s.
-
-        Returns:
-            See :meth:`Region.distance`.
         """
 
     @abstractmethod
-    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
-        """Way from one time of the clock to another of what moves with the region, m.
+    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
+        """Where a vector points that moves with the region, [3].
 
         Args:
-            x: Where it is at first, world axes, m.
-            y: See x.
-            z: See x.
+            vector: While the course is zero, [3].
+            clock: s.
+        """
+
+    @abstractmethod
+    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """Way from one time of the clock to another of what moves with the region, [3], m.
+
+        Args:
+            point: Where it is at first, world axes, [3], m.
             clock: s.
             clock_next: s.
         """
@@ -56,7 +68,77 @@ class MovingRegion(ABC):
             radius: m.
         """
 
-    @abstractmethod
+    @cached_property
+    def signed_distance(self) -> ca.Function:
+        """The function ``(point, clock) -> (h, n)``, see :attr:`Region.signed_distance`.
+
+        Raises:
+            InputError: The distance is no expression; says why.
+        """
+        point, clock = ca.MX.sym("point", 3), ca.MX.sym("clock")
+        h, n = self._region.signed_distance(self.at_rest(point, clock))
+        return ca.Function(
+            "signed_distance",
+            [point, clock],
+            [h, self.turned(n, clock)],
+            ["point", "clock"],
+            ["h", "n"],
+        )
+
+    @cached_property
+    def signed_distances(self) -> ca.Function:
+        """:meth:`distances_over` of symbols: ``(point, clock, clock_next) -> (h, h_next, n)``.
+
+        Raises:
+            InputError: The distance is no expression; says why.
+        """
+        point, now, then = _point_and_clocks()
+        h_next, n = self.signed_distance(point, then)
+        h = h_next + ca.dot(n, self.way(point, now, then))
+        return ca.Function(
+            "signed_distances",
+            [point, now, then],
+            [h, h_next, n],
+            ["point", "clock", "clock_next"],
+            ["h", "h_next", "n"],
+        )
+
+    def distance_at(self, x: float, y: float, z: float, clock: float) -> Distance:
+        """Signed distance to the boundary where it is at a time of the clock.
+
+        Args:
+            x: Of the tool point, world axes, finite, m.
+            y: See x.
+            z: See x.
+            clock: s.
+
+        Returns:
+            See :meth:`Region.distance`.
+        """
+        h, *n = self._region.distance(*self._at_rest(x, y, z, clock))
+        return h, *self._turned(*n, clock)
+
+    def distances_over(
+        self, x: float, y: float, z: float, clock: float, clock_next: float
+    ) -> Distance:
+        """Signed distances before and after the boundary moves on.
+
+        Of the surface that will be the nearest, which may be another one than that now.
+
+        Args:
+            x: Of the tool point, which rests, world axes, finite, m.
+            y: See x.
+            z: See x.
+            clock: s.
+            clock_next: s.
+
+        Returns:
+            h before and after, m, and n after.
+        """
+        h_next, n_x, n_y, n_z = self.distance_at(x, y, z, clock_next)
+        w_x, w_y, w_z = self._way(x, y, z, clock, clock_next)
+        return h_next + n_x * w_x + n_y * w_y + n_z * w_z, h_next, n_x, n_y, n_z
+
     def placement(self, clock: float) -> tuple[np.ndarray, np.ndarray]:
         """Where what moves with the region is, as seen from where it is at rest.
 
@@ -66,6 +148,21 @@ class MovingRegion(ABC):
         Returns:
             Rotation R, [3, 3], and way p, [3], m: a point y at rest has come to R y + p.
         """
+        rotation = np.array([self._turned(*axis, clock) for axis in np.eye(3)]).T
+        return rotation, -rotation @ self._at_rest(0.0, 0.0, 0.0, clock)
+
+    @cached_property
+    def _at_rest(self) -> PlainFunction:
+        return PlainFunction(_function_of_clock("at_rest", self.at_rest))
+
+    @cached_property
+    def _turned(self) -> PlainFunction:
+        return PlainFunction(_function_of_clock("turned", self.turned))
+
+    @cached_property
+    def _way(self) -> PlainFunction:
+        given = _point_and_clocks()
+        return PlainFunction(ca.Function("way", given, [self.way(*given)]))
 
 
 class ShiftedRegion(MovingRegion):
@@ -81,29 +178,24 @@ class ShiftedRegion(MovingRegion):
     """
 
     def __init__(self, region: Region, course: Course, direction: ArrayLike) -> None:
-        self._distance, self._course = region.distance, course
-        a, b, c = axes_along(direction)[2].tolist()
-        self._direction = a, b, c
+        super().__init__(region, course)
+        self._direction = ca.DM(axes_along(direction)[2])
 
-    def distance_at(self, x: float, y: float, z: float, clock: float) -> Distance:
+    def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
         """See the base class."""
-        way = self._course.at(clock)
-        a, b, c = self._direction
-        return self._distance(x - way * a, y - way * b, z - way * c)
+        return point - self._course.at(clock) * self._direction
 
-    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
+    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
         """See the base class."""
-        way = self._course.at(clock_next) - self._course.at(clock)
-        a, b, c = self._direction
-        return way * a, way * b, way * c
+        return vector
+
+    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """See the base class."""
+        return (self._course.at(clock_next) - self._course.at(clock)) * self._direction
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
         """See the base class."""
         return self._course.largest_rate
-
-    def placement(self, clock: float) -> tuple[np.ndarray, np.ndarray]:
-        """See the base class."""
-        return np.eye(3), self._course.at(clock) * np.array(self._direction)
 
 
 class TurningRegion(MovingRegion):
@@ -120,43 +212,41 @@ class TurningRegion(MovingRegion):
     """
 
     def __init__(self, region: Region, course: Course, point: ArrayLike, axis: ArrayLike) -> None:
-        self._distance, self._course = region.distance, course
-        self._point = checked_point("point", point)
+        super().__init__(region, course)
+        self._point = np.array(checked_point("point", point))
         self._axes = axes_along(axis)
-        self._flat = tuple(self._axes.ravel().tolist())
 
-    def distance_at(self, x: float, y: float, z: float, clock: float) -> Distance:
+    def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
         """See the base class."""
-        angle = self._course.at(clock)
-        cosine, sine = math.cos(angle), math.sin(angle)
-        a, b, c = self._point
-        x, y, z = self._turned(x - a, y - b, z - c, cosine, -sine)
-        h, x, y, z = self._distance(x + a, y + b, z + c)
-        return h, *self._turned(x, y, z, cosine, sine)
+        return self._point + self._rotated(point - self._point, -self._course.at(clock))
 
-    def way(self, x: float, y: float, z: float, clock: float, clock_next: float) -> Triple:
+    def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
         """See the base class."""
-        angle = self._course.at(clock_next) - self._course.at(clock)
-        a, b, c = self._point
-        x, y, z = x - a, y - b, z - c
-        a, b, c = self._turned(x, y, z, math.cos(angle), math.sin(angle))
-        return a - x, b - y, c - z
+        return self._rotated(vector, self._course.at(clock))
+
+    def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
+        """See the base class."""
+        away, angle = point - self._point, self._course.at(clock_next) - self._course.at(clock)
+        return self._rotated(away, angle) - away
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
         """See the base class."""
         away = self._axes[:2] @ (np.asarray(centre, dtype=float) - self._point)
         return self._course.largest_rate * (float(np.linalg.norm(away)) + radius)
 
-    def placement(self, clock: float) -> tuple[np.ndarray, np.ndarray]:
-        """See the base class."""
-        rotation = Rotation.from_rotvec(self._course.at(clock) * self._axes[2]).as_matrix()
-        return rotation, self._point - rotation @ self._point
-
-    def _turned(
-        self, x: float, y: float, z: float, cosine: float, sine: float
-    ) -> tuple[float, float, float]:
+    def _rotated(self, vector: ca.MX, angle: ca.MX) -> ca.MX:
         """A vector turned about the axis by an angle."""
-        ax, ay, az, bx, by, bz, _, _, _ = self._flat
-        a, b = ax * x + ay * y + az * z, bx * x + by * y + bz * z
-        da, db = cosine * a - sine * b - a, sine * a + cosine * b - b
-        return x + da * ax + db * bx, y + da * ay + db * by, z + da * az + db * bz
+        across = ca.DM(self._axes[:2])
+        u, v = ca.vertsplit(across @ vector)
+        cosine, sine = ca.cos(angle), ca.sin(angle)
+        change = ca.vertcat(cosine * u - sine * v - u, sine * u + cosine * v - v)
+        return vector + across.T @ change
+
+
+def _point_and_clocks() -> list[ca.MX]:
+    return [ca.MX.sym("point", 3), ca.MX.sym("clock"), ca.MX.sym("clock_next")]
+
+
+def _function_of_clock(name: str, expression: Callable[[ca.MX, ca.MX], ca.MX]) -> ca.Function:
+    point, clock, _ = _point_and_clocks()
+    return ca.Function(name, [point, clock], [expression(point, clock)])

@@ -1,14 +1,16 @@
 """Obstacles bounded by planes."""
 
 import math
+from functools import reduce
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.placement import Triple
-from pfsc_drake.geometry.regions.region import Distance, Region
+from pfsc_drake.geometry.regions.region import FormulaRegion, direction
 from pfsc_drake.geometry.surfaces.placement import checked_placement
 
 # Planes whose coefficients differ by less are one, m.
@@ -16,7 +18,7 @@ _SAME = 1e-9
 _ROUNDING = 1e-12
 
 
-class PolyhedronRegion(Region):
+class PolyhedronRegion(FormulaRegion):
     """What lies outside a convex polyhedron.
 
     The largest of the distances from its planes is the distance where the foot is on a face;
@@ -50,7 +52,8 @@ class PolyhedronRegion(Region):
             number.append(same[0] if same else len(planes))
             if not same:
                 planes.append(equation)
-        self._planes = [(float(a), float(b), float(c), float(d)) for a, b, c, d in planes]
+        # of planes that are as near the last one counts
+        self._planes = sorted((float(a), float(b), float(c), float(d)) for a, b, c, d in planes)
         edges = {
             tuple(sorted(set(simplex.tolist()) - {int(simplex[k])}))
             for face, simplex in enumerate(hull.simplices)
@@ -59,31 +62,30 @@ class PolyhedronRegion(Region):
         }
         self._edges = [_edge(points[a], points[b]) for a, b in sorted(edges)]
 
-    def distance(self, x: float, y: float, z: float) -> Distance:
+    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
         """See the base class."""
-        h, n_x, n_y, n_z = max(
-            [(a * x + b * y + c * z + d, a, b, c) for a, b, c, d in self._planes]
-        )
-        if h <= 0.0:
-            return h, n_x, n_y, n_z
-        u, v, w = x - h * n_x, y - h * n_y, z - h * n_z
-        for a, b, c, d in self._planes:
-            if a * u + b * v + c * w + d > _ROUNDING:
-                return self._from_edges(x, y, z)
-        return h, n_x, n_y, n_z
+        heights = [a * point[0] + b * point[1] + c * point[2] + d for a, b, c, d in self._planes]
+        h, n = heights[0], ca.SX(self._planes[0][:3])
+        for height, plane in zip(heights[1:], self._planes[1:], strict=True):
+            n = ca.if_else(height >= h, ca.DM(plane[:3]), n)
+            h = ca.fmax(h, height)
+        foot = point - h * n
+        over = [a * foot[0] + b * foot[1] + c * foot[2] + d for a, b, c, d in self._planes]
+        on_face = ca.logic_or(h <= 0.0, reduce(ca.fmax, over) <= _ROUNDING)
+        away, outwards = direction(self._from_edges(point), (1.0, 0.0, 0.0))
+        return ca.if_else(on_face, h, away), ca.if_else(on_face, n, outwards)
 
-    def _from_edges(self, x: float, y: float, z: float) -> Distance:
-        """Distance of a point outside whose foot is on an edge or a corner."""
-        least, best = math.inf, (0.0, 0.0, 0.0)
-        for (a, b, c), (t_x, t_y, t_z), length in self._edges:
-            a, b, c = x - a, y - b, z - c
-            along = min(max(a * t_x + b * t_y + c * t_z, 0.0), length)
-            a, b, c = a - along * t_x, b - along * t_y, c - along * t_z
-            square = a * a + b * b + c * c
-            if square < least:
-                least, best = square, (a, b, c)
-        h = math.sqrt(least)
-        return h, best[0] / h, best[1] / h, best[2] / h
+    def _from_edges(self, point: ca.SX) -> ca.SX:
+        """Way from the nearest place of all edges."""
+        least, nearest = ca.SX(math.inf), ca.SX.zeros(3)
+        for begin, tangent, length in self._edges:
+            way = point - ca.DM(begin)
+            along = ca.fmin(ca.fmax(ca.dot(ca.DM(tangent), way), 0.0), length)
+            way -= along * ca.DM(tangent)
+            square = ca.dot(way, way)
+            nearest = ca.if_else(square < least, way, nearest)
+            least = ca.fmin(square, least)
+        return nearest
 
 
 def box_corners(size: ArrayLike, centre: ArrayLike, rotation: ArrayLike | None) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_right
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,9 +11,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.paths.projection import Projector
 from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
-from pfsc_drake.geometry.regions.placement import axes_along
+from pfsc_drake.geometry.regions.placement import axes_along, checked_point
 from pfsc_drake.geometry.regions.region import Distance, Region
-from pfsc_drake.geometry.regions.shapes import Meridian, TurnedRegion
 
 # Of the tangent on a piece, rad, and most pieces of a cell.
 _TURNING = 0.12
@@ -104,7 +103,19 @@ class PlaneCurve:
         return _CurveFoot(away, piece, bool(along < 0.0), signed)
 
 
-class ExtrudedRegion(Region):
+class ProfileRegion(Region):
+    """What lies on one side of a profile that is swept through space."""
+
+    @property
+    def signed_distance(self) -> NoReturn:
+        """See the base class."""
+        raise InputError(
+            "profile: its nearest place is searched for, in as many steps as that takes; no formula"
+            " has it"
+        )
+
+
+class ExtrudedRegion(ProfileRegion):
     """What lies on one side of a profile that is moved along a line without end.
 
     Both ends of an open profile go on straight.
@@ -142,7 +153,7 @@ class ExtrudedRegion(Region):
         return sign * h, a * ax + b * bx, a * ay + b * by, a * az + b * bz
 
 
-class RevolvedRegion(TurnedRegion):
+class RevolvedRegion(ProfileRegion):
     """What lies on one side of a profile that is turned about an axis.
 
     Both ends of an open profile go on straight, to the axis or without end.
@@ -168,13 +179,27 @@ class RevolvedRegion(TurnedRegion):
         *,
         inside: bool,
     ) -> None:
-        super().__init__(origin, axis, inside=False)
+        self._origin = checked_point("origin", origin)
+        self._axes = tuple(axes_along(axis).ravel().tolist())
         self._curve = PlaneCurve(profile, ends_at_axis=True)
         self._sign = _right_sign(self._curve, profile.closed, inside)
 
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def distance(self, x: float, y: float, z: float) -> Distance:
         """See the base class."""
-        return self._curve(rho, height)
+        a, b, c = self._origin
+        x, y, z = x - a, y - b, z - c
+        ax, ay, az, bx, by, bz, cx, cy, cz = self._axes
+        a, b, c = ax * x + ay * y + az * z, bx * x + by * y + bz * z, cx * x + cy * y + cz * z
+        rho = math.sqrt(a * a + b * b)
+        h, radial, axial = self._curve(rho, c)
+        radial, axial = self._sign * radial, self._sign * axial
+        a, b = (radial * a / rho, radial * b / rho) if rho else (radial, 0.0)
+        return (
+            self._sign * h,
+            a * ax + b * bx + axial * cx,
+            a * ay + b * by + axial * cy,
+            a * az + b * bz + axial * cz,
+        )
 
 
 class _CurveFoot(NamedTuple):

@@ -1,8 +1,15 @@
 """Admissible regions: what every one of them offers."""
 
+import math
 from abc import ABC, abstractmethod
+from functools import cached_property
 
-Distance = tuple[float, float, float, float]
+import casadi as ca
+
+from pfsc_drake.compiled.plain_function import PlainFunction
+
+Distance = tuple[float, ...]
+Symbol = ca.SX | ca.MX
 
 
 class Region(ABC):
@@ -23,6 +30,66 @@ class Region(ABC):
 
         Returns:
             h, m, and its gradient, the unit normal n at the foot into the admissible region, as
-            plain floats: in a tick of 1 ms an array costs more than the formula. Where several
-            points of the boundary are the nearest, that of one of them, always the same.
+            plain floats. Where several points of the boundary are the nearest, that of one of them,
+            always the same.
         """
+
+    @property
+    @abstractmethod
+    def signed_distance(self) -> ca.Function:
+        """The same of symbols or numbers, a function ``(point) -> (h, n)``.
+
+        Of a point that is not finite h is no number.
+
+        Raises:
+            InputError: The distance is no expression; says why.
+        """
+
+
+class FormulaRegion(Region):
+    """A region whose distance is an expression."""
+
+    @abstractmethod
+    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Signed distance and normal as expressions.
+
+        Args:
+            point: The tool point, world axes, [3], m.
+
+        Returns:
+            h, m, and n, [3], see :meth:`Region.distance`.
+        """
+
+    @cached_property
+    def signed_distance(self) -> ca.Function:
+        """See the base class."""
+        point = ca.SX.sym("point", 3)
+        h, n = self.formula(point)
+        is_finite = ca.dot(point, point) < math.inf
+        return ca.Function(
+            "signed_distance",
+            [point],
+            [ca.if_else(is_finite, h, math.nan), n],
+            ["point"],
+            ["h", "n"],
+        )
+
+    @cached_property
+    def _distance(self) -> PlainFunction:
+        return PlainFunction(self.signed_distance)
+
+    def distance(self, x: float, y: float, z: float) -> Distance:
+        """See the base class."""
+        return self._distance(x, y, z)
+
+
+def direction(vector: ca.SX, otherwise: tuple[float, ...]) -> tuple[ca.SX, ca.SX]:
+    """Length and unit vector of a vector.
+
+    Args:
+        vector: [n].
+        otherwise: The unit vector of one without length, [n].
+    """
+    length = ca.norm_2(vector)
+    some = length > 0.0
+    return length, ca.if_else(some, vector / ca.if_else(some, length, 1.0), ca.DM(otherwise))

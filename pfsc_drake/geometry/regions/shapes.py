@@ -3,19 +3,22 @@
 import math
 from abc import abstractmethod
 
+import casadi as ca
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.placement import axes_along, checked_length, checked_point
-from pfsc_drake.geometry.regions.region import Distance, Region
+from pfsc_drake.geometry.regions.region import FormulaRegion, direction
 
 # A bound, safe from rounding errors.
 _ABOVE = 1.0 + 1e-15
+# Newton's steps to the foot on a paraboloid, from 1e-12 to 1e12 in p and q.
+_STEPS = 8
 
-Meridian = tuple[float, float, float]
+Meridian = tuple[ca.SX, ca.SX, ca.SX]
 
 
-class HalfSpace(Region):
+class HalfSpace(FormulaRegion):
     """The side of a plane that a normal points to.
 
     Args:
@@ -27,17 +30,15 @@ class HalfSpace(Region):
     """
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
-        a, b, c = axes_along(normal)[2].tolist()
-        x, y, z = checked_point("point", point)
-        self._normal, self._offset = (a, b, c), a * x + b * y + c * z
+        self._normal = ca.DM(axes_along(normal)[2])
+        self._point = ca.DM(checked_point("point", point))
 
-    def distance(self, x: float, y: float, z: float) -> Distance:
+    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
         """See the base class."""
-        a, b, c = self._normal
-        return a * x + b * y + c * z - self._offset, a, b, c
+        return ca.dot(self._normal, point - self._point), ca.SX(self._normal)
 
 
-class SphereRegion(Region):
+class SphereRegion(FormulaRegion):
     """What lies inside or outside a sphere.
 
     Args:
@@ -50,23 +51,17 @@ class SphereRegion(Region):
     """
 
     def __init__(self, centre: ArrayLike, radius: float, *, inside: bool) -> None:
-        self._centre = checked_point("centre", centre)
+        self._centre = ca.DM(checked_point("centre", centre))
         self._radius = checked_length("radius", radius)
         self._sign = -1.0 if inside else 1.0
 
-    def distance(self, x: float, y: float, z: float) -> Distance:
+    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
         """See the base class."""
-        a, b, c = self._centre
-        x, y, z = x - a, y - b, z - c
-        length = math.sqrt(x * x + y * y + z * z)
-        sign = self._sign
-        if not length:
-            return -sign * self._radius, sign, 0.0, 0.0
-        scale = sign / length
-        return sign * (length - self._radius), scale * x, scale * y, scale * z
+        away, outwards = direction(point - self._centre, (1.0, 0.0, 0.0))
+        return self._sign * (away - self._radius), self._sign * outwards
 
 
-class TurnedRegion(Region):
+class TurnedRegion(FormulaRegion):
     """What lies inside or outside a surface of revolution.
 
     Args:
@@ -79,12 +74,12 @@ class TurnedRegion(Region):
     """
 
     def __init__(self, origin: ArrayLike, axis: ArrayLike, *, inside: bool) -> None:
-        self._origin = checked_point("origin", origin)
-        self._axes = tuple(axes_along(axis).ravel().tolist())
+        self._origin = ca.DM(checked_point("origin", origin))
+        self._axes = ca.DM(axes_along(axis))
         self._sign = -1.0 if inside else 1.0
 
     @abstractmethod
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
         """Distance in a half-plane that ends at the axis.
 
         Args:
@@ -96,27 +91,12 @@ class TurnedRegion(Region):
             rho and the height.
         """
 
-    def distance(self, x: float, y: float, z: float) -> Distance:
+    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
         """See the base class."""
-        a, b, c = self._origin
-        x, y, z = x - a, y - b, z - c
-        ax, ay, az, bx, by, bz, cx, cy, cz = self._axes
-        a, b, c = ax * x + ay * y + az * z, bx * x + by * y + bz * z, cx * x + cy * y + cz * z
-        rho = math.sqrt(a * a + b * b)
-        h, radial, axial = self.meridian(rho, c)
-        sign = self._sign
-        axial *= sign
-        if rho:
-            radial *= sign / rho
-            a, b = radial * a, radial * b
-        else:
-            a = sign * radial
-        return (
-            sign * h,
-            a * ax + b * bx + axial * cx,
-            a * ay + b * by + axial * cy,
-            a * az + b * bz + axial * cz,
-        )
+        local = self._axes @ (point - self._origin)
+        rho, outwards = direction(local[:2], (1.0, 0.0))
+        h, radial, axial = self.meridian(rho, local[2])
+        return self._sign * h, self._sign * (self._axes.T @ ca.vertcat(radial * outwards, axial))
 
 
 class CylinderRegion(TurnedRegion):
@@ -136,9 +116,9 @@ class CylinderRegion(TurnedRegion):
         super().__init__(origin, axis, inside=inside)
         self._radius = checked_length("radius", radius)
 
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
         """See the base class."""
-        return rho - self._radius, 1.0, 0.0
+        return rho - self._radius, ca.SX(1.0), ca.SX(0.0)
 
 
 class ConeRegion(TurnedRegion):
@@ -164,15 +144,16 @@ class ConeRegion(TurnedRegion):
             )
         self._slope = (math.sin(opening_angle), math.cos(opening_angle))
 
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
         """See the base class."""
         sine, cosine = self._slope
-        if rho * sine + height * cosine > 0.0:
-            return rho * cosine - height * sine, cosine, -sine
-        length = math.hypot(rho, height)
-        if not length:
-            return 0.0, 0.0, -1.0
-        return length, rho / length, height / length
+        beyond_apex = rho * sine + height * cosine <= 0.0
+        from_apex, n = direction(ca.vertcat(rho, height), (0.0, -1.0))
+        return (
+            ca.if_else(beyond_apex, from_apex, rho * cosine - height * sine),
+            ca.if_else(beyond_apex, n[0], cosine),
+            ca.if_else(beyond_apex, n[1], -sine),
+        )
 
 
 class TorusRegion(TurnedRegion):
@@ -207,13 +188,10 @@ class TorusRegion(TurnedRegion):
             )
         self._ring = float(ring_radius)
 
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
         """See the base class."""
-        x = rho - self._ring
-        length = math.hypot(x, height)
-        if not length:
-            return -self._tube, 1.0, 0.0
-        return length - self._tube, x / length, height / length
+        away, n = direction(ca.vertcat(rho - self._ring, height), (1.0, 0.0))
+        return away - self._tube, n[0], n[1]
 
 
 class ParaboloidRegion(TurnedRegion):
@@ -243,30 +221,25 @@ class ParaboloidRegion(TurnedRegion):
         self._coefficient = abs(float(coefficient))
         self._upwards = math.copysign(1.0, coefficient)
 
-    def meridian(self, rho: float, height: float) -> Meridian:
+    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
         """See the base class.
 
-        The foot is at the largest root of a cubic. Newton's method falls monotonically to it from
-        above, so it has converged when it falls no longer.
+        The foot is at the largest root of a cubic, ``u^3 + p u = q`` with u = c times its radius.
+        Newton's method falls monotonically to it from above, and stays where it falls no longer.
         """
         c = self._coefficient
-        height *= self._upwards
-        # u = c times the radius of the foot: u^3 + p u = q
+        height = height * self._upwards
         p, q = 0.5 - c * height, 0.5 * c * rho
-        if not q:
-            u = math.sqrt(-p) if p < 0.0 else 0.0
-        else:
-            u = q ** (1.0 / 3.0)
-            if p < 0.0:
-                u += math.sqrt(-p)
-            elif u * p > q:
-                u = q / p
-            u *= _ABOVE
-            last = math.inf
-            while u < last:
-                last = u
-                u = (2.0 * u * u * u + q) / (3.0 * u * u + p)
+        cube_root = q ** (1.0 / 3.0)
+        bound = ca.if_else(
+            p < 0.0,
+            cube_root + ca.sqrt(ca.fmax(-p, 0.0)),
+            ca.if_else(cube_root * p > q, q / ca.if_else(p > 0.0, p, 1.0), cube_root),
+        )
+        u = _ABOVE * bound
+        for _ in range(_STEPS):
+            u = ca.fmin(u, (2.0 * u * u * u + q) / (3.0 * u * u + p))
         slope = 2.0 * u
-        norm = 1.0 / math.sqrt(1.0 + slope * slope)
+        norm = 1.0 / ca.sqrt(1.0 + slope * slope)
         h = ((rho - u / c) * slope - height + u * u / c) * norm
         return h, slope * norm, -norm * self._upwards

@@ -2,10 +2,11 @@
 
 import math
 from bisect import bisect_right
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
 from pfsc_drake.geometry.regions.region import Distance, Region
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
@@ -56,6 +57,14 @@ class SurfaceRegion(Region):
         self._sample = surface.flat_sampler(1)
         self._projector = SurfaceProjector(surface)
         self._nearest = NearestFoot(_pieces(surface, edges), self._project)
+
+    @property
+    def signed_distance(self) -> NoReturn:
+        """See the base class."""
+        raise InputError(
+            "fitted surface: its nearest place is searched for, in as many steps as that takes; no"
+            " formula has it"
+        )
 
     def distance(self, x: float, y: float, z: float) -> Distance:
         """See the base class."""

@@ -2,6 +2,7 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -153,7 +154,20 @@ def test_on_the_axis_one_of_the_feet_is_told(name, height):
         assert distance(*(y - h * np.array(n)))[0] == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@pytest.mark.parametrize("name", CASES)
+def test_symbols_and_numbers_have_one_formula(name):
+    """Also of points that are not finite: their distance is no number."""
+    region = CASES[name][0]
+    for symbol in (ca.SX.sym("point", 3), ca.MX.sym("point", 3)):
+        of_symbol = ca.Function("f", [symbol], list(region.signed_distance(symbol)))
+        for y in ORIGIN + np.random.default_rng(8).uniform(-0.4, 0.4, size=(5, 3)):
+            h, n = of_symbol(y)
+            assert (float(h), *n.full().ravel()) == region.distance(*y)
+    for y in ((math.nan, 0.1, 0.2), (0.3, 0.1, -math.inf)):
+        assert math.isnan(region.distance(*y)[0])
+
+
+@settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.floats(-9.0, 9.0), st.floats(-30.0, 3.0), st.floats(-3.0, 3.0))
 def test_the_cubic_of_a_paraboloid(curvature, exponent, height):
     """Of the foot's radius u: 2 c^2 u^3 + (1 - 2 c z) u - rho = 0, c and rho of any size."""
