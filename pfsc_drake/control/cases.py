@@ -79,3 +79,27 @@ def all_finite(*parts: Any) -> Any:
         parts: Each of any shape.
     """
     return is_finite(ca.sum1(ca.vertcat(*[ca.vec(part) for part in parts])))
+
+
+def least(values: Any, counts: Any) -> Any:
+    """Return the number of the least of those values that count, -1 if none does.
+
+    Args:
+        values: Shape (k,); NaN does not count.
+        counts: Conditions, shape (k,).
+    """
+    which, lowest = -1, ca.inf
+    for i in range(values.numel()):
+        lower = ca.logic_and(counts[i], values[i] < lowest)
+        which, lowest = where(lower, i, which), where(lower, values[i], lowest)
+    return which
+
+
+def unit(which: Any, size: int) -> Any:
+    """Return 1 at a place, and 0 elsewhere, shape (size,).
+
+    Args:
+        which: Number of the place; if there is none such, all is 0.
+        size: k.
+    """
+    return ca.vertcat(*[which == i for i in range(size)])

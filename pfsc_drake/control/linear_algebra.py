@@ -4,10 +4,14 @@ All functions take and return expressions of scalars (``casadi.SX``). Nothing is
 cannot be computed comes out as NaN, or with a reciprocal condition number of 0.
 """
 
+import itertools
+
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.control.cases import all_finite, all_of, where
+
+_SWEEPS = 6
 
 
 def solve(A: ca.SX, B: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -87,6 +91,33 @@ def cholesky(M: ca.SX) -> ca.SX:
         for j in range(k + 1, n):
             U[k, j] = (M[k, j] - ca.dot(U[:k, k], U[:k, j])) / U[k, k]
     return upper_part(where(all_of(*positive), ca.densify(U), np.nan))
+
+
+def symmetric_eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return eigenvalues and eigenvectors of a symmetric matrix.
+
+    By Jacobi's rotations, each of which makes one element zero, in a fixed number of sweeps over
+    all of them. They converge quadratically; six are enough for matrices of up to ten rows.
+
+    Args:
+        A: Symmetric, shape (n, n).
+
+    Returns:
+        Eigenvalues, shape (n,), in no order, and the vectors as columns, shape (n, n).
+    """
+    n = A.shape[0]
+    A, V = ca.densify(A), ca.densify(ca.SX.eye(n))
+    for p, q in _SWEEPS * list(itertools.combinations(range(n), 2)):
+        x, gap = A[p, q], A[q, q] - A[p, p]
+        longer = gap + ca.copysign(ca.sqrt(gap**2 + 4.0 * x**2), gap)
+        t = where(x == 0.0, 0.0, 2.0 * x / longer)
+        c = 1.0 / ca.sqrt(1.0 + t**2)
+        for i in set(range(n)) - {p, q}:
+            turned = c * (A[i, p] - t * A[i, q]), c * (A[i, q] + t * A[i, p])
+            A[i, p], A[i, q] = A[p, i], A[q, i] = turned
+        A[p, p], A[q, q], A[p, q], A[q, p] = A[p, p] - t * x, A[q, q] + t * x, 0.0, 0.0
+        V[:, p], V[:, q] = c * (V[:, p] - t * V[:, q]), c * (V[:, q] + t * V[:, p])
+    return ca.diag(A), V
 
 
 def solve_upper(U: ca.SX, B: ca.SX, *, transposed: bool = False) -> ca.SX:

@@ -68,3 +68,15 @@ def test_what_is_finite(evaluate, bad):
     assert evaluate(cases.all_finite, [1.0, -1e308], [2.0]).tolist() == [1.0]
     assert evaluate(cases.all_finite, [1.0, 2.0], [bad]).tolist() == [0.0]
     assert evaluate(cases.all_finite, [bad, -bad], [1.0]).tolist() == [0.0]
+
+
+def test_the_least_of_those_that_count(evaluate):
+    values = [3.0, 1.0, NAN, 1.0, -5.0]
+    assert evaluate(cases.least, values, [1.0, 1.0, 1.0, 1.0, 0.0])[0] == 1
+    assert evaluate(cases.least, values, [1.0, 0.0, 1.0, 0.0, 0.0])[0] == 0
+    assert evaluate(cases.least, values, [0.0, 0.0, 1.0, 0.0, 0.0])[0] == -1
+
+
+@pytest.mark.parametrize(("which", "expected"), [(1.0, [0, 1, 0]), (-1.0, [0, 0, 0])])
+def test_a_one_at_a_place(evaluate, which, expected):
+    assert evaluate(lambda k: cases.unit(k, 3), [which]).tolist() == expected

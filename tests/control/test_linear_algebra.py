@@ -131,3 +131,18 @@ def test_substitution(transposed):
     expected = scipy.linalg.solve_triangular(U, B, trans=int(transposed))
     found = on_numbers("solve_upper", U, B, transposed=transposed)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6, 7])
+def test_eigenvalues_and_vectors(n):
+    """Also where they are all the same, nearly the same, or some are zero."""
+    rng = np.random.default_rng(n)
+    Q = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    some = [rng.normal(size=n), np.ones(n), 1.0 + 1e-9 * np.arange(n), np.arange(n) // 2 * 1.0]
+    for values in (*some, np.geomspace(1.0, 1e-8, n)):
+        A = Q @ np.diag(values) @ Q.T
+        A = (A + A.T) / 2.0
+        found, V = on_numbers("symmetric_eigen", A)
+        np.testing.assert_allclose(np.sort(found.ravel()), np.linalg.eigvalsh(A), atol=1e-14)
+        np.testing.assert_allclose(V.T @ V, np.eye(n), atol=1e-13)
+        np.testing.assert_allclose(A @ V, V @ np.diag(found.ravel()), atol=1e-13)
