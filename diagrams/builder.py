@@ -44,6 +44,7 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.systems.fuse import fuse_blocks
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
@@ -114,6 +115,8 @@ def build_station(
     signals |= states_to_log(scenario, true_state, joint_state)
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
+    if scenario.simulation.fused:
+        fuse_blocks(builder)
     diagram = builder.Build()
     diagram.set_name(scenario.name or "station")
     return Station(

@@ -18,6 +18,7 @@ from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.singularity_name import singularity_name
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture
+from pfsc_drake.systems.block_access import BlockAccess
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")
 # m, from which on a distance from the path is worth a word where an arm becomes singular
@@ -67,12 +68,13 @@ class FaultScene:
 
 
 def first_instant(
-    log: SignalLog, root: Context, signal: str, column: int
+    log: SignalLog, blocks: BlockAccess, root: Context, signal: str, column: int
 ) -> tuple[Instant, Instant | None]:
     """Return the first instant at which a logged fault was there, and the one before.
 
     Args:
         log: The log.
+        blocks: Of the diagram.
         root: Context of the diagram, in which the fault holds.
         signal: Logged signal with the fault.
         column: Of the signal, where the fault is.
@@ -87,7 +89,7 @@ def first_instant(
     ]
     if k == len(times):
         # it is so new that it has not been logged
-        instants.append(Instant(root.get_time(), log.now(root)))
+        instants.append(Instant(root.get_time(), log.now(blocks, root)))
     return instants[-1], instants[0] if len(instants) > 1 else None
 
 

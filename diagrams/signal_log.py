@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import (
-    LogVectorOutput,
-    Multiplexer,
-    VectorLogSink,
-    ZeroOrderHold,
-)
+from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+
+from pfsc_drake.blocks.wiring_blocks import Collect, Hold
+from pfsc_drake.systems.block_access import BlockAccess
+from pfsc_drake.systems.block_system import BlockSystem
+
+_SIGNALS = "log_signals"
 
 
 @dataclass(frozen=True)
@@ -17,13 +18,11 @@ class SignalLog:
     """Several signals in one log.
 
     Attributes:
-        signals: All of them together.
         sink: The log.
         rows: Rows of each signal in the log's data.
         delay: By how much later than they were true the sink gets them [s].
     """
 
-    signals: Multiplexer
     sink: VectorLogSink
     rows: dict[str, slice]
     delay: float = 0.0
@@ -40,13 +39,14 @@ class SignalLog:
             times, data = times[1:] - self.delay, data[:, 1:]
         return times, {name: data[rows].T for name, rows in self.rows.items()}
 
-    def now(self, root: Context) -> dict[str, np.ndarray]:
+    def now(self, blocks: BlockAccess, root: Context) -> dict[str, np.ndarray]:
         """Return the signals as they are, logged or not.
 
         Args:
+            blocks: Of the diagram.
             root: Context of the diagram.
         """
-        row = self.signals.get_output_port().Eval(self.signals.GetMyContextFromRoot(root))
+        row = blocks.output(root, f"{_SIGNALS}.all")
         return {name: row[rows] for name, rows in self.rows.items()}
 
 
@@ -71,18 +71,15 @@ def add_log(
         period: Sampling time of the log [s].
         discrete_plant: Whether the plant is discrete. The log ends a tick earlier then.
     """
-    sizes = [port.size() for port in signals.values()]
-    multiplexer = builder.AddNamedSystem("log_signals", Multiplexer(sizes))
-    for i, port in enumerate(signals.values()):
-        builder.Connect(port, multiplexer.get_input_port(i))
-    logged = multiplexer.get_output_port()
+    collect = Collect({name: port.size() for name, port in signals.items()})
+    system = builder.AddNamedSystem(_SIGNALS, BlockSystem(collect, period))
+    for name, port in signals.items():
+        builder.Connect(port, system.GetInputPort(name))
+    logged = system.GetOutputPort("all")
     if discrete_plant:
-        hold = builder.AddNamedSystem("log_hold", ZeroOrderHold(period, logged.size()))
-        builder.Connect(logged, hold.get_input_port())
-        logged = hold.get_output_port()
+        hold = builder.AddNamedSystem("log_hold", BlockSystem(Hold(logged.size()), period))
+        builder.Connect(logged, hold.GetInputPort("value"))
+        logged = hold.GetOutputPort("held")
     sink = LogVectorOutput(logged, builder, period)
     sink.set_name("log")
-    ends = np.cumsum(sizes).tolist()
-    rows = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-    delay = period if discrete_plant else 0.0
-    return SignalLog(multiplexer, sink, dict(zip(signals, rows, strict=True)), delay)
+    return SignalLog(sink, collect.rows, period if discrete_plant else 0.0)

@@ -19,6 +19,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
@@ -88,6 +89,11 @@ class Station:
         """The robot as it is."""
         return self.part.robot
 
+    @cached_property
+    def blocks(self) -> BlockAccess:
+        """What the diagram's blocks remember and put out, fused or not."""
+        return BlockAccess(self.diagram)
+
     @property
     def path(self) -> Path:
         """The path, of a station whose task is one."""
@@ -115,9 +121,8 @@ class Station:
         """
         self.place_robot(root, self.initial_state)
         if self.part.drives.step is not None:
-            hold = self.diagram.GetSubsystemByName("hold")
             weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
-            hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), weight)
+            self.blocks.set_state(root, "hold.held", weight)
         projector = self.projector.GetMyMutableContextFromRoot(root)
         self.projector.set_place(projector, self.initial_place)
 
@@ -171,7 +176,7 @@ class Station:
 
     def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> FoundFault:
         """Return what there is to say of a fault that is logged in a column of a signal."""
-        now, before = first_instant(self.log, root, signal, column)
+        now, before = first_instant(self.log, self.blocks, root, signal, column)
         place = self.task.place
         system = self.controller if signal == "law" else self.diagram.GetSubsystemByName(_SERVO)
         suspects = system.suspects(system.GetMyContextFromRoot(root))

@@ -6,18 +6,20 @@ from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer, ZeroOrderHold
+from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
 
 from diagrams.robots.part import Drives, RobotPart
 from diagrams.safety import safe_state, supervision
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
+from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.bus_delay import add_bus_delay
 from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
 from pfsc_drake.systems.physics.joint_friction import JointFriction
@@ -59,9 +61,9 @@ def add_drives(
         servo, period = _add_servo(builder, chain, scenario, ports, q_J)
         torque = servo.GetOutputPort("drive_torque")
         signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
-    hold = builder.AddNamedSystem("hold", ZeroOrderHold(period, chain.dimension))
-    builder.Connect(torque, hold.get_input_port())
-    part.connect_drives(builder, hold.get_output_port())
+    hold = builder.AddNamedSystem("hold", BlockSystem(Hold(chain.dimension), period))
+    builder.Connect(torque, hold.GetInputPort("value"))
+    part.connect_drives(builder, hold.GetOutputPort("held"))
     return signals
 
 
@@ -99,9 +101,9 @@ def _add_servo(
         velocity = bus.GetOutputPort("delivered")
     elif ratio > 1:
         # the law must not be evaluated between its own ticks
-        keep = builder.AddNamedSystem("velocity_hold", ZeroOrderHold(tick, chain.dimension))
-        builder.Connect(velocity, keep.get_input_port())
-        velocity = keep.get_output_port()
+        keep = builder.AddNamedSystem("velocity_hold", BlockSystem(Hold(chain.dimension), tick))
+        builder.Connect(velocity, keep.GetInputPort("value"))
+        velocity = keep.GetOutputPort("held")
     builder.Connect(velocity, system.GetInputPort("velocity_reference"))
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
     return system, period

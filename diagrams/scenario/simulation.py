@@ -54,6 +54,8 @@ class SimulationParameters:
         sensor_failure: A sensor that fails on the way.
         force_sensor_failure: The same for the force/torque sensor; ``component`` is an index in
             ``[force, torque]``, of which ``whole_joint`` takes all.
+        fused: Whether all blocks are evaluated as one function, which is faster; one by one they
+            give the same log.
     """
 
     integrator: str = AUTO
@@ -64,6 +66,7 @@ class SimulationParameters:
     force_sensor_failure: SensorFailureParameters = dc.field(
         default_factory=SensorFailureParameters
     )
+    fused: bool = True
 
     def __post_init__(self) -> None:
         schemes = [AUTO, *GetIntegrationSchemes()]

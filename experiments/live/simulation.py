@@ -79,7 +79,7 @@ class LiveSimulation:
 
     def signals(self) -> dict[str, np.ndarray]:
         """Return what is logged, as it is now."""
-        return self._station.log.now(self.root)
+        return self._station.log.now(self._station.blocks, self.root)
 
     def frame(self, signals: dict[str, np.ndarray]) -> LiveFrame:
         """Return what there is to see.

@@ -1,6 +1,6 @@
 """A station's closed loop, linearized over one sampling period."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -49,6 +49,8 @@ class StationLoop:
     """
 
     def __init__(self, settings: Scenario, folder: Path, task: Task | None = None) -> None:
+        # each system's part of the state is looked for
+        settings = replace(settings, simulation=replace(settings.simulation, fused=False))
         with compiled_when_bound():
             self.station: Station = build_station(settings, folder, task=task, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
@@ -189,7 +191,7 @@ class StationLoop:
             if isinstance(system, BusDelay):  # newest sample first
                 return self.map.rows(system)[:N], True
         name = "velocity_hold" if "velocity_hold" in systems else "hold"
-        return self.map.rows(systems[name]), name != "hold"
+        return self.map.rows(systems[name])[-N:], name != "hold"
 
 
 def _only(diagram: Diagram, kind: type[Kind]) -> Kind | None:
