@@ -23,6 +23,8 @@ from pfsc_drake.systems.block_access import BlockAccess
 _STATE = ("q_J", "v_J", "q_M", "v_M")
 # m, from which on a distance from the path is worth a word where an arm becomes singular
 _BESIDE = 1e-3
+# of singular values of the Jacobian, from which on a joint that runs away is the posture's fault
+_NEARLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,11 @@ def _joint_speed(scene: FaultScene) -> str:
     i = int(np.nanargmax(speed / limits))
     revolute = bool(robot.gather("is_revolute")[i])
     found, limit = (coordinate_text(float(x[i]), revolute=revolute) for x in (speed, limits))
-    return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}"
+    q, posture = _posture(scene)
+    nearly = posture.rcond < _NEARLY and i in posture.free_joints
+    return f"joint {i + 1} '{robot.names[i]}' moves at {found}/s of {limit}/s {_place(scene)}" + (
+        f"; {_singularity(scene, q, posture, 'nearly singular')}" if nearly else ""
+    )
 
 
 def _at_limit(fault: Fault, scene: FaultScene) -> str:
@@ -207,6 +213,18 @@ def _outside(scene: FaultScene) -> str:
 
 
 def _singular(scene: FaultScene) -> str:
+    q, posture = _posture(scene)
+    A = _decoupling_matrix(scene)
+    distance = float(np.linalg.norm(_beside(scene)))
+    beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""
+    if _is_map_singular(A, posture):
+        bend = _bend(scene)
+        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}{bend}"
+    return _singularity(scene, q, posture, f"singular {_place(scene)}") + beside
+
+
+def _posture(scene: FaultScene) -> tuple[np.ndarray, SingularPosture]:
+    """Return the joint coordinates the law acts on, and how close to singular they are."""
     n, state = scene.robot.dimension, scene.now.measured_state
     q = state[2 * n : 3 * n] if scene.on_motors else state[:n]
     place, tool = scene.place, scene.place.tool
@@ -217,20 +235,18 @@ def _singular(scene: FaultScene) -> str:
         tool_axis=tool.tool_axis,
         yaw_axis=tool.yaw_axis,
     )
-    A = _decoupling_matrix(scene)
-    distance = float(np.linalg.norm(_beside(scene)))
-    beside = f"; the tool is {1e3 * distance:.0f} mm beside the path" if distance > _BESIDE else ""
-    if _is_map_singular(A, posture):
-        bend = _bend(scene)
-        return f"{Fault.SINGULAR.explanation} {_place(scene)}: {_map_state(scene)}{beside}{bend}"
+    return q, posture
+
+
+def _singularity(scene: FaultScene, q: np.ndarray, posture: SingularPosture, how: str) -> str:
+    """Return what of the robot is singular, through which joints, and which can move."""
     name = None
     if isinstance(scene.robot, SerialChain):
         name = singularity_name(scene.robot, q, posture)
     free = listed(f"q_{i + 1}" for i in posture.free_joints)
     return (
-        f"{name or 'robot'} singular {_place(scene)}: "
-        f"{posture_text(scene.robot, q, posture.causing_joints)} "
-        f"({free} can move without the tool){beside}"
+        f"{name or 'robot'} {how}: {posture_text(scene.robot, q, posture.causing_joints)} "
+        f"({free} can move without the tool)"
     )
 
 

@@ -182,6 +182,20 @@ def test_what_is_known_without_a_run(six_axes):
     assert f"at eta = 0.026 m, t = 0.500 s: tool at {y_t} m" in lost
 
 
+@pytest.mark.parametrize("fast", [0, 3])
+def test_a_joint_that_runs_away_next_to_a_singular_posture(six_axes, fast):
+    station, root = run(six_axes, 0.0)
+    now, _ = first_instant(station.log, root, "law", station.law.layout.status.start)
+    state = now.measured_state.copy()
+    state[[4, 16]], state[[6 + fast, 18 + fast]] = np.deg2rad(2.0), np.deg2rad(600.0)
+    near = Instant(0.5, {**now.signals, "joint_state_measured": state})
+    scene = FaultScene(station.law, station.robot, station.task.place, False, near, now)
+    sentence, name = describe(Fault.JOINT_SPEED, scene), station.robot.names[fast]
+    assert sentence.startswith(f"joint {fast + 1} '{name}' moves at 600.0 deg/s of ")
+    ending = "; wrist nearly singular: q_5 = 2.0 deg (q_4 and q_6 can move without the tool)"
+    assert sentence.endswith(ending) == (fast == 3)
+
+
 def test_a_robot_without_names(load_scenario):
     """A DELTA robot is no chain; made-up, for its reach ends before it becomes singular."""
     settings = load_scenario("pfc_delta")
