@@ -1,6 +1,7 @@
 """The blocks of a diagram as one system."""
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 from pydrake.systems.framework import (
     Diagram,
@@ -17,6 +18,53 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
 
 Connections = Mapping[tuple[System, InputPortIndex], tuple[System, OutputPortIndex]]
+
+
+class FusedSystem(BlockSystem):
+    """Blocks that are evaluated as one function, and drawn one by one.
+
+    Args:
+        wiring: How they are connected.
+        network: What they do together.
+        period: Sampling time [s].
+        parts: The systems that they were, by name.
+    """
+
+    def __init__(
+        self, wiring: Wiring, network: Network, period: float, parts: Mapping[str, System]
+    ) -> None:
+        super().__init__(network, period)
+        self._wiring, self._parts = wiring, parts
+
+    def DoGetGraphvizFragment(self, params: System.GraphvizFragmentParams) -> Any:  # noqa: N802
+        """Draw all parts and their connections, within one frame."""
+        drawn = {name: part.GetGraphvizFragment(max_depth=0) for name, part in self._parts.items()}
+        fed: dict[str, list[str]] = {}
+        lines = []
+        for (name, port), source in self._wiring.connections.items():
+            target = drawn[name].input_ports[self._parts[name].GetInputPort(port).get_index()]
+            if isinstance(source, str):
+                fed.setdefault(source, []).append(target)
+            else:
+                lines.append(f"{self._drawn_output(drawn, *source)}:e -> {target}:w;")
+        inputs = []
+        for k, name in enumerate(self.network.inputs):
+            inputs.append(f"{params.node_id}u{k}")
+            lines.append(f"{inputs[-1]} [shape=point];")
+            lines += [f"{inputs[-1]}:e -> {target}:w;" for target in fed[name]]
+        outputs = [
+            self._drawn_output(drawn, *self._wiring.outputs[name]) for name in self.network.outputs
+        ]
+        frame = [f"subgraph cluster{params.node_id} {{", f'label="{self.get_name()}";']
+        inside = [text for fragment in drawn.values() for text in fragment.fragments]
+        fragment = super().DoGetGraphvizFragment(params)
+        fragment.input_ports, fragment.output_ports = inputs, outputs
+        fragment.fragments = [*frame, *inside, *lines, "}"]
+        return fragment
+
+    def _drawn_output(self, drawn: Mapping[str, Any], name: str, port: str) -> str:
+        index = self._parts[name].GetOutputPort(port).get_index()
+        return str(drawn[name].output_ports[index])
 
 
 def fuse(diagram: Diagram) -> BlockSystem:
@@ -92,7 +140,8 @@ def _replace(
         elif source in inside:
             wiring.outputs[".".join(origin)] = origin
             targets.append((port, ".".join(origin)))
-    fused = BlockSystem(wiring.network(), period)
+    parts = {system.get_name(): system for system in systems}
+    fused = FusedSystem(wiring, wiring.network(), period, parts)
     for system in systems:
         builder.RemoveSystem(system)
     builder.AddNamedSystem(name, fused)
