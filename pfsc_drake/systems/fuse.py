@@ -36,7 +36,7 @@ class FusedSystem(BlockSystem):
         super().__init__(network, period)
         self._wiring, self._parts = wiring, parts
 
-    def DoGetGraphvizFragment(self, params: System.GraphvizFragmentParams) -> Any:  # noqa: N802
+    def DoGetGraphvizFragment(self, params: System.GraphvizFragmentParams) -> Any:
         """Draw all parts and their connections, within one frame."""
         drawn = {name: part.GetGraphvizFragment(max_depth=0) for name, part in self._parts.items()}
         fed: dict[str, list[str]] = {}
