@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
+from pfsc_drake.geometry.piece_table import PieceTable
 
 # Jumps of a repeated course, of its extent (and of that over the square of its duration).
 _SAME = 1e-9
@@ -49,8 +50,7 @@ class CurveCourse:
         self._begin, self._end = curve.domain
         self._period = curve.period
         self._repeat = repeat
-        self._breakpoints = ca.DM(curve.breakpoints)
-        self._powers = [ca.DM(powers) for powers in curve.coefficients[..., 0].T]
+        self._table = PieceTable(curve.breakpoints, curve.coefficients.transpose(0, 2, 1))
         ends = curve.derivatives(np.array(curve.domain), 2)[..., 0]
         extent = np.ptp(curve.derivatives(np.linspace(*curve.domain, 1001), 0))
         scales = extent / self._period ** np.arange(3)
@@ -72,12 +72,7 @@ class CurveCourse:
         if self._repeat:
             laps = ca.floor((clock - self._begin) / self._period)
             clock = clock - laps * self._period
-        clock = ca.fmin(ca.fmax(clock, self._begin), self._end)
-        piece = ca.low(self._breakpoints, clock)
-        u, value = clock - ca.MX(self._breakpoints)[piece], ca.MX(0.0)
-        for coefficient in reversed(self._powers):
-            value = value * u + ca.MX(coefficient)[piece]
-        return value
+        return self._table(ca.fmin(ca.fmax(clock, self._begin), self._end))
 
 
 def _largest_rate(curve: PiecewisePolynomialCurve) -> float:

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 # Pieces on each side of a foot that are told to have no other, ...
-_BLOCK = 2
+BLOCK = 2
 # ... and their largest extent in radii of one.
-_BLOCK_EXTENT = 2.0 * _BLOCK + 1.0
+_BLOCK_EXTENT = 2.0 * BLOCK + 1.0
 # Nearer by less than this is not nearer, m.
-_NOT_NEARER = 1e-12
+NOT_NEARER = 1e-12
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class NearestFoot(Generic[FootType]):
         self._project = project
         self._shape = pieces.radius.shape
         self._closed = pieces.closed
-        self._alone = [_alone_within(pieces, bend).ravel().tolist() for bend in pieces.bends]
+        self._alone = [alone_within(pieces, bend).ravel().tolist() for bend in pieces.bends]
         self._balls, self._leaves = _tree(pieces)
 
     def __call__(self, x: float, y: float, z: float) -> FootType:
@@ -116,7 +116,7 @@ class NearestFoot(Generic[FootType]):
         columns = self._shape[1]
         while heap:
             low, node, piece = heapq.heappop(heap)
-            if best is not None and low >= best.distance - _NOT_NEARER:
+            if best is not None and low >= best.distance - NOT_NEARER:
                 break
             if piece >= 0:
                 row, column = divmod(piece, columns)
@@ -159,7 +159,7 @@ class NearestFoot(Generic[FootType]):
             apart = min(apart, rows - apart)
         if self._closed[1]:
             across = min(across, columns - across)
-        return apart <= _BLOCK and across <= _BLOCK
+        return apart <= BLOCK and across <= BLOCK
 
 
 def _tree(pieces: Pieces) -> tuple[list[list[_Ball]], list[list[_Leaf]]]:
@@ -221,7 +221,7 @@ def _balls(pieces: Pieces, stride: tuple[int, int]) -> tuple[np.ndarray, np.ndar
     return middle, over_blocks(np.maximum, away + pieces.radius + pieces.sag)
 
 
-def _alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
+def alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
     """Distance below which a foot on a piece is the only one of its block, [n_1, n_2], m.
 
     Along a geodesic f = |y - sigma|^2 / 2 has the second derivative 1 - (y - sigma) . n kappa, and
@@ -232,7 +232,7 @@ def _alone_within(pieces: Pieces, bends: np.ndarray) -> np.ndarray:
         bends: Curvature towards the side of the point, [n_1, n_2], 1/m.
     """
     modes = ["wrap" if closed else "nearest" for closed in pieces.closed]
-    size = 2 * _BLOCK + 1
+    size = 2 * BLOCK + 1
     bend, most, radius = (
         maximum_filter(values, size=size, mode=modes)
         for values in (bends, np.abs(pieces.bends).max(axis=0), pieces.radius)

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.placement import Triple
-from pfsc_drake.geometry.regions.region import FormulaRegion, direction
+from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, direction
 from pfsc_drake.geometry.surfaces.placement import checked_placement
 
 # Planes whose coefficients differ by less are one, m.
@@ -62,7 +62,7 @@ class PolyhedronRegion(FormulaRegion):
         }
         self._edges = [_edge(points[a], points[b]) for a, b in sorted(edges)]
 
-    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
         """See the base class."""
         heights = [a * point[0] + b * point[1] + c * point[2] + d for a, b, c, d in self._planes]
         h, n = heights[0], ca.SX(self._planes[0][:3])
@@ -75,7 +75,7 @@ class PolyhedronRegion(FormulaRegion):
         away, outwards = direction(self._from_edges(point), (1.0, 0.0, 0.0))
         return ca.if_else(on_face, h, away), ca.if_else(on_face, n, outwards)
 
-    def _from_edges(self, point: ca.SX) -> ca.SX:
+    def _from_edges(self, point: Symbol) -> Symbol:
         """Way from the nearest place of all edges."""
         least, nearest = ca.SX(math.inf), ca.SX.zeros(3)
         for begin, tangent, length in self._edges:

@@ -3,13 +3,15 @@
 import math
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 
 from pfsc_drake.compiled.plain_function import PlainFunction
 
 Distance = tuple[float, ...]
-Symbol = ca.SX | ca.MX
+# ca.SX or ca.MX, which have no types
+Symbol = Any
 
 
 class Region(ABC):
@@ -47,10 +49,16 @@ class Region(ABC):
 
 
 class FormulaRegion(Region):
-    """A region whose distance is an expression."""
+    """A region whose distance is an expression.
+
+    Attributes:
+        symbol: What its expression is made of: scalars, or matrices where tables are looked up.
+    """
+
+    symbol: Any = ca.SX
 
     @abstractmethod
-    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
         """Signed distance and normal as expressions.
 
         Args:
@@ -63,7 +71,7 @@ class FormulaRegion(Region):
     @cached_property
     def signed_distance(self) -> ca.Function:
         """See the base class."""
-        point = ca.SX.sym("point", 3)
+        point = self.symbol.sym("point", 3)
         h, n = self.formula(point)
         is_finite = ca.dot(point, point) < math.inf
         return ca.Function(
@@ -83,7 +91,7 @@ class FormulaRegion(Region):
         return self._distance(x, y, z)
 
 
-def direction(vector: ca.SX, otherwise: tuple[float, ...]) -> tuple[ca.SX, ca.SX]:
+def direction(vector: Symbol, otherwise: tuple[float, ...]) -> tuple[Symbol, Symbol]:
     """Length and unit vector of a vector.
 
     Args:

@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.placement import axes_along, checked_length, checked_point
-from pfsc_drake.geometry.regions.region import FormulaRegion, direction
+from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, direction
 
 # A bound, safe from rounding errors.
 _ABOVE = 1.0 + 1e-15
 # Newton's steps to the foot on a paraboloid, from 1e-12 to 1e12 in p and q.
 _STEPS = 8
 
-Meridian = tuple[ca.SX, ca.SX, ca.SX]
+Meridian = tuple[Symbol, Symbol, Symbol]
 
 
 class HalfSpace(FormulaRegion):
@@ -33,7 +33,7 @@ class HalfSpace(FormulaRegion):
         self._normal = ca.DM(axes_along(normal)[2])
         self._point = ca.DM(checked_point("point", point))
 
-    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
         """See the base class."""
         return ca.dot(self._normal, point - self._point), ca.SX(self._normal)
 
@@ -55,7 +55,7 @@ class SphereRegion(FormulaRegion):
         self._radius = checked_length("radius", radius)
         self._sign = -1.0 if inside else 1.0
 
-    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
         """See the base class."""
         away, outwards = direction(point - self._centre, (1.0, 0.0, 0.0))
         return self._sign * (away - self._radius), self._sign * outwards
@@ -79,7 +79,7 @@ class TurnedRegion(FormulaRegion):
         self._sign = -1.0 if inside else 1.0
 
     @abstractmethod
-    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
+    def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
         """Distance in a half-plane that ends at the axis.
 
         Args:
@@ -91,7 +91,7 @@ class TurnedRegion(FormulaRegion):
             rho and the height.
         """
 
-    def formula(self, point: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
         """See the base class."""
         local = self._axes @ (point - self._origin)
         rho, outwards = direction(local[:2], (1.0, 0.0))
@@ -116,7 +116,7 @@ class CylinderRegion(TurnedRegion):
         super().__init__(origin, axis, inside=inside)
         self._radius = checked_length("radius", radius)
 
-    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
+    def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
         """See the base class."""
         return rho - self._radius, ca.SX(1.0), ca.SX(0.0)
 
@@ -144,7 +144,7 @@ class ConeRegion(TurnedRegion):
             )
         self._slope = (math.sin(opening_angle), math.cos(opening_angle))
 
-    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
+    def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
         """See the base class."""
         sine, cosine = self._slope
         beyond_apex = rho * sine + height * cosine <= 0.0
@@ -188,7 +188,7 @@ class TorusRegion(TurnedRegion):
             )
         self._ring = float(ring_radius)
 
-    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
+    def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
         """See the base class."""
         away, n = direction(ca.vertcat(rho - self._ring, height), (1.0, 0.0))
         return away - self._tube, n[0], n[1]
@@ -221,7 +221,7 @@ class ParaboloidRegion(TurnedRegion):
         self._coefficient = abs(float(coefficient))
         self._upwards = math.copysign(1.0, coefficient)
 
-    def meridian(self, rho: ca.SX, height: ca.SX) -> Meridian:
+    def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
         """See the base class.
 
         The foot is at the largest root of a cubic, ``u^3 + p u = q`` with u = c times its radius.

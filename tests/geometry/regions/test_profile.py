@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     PiecewisePolynomialCurve,
@@ -14,7 +15,8 @@ from pfsc_drake.geometry import (
     surface_of_revolution,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.regions.profile import ExtrudedRegion, PlaneCurve, RevolvedRegion
+from pfsc_drake.geometry.regions.plane_curve import PlaneCurve
+from pfsc_drake.geometry.regions.profile import ExtrudedRegion, RevolvedRegion
 from pfsc_drake.geometry.regions.shapes import ConeRegion, CylinderRegion, HalfSpace
 from tests.geometry.regions.brute_force import BruteForce, gradient
 
@@ -117,7 +119,7 @@ def test_straight_profiles_are_planes_cones_and_cylinders():
 
 def test_the_ends_of_an_open_profile_go_on_straight():
     curve = _wave()
-    distance = PlaneCurve(curve)
+    distance = PlainFunction(PlaneCurve(curve).signed_distance)
     theta = np.linspace(*curve.domain, 20001)
     line = curve.derivatives(theta, 1)
     way = np.linspace(0.0, 2.0, 20001)[:, None]
@@ -135,6 +137,19 @@ def test_the_ends_of_an_open_profile_go_on_straight():
         assert (h > 0.0) == _encloses(around, x, y)  # right of a way along x
         foot = np.array([x, y]) - h * np.array(n)
         assert distance(*foot)[0] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_where_all_places_are_as_near_one_of_them_is_told():
+    """Around the centre of a circle, whose radius a spline has to a few um."""
+    t = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
+    curve = interpolate(0.2 * np.stack([np.cos(t), np.sin(t)], axis=1), smoothness=3, closed=True)
+    distance = PlainFunction(PlaneCurve(curve).signed_distance)
+    every = curve.derivatives(np.linspace(*curve.domain, 200001), 0)[:, 0]
+    for x, y in np.random.default_rng(6).uniform(-1e-4, 1e-4, size=(20, 2)):
+        h, *n = distance(x, y)
+        assert h == pytest.approx(-np.hypot(*(every - (x, y)).T).min(), abs=1e-10)
+        assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-12)
+    assert all(math.isnan(value) for value in distance(math.nan, 0.0))
 
 
 def test_a_bell_is_closed_at_its_tip():
