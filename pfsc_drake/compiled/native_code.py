@@ -1,122 +1,29 @@
 """CasADi functions as machine code: the interpreter's results, bit for bit, ten times faster.
 
-A CasADi function of scalars is a list of instructions, which an interpreter carries out one by
-one. Here LLVM turns the same list into machine code: the same operations in the same order,
-nothing fused, nothing reordered, and CasADi's own mathematical library for sines and the like.
-Only the sign of a NaN may differ. llvmlite is optional; what it cannot do is left to the
-interpreter.
+A CasADi function is a list of instructions, which an interpreter carries out one by one. Here LLVM
+turns the same list into machine code: the same operations in the same order, nothing fused, nothing
+reordered, and CasADi's own mathematical library for sines and the like. Only the sign of a NaN may
+differ. What cannot be translated is left to the interpreter.
+
+Machine code is made without LLVM's optimizations: they take ten times as long, for a law of 8,000
+instructions seconds, and gain a fifth. It is kept for the next process.
 """
 
 import ctypes
 import functools
 import hashlib
-import math
-import struct
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-__all__ = ["NativeCode", "native_code", "translate"]
+from pfsc_drake.compiled.object_store import user_store
+from pfsc_drake.compiled.operations import Untranslatable, function_symbols
+from pfsc_drake.compiled.translation import translate
 
-# machine code without optimizations keeps every value on the stack
-_MOST_INSTRUCTIONS = 50_000
-
-# {v} is the result, {x} and {y} are the operands
-_INLINE = {
-    ca.OP_ADD: ("{v} = fadd double {x}, {y}",),
-    ca.OP_SUB: ("{v} = fsub double {x}, {y}",),
-    ca.OP_MUL: ("{v} = fmul double {x}, {y}",),
-    ca.OP_DIV: ("{v} = fdiv double {x}, {y}",),
-    ca.OP_NEG: ("{v} = fneg double {x}",),
-    ca.OP_SQ: ("{v} = fmul double {x}, {x}",),
-    ca.OP_TWICE: ("{v} = fmul double 2.0, {x}",),
-    ca.OP_INV: ("{v} = fdiv double 1.0, {x}",),
-    ca.OP_SQRT: ("{v} = call double @llvm.sqrt.f64(double {x})",),
-    ca.OP_FABS: ("{v} = call double @llvm.fabs.f64(double {x})",),
-    ca.OP_COPYSIGN: ("{v} = call double @llvm.copysign.f64(double {x}, double {y})",),
-    # NaN is not less, not equal, and true
-    ca.OP_LT: ("{v}a = fcmp olt double {x}, {y}", "{v} = uitofp i1 {v}a to double"),
-    ca.OP_LE: ("{v}a = fcmp ole double {x}, {y}", "{v} = uitofp i1 {v}a to double"),
-    ca.OP_EQ: ("{v}a = fcmp oeq double {x}, {y}", "{v} = uitofp i1 {v}a to double"),
-    ca.OP_NE: ("{v}a = fcmp une double {x}, {y}", "{v} = uitofp i1 {v}a to double"),
-    ca.OP_NOT: ("{v}a = fcmp oeq double {x}, 0.0", "{v} = uitofp i1 {v}a to double"),
-    ca.OP_AND: (
-        "{v}a = fcmp une double {x}, 0.0",
-        "{v}b = fcmp une double {y}, 0.0",
-        "{v}c = and i1 {v}a, {v}b",
-        "{v} = uitofp i1 {v}c to double",
-    ),
-    ca.OP_OR: (
-        "{v}a = fcmp une double {x}, 0.0",
-        "{v}b = fcmp une double {y}, 0.0",
-        "{v}c = or i1 {v}a, {v}b",
-        "{v} = uitofp i1 {v}c to double",
-    ),
-    ca.OP_IF_ELSE_ZERO: (
-        "{v}a = fcmp oeq double {x}, 0.0",
-        "{v} = select i1 {v}a, double 0.0, double {y}",
-    ),
-    # a number rather than NaN; of 0 and -0, which the standard leaves open, CasADi's is the first
-    ca.OP_FMIN: (
-        "{v}a = fcmp olt double {y}, {x}",
-        "{v}b = fcmp uno double {x}, {x}",
-        "{v}c = or i1 {v}a, {v}b",
-        "{v} = select i1 {v}c, double {y}, double {x}",
-    ),
-    ca.OP_FMAX: (
-        "{v}a = fcmp ogt double {y}, {x}",
-        "{v}b = fcmp uno double {x}, {x}",
-        "{v}c = or i1 {v}a, {v}b",
-        "{v} = select i1 {v}c, double {y}, double {x}",
-    ),
-    # of NaN it is NaN, of -0 it is -0
-    ca.OP_SIGN: (
-        "{v}a = fcmp ogt double {x}, 0.0",
-        "{v}b = select i1 {v}a, double 1.0, double {x}",
-        "{v}c = fcmp olt double {x}, 0.0",
-        "{v} = select i1 {v}c, double -1.0, double {v}b",
-    ),
-}
-_UNARY_CALLS = {
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_ASINH: "asinh",
-    ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_ERF: "erf",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_EXPM1: "expm1",
-}
-_BINARY_CALLS = {
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_FMOD: "fmod",
-    ca.OP_REMAINDER: "remainder",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_HYPOT: "hypot",
-}
-_MODULE = """\
-declare double @llvm.sqrt.f64(double)
-declare double @llvm.fabs.f64(double)
-declare double @llvm.copysign.f64(double, double)
-define void @evaluate(ptr %table) nounwind {{
-{body}
-ret void
-}}
-"""
+__all__ = ["NativeCode", "native_code", "why_not"]
 
 # holds the GIL: releasing it takes longer than most functions
 _PROTOTYPE = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
@@ -126,28 +33,21 @@ class NativeCode:
     """Machine code of one function, for any number of sets of arrays.
 
     Args:
-        source: LLVM assembly that defines ``evaluate(table)``, see :func:`translate`.
+        code: An object file that defines ``evaluate(table)``, see
+            :func:`~pfsc_drake.compiled.translation.translate`.
 
     Raises:
         ImportError: If llvmlite is not installed.
-        RuntimeError: If LLVM has no code generator for this machine.
+        RuntimeError: If LLVM has no code generator for this machine, or cannot read the file.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, code: bytes) -> None:
         llvm = _llvm()
-        module = llvm.parse_assembly(source)
-        module.verify()
-        # Without optimization the code takes 3 microseconds where the best takes 2, and is made in
-        # a tenth of the time. No instructions beyond those of every such processor: fused
-        # multiplication and addition would round differently.
-        machine = llvm.Target.from_default_triple().create_target_machine(opt=0, jit=True)
-        # the code is gone when the engine is, but needs four times less memory than its source
-        self._engine = llvm.create_mcjit_compiler(module, machine)
+        # the code is gone when the engine is
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
-        address = self._engine.get_function_address("evaluate")
-        self._engine.remove_module(module)
-        module.close()
-        self._evaluate = _PROTOTYPE(address)
+        self._evaluate = _PROTOTYPE(self._engine.get_function_address("evaluate"))
 
     def bind(
         self, arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]
@@ -168,106 +68,79 @@ class NativeCode:
         return call
 
 
-_compiled: dict[bytes, NativeCode | None] = {}
+# the code, or why there is none
+_compiled: dict[str, NativeCode | str] = {}
 
 
 def native_code(function: ca.Function) -> NativeCode | None:
     """Return the machine code of a function, or None if there can be none.
 
-    Functions of the same content are compiled once per process. It takes 10 microseconds per
-    instruction, as long as the interpreter takes for 2000 evaluations.
+    Functions of the same content are made once per process. It takes 40 microseconds per
+    instruction the first time, as long as the interpreter takes for 5000 evaluations, and a few
+    milliseconds after that.
 
     Args:
-        function: Any function; only functions of scalar expressions (SX) are compiled.
+        function: Any function; of scalar expressions (SX) or matrix expressions (MX) that is
+            compiled, with those that it calls.
     """
-    if not function.is_a("SXFunction") or function.n_instructions() > _MOST_INSTRUCTIONS:
-        return None
-    key = hashlib.sha256(function.serialize().encode()).digest()
+    made = _made(function)
+    return None if isinstance(made, str) else made
+
+
+def why_not(function: ca.Function) -> str | None:
+    """Return why there is no machine code of a function, or None if there is.
+
+    Args:
+        function: Any function.
+    """
+    made = _made(function)
+    return made if isinstance(made, str) else None
+
+
+def _made(function: ca.Function) -> NativeCode | str:
+    key = hashlib.sha256(function.serialize().encode()).hexdigest()
     if key not in _compiled:
-        _compiled[key] = _compile(function)
+        try:
+            _compiled[key] = NativeCode(_object_code(function, key))
+        except Untranslatable as reason:
+            _compiled[key] = str(reason)
+        except Exception as error:
+            # whatever is missing or new in llvmlite: it is no reason to stop a controller
+            _compiled[key] = f"{type(error).__name__}: {error}"
     return _compiled[key]
 
 
-def _compile(function: ca.Function) -> NativeCode | None:
-    try:
-        # without it there is no need to translate
-        _llvm()
-        source = translate(function)
-        return None if source is None else NativeCode(source)
-    except Exception:
-        # whatever is missing or new in llvmlite: it is no reason to stop a controller
-        return None
-
-
-def translate(function: ca.Function) -> str | None:
-    """Return a function in LLVM assembly, or None if it contains an unknown operation.
-
-    It defines ``void evaluate(double** table)``; the table has the addresses of the arguments'
-    nonzeros, then those of the results'.
-
-    Args:
-        function: A function of scalar expressions.
-    """
-    lines = []
-    for i in range(function.n_in() + function.n_out()):
-        lines.append(f"%t{i} = getelementptr ptr, ptr %table, i64 {i}")
-        lines.append(f"%a{i} = load ptr, ptr %t{i}")
-    # name or literal of the value that each place of the interpreter's memory has at present
-    values: dict[int, str] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        operands, target = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_CONST:
-            values[target[0]] = _literal(function.instruction_constant(k))
-        elif operation == ca.OP_INPUT:
-            lines.append(f"%p{k} = getelementptr double, ptr %a{operands[0]}, i64 {operands[1]}")
-            lines.append(f"%v{k} = load double, ptr %p{k}")
-            values[target[0]] = f"%v{k}"
-        elif operation == ca.OP_OUTPUT:
-            array = function.n_in() + target[0]
-            lines.append(f"%p{k} = getelementptr double, ptr %a{array}, i64 {target[1]}")
-            lines.append(f"store double {values[operands[0]]}, ptr %p{k}")
-        else:
-            template = _template(operation)
-            if template is None:
-                return None
-            x, y = values[operands[0]], values[operands[-1]]
-            lines.append(template.format(v=f"%v{k}", x=x, y=y))
-            values[target[0]] = f"%v{k}"
-    return _MODULE.format(body="\n".join(lines))
+def _object_code(function: ca.Function, key: str) -> bytes:
+    """Return the object file of a function, as it was kept or new."""
+    llvm, store = _llvm(), user_store()
+    name = hashlib.sha256(f"{_maker()} {key}".encode()).hexdigest()
+    code = store.get(name)
+    if code is None:
+        module = llvm.parse_assembly(translate(function))
+        module.verify()
+        code = _machine().emit_object(module)
+        module.close()
+        store.put(name, code)
+    return code
 
 
 @functools.cache
-def _template(operation: int) -> str | None:
-    """Return the assembly of an operation."""
-    if operation in _INLINE:
-        return "\n".join(_INLINE[operation])
-    if operation in _UNARY_CALLS:
-        address, operands = _address(_UNARY_CALLS[operation]), "double {x}"
-    elif operation in _BINARY_CALLS:
-        address, operands = _address(_BINARY_CALLS[operation]), "double {x}, double {y}"
-    else:
-        return None
-    if address is None:
-        return None
-    # LLVM cannot know what is behind an address, and so cannot put something else there
-    return f"{{v}} = call double inttoptr (i64 {address} to ptr)({operands})"
+def _maker() -> str:
+    """Return what object files depend on besides the function."""
+    llvm = _llvm()
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    program = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    parts = llvm.get_process_triple(), llvm.llvm_version_info, ca.CasadiMeta.version()
+    return f"{parts} {sorted(function_symbols())} {program}"
 
 
-def _address(name: str) -> int | None:
-    """Return where a mathematical function is that CasADi uses, too."""
-    try:
-        library = ctypes.CDLL(ca._casadi.__file__)
-        return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-    except (AttributeError, OSError):
-        return None
+def _machine() -> Any:
+    """Return the code generator.
 
-
-def _literal(value: float) -> str:
-    """Return a constant with all its bits; LLVM wants decimals to be exact."""
-    if math.isnan(value):
-        return "0x7FF8000000000000"
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+    It uses no instructions beyond those of every such processor: fused multiplication and addition
+    would round differently.
+    """
+    return _llvm().Target.from_default_triple().create_target_machine(opt=0, jit=True)
 
 
 @functools.cache
@@ -277,4 +150,6 @@ def _llvm() -> Any:
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    for name, address in function_symbols().items():
+        llvm.add_symbol(name, address)
     return llvm

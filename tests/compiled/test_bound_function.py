@@ -20,7 +20,8 @@ def fixture_compile_after(request, monkeypatch):
 
 
 @pytest.fixture(name="no_llvmlite")
-def fixture_no_llvmlite(monkeypatch):
+def fixture_no_llvmlite(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(native_code, "_compiled", {})
     native_code._llvm.cache_clear()
     for name in ("llvmlite", "llvmlite.binding"):
@@ -72,7 +73,6 @@ def test_compiles_when_it_pays_and_once(monkeypatch):
 
 
 def test_a_method_that_was_kept_uses_machine_code(monkeypatch):
-    pytest.importorskip("llvmlite")
     bound = BoundFunction(FUNCTION)
     evaluate = bound.evaluate
     assert bound.compile()

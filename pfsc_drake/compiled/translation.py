@@ -1,0 +1,242 @@
+"""CasADi functions in LLVM assembly: each function, and each that it calls, once."""
+
+import hashlib
+import re
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.compiled.assembly import Code, Constants, Value, Values, elements, literals
+from pfsc_drake.compiled.computed_indices import helpers, look_up
+from pfsc_drake.compiled.matrix_instructions import projected, translate_instruction
+from pfsc_drake.compiled.operations import (
+    Untranslatable,
+    declarations,
+    literal,
+)
+
+__all__ = ["translate"]
+
+# of one function; machine code without optimizations keeps every value on the stack
+_MOST_INSTRUCTIONS = 50_000
+_LOOK_UP_MODES = {"0": "linear", "1": "exact", "2": "binary"}
+
+
+def translate(function: ca.Function) -> str:
+    """Return a function in LLVM assembly.
+
+    It defines ``void evaluate(double** table)``; the table has the addresses of the arguments'
+    nonzeros, then those of the results'.
+
+    Args:
+        function: A function of scalar or matrix expressions.
+
+    Raises:
+        Untranslatable: If it contains something that has no assembly here.
+    """
+    module = _Module()
+    name = module.function(function)
+    code = Code(module.constants)
+    pointers = []
+    for i in range(function.n_in() + function.n_out()):
+        place = code.new(f"getelementptr ptr, ptr %table, i64 {i}")
+        pointers.append(code.new(f"load ptr, ptr {place}"))
+    code.call(name, pointers)
+    entry = code.text("@evaluate", ["%table"]).replace("define internal", "define", 1)
+    text = "\n".join([*module.texts, entry])
+    return "\n".join([declarations(text), module.constants.text(), helpers(text), text])
+
+
+class _Module:
+    """Functions that are translated so far."""
+
+    def __init__(self) -> None:
+        self.constants = Constants()
+        self.texts: list[str] = []
+        self._names: dict[bytes, str] = {}
+
+    def function(self, function: ca.Function) -> str:
+        """Translate a function where that has not been done, and return its name.
+
+        Its parameters are pointers to the nonzeros of each argument, then of each result.
+        """
+        key = hashlib.sha256(function.serialize().encode()).digest()
+        if key not in self._names:
+            kinds: dict[str, Callable[[ca.Function], Code]] = {
+                "SXFunction": self._scalars,
+                "MXFunction": self._matrices,
+                "Map": self._map,
+                "Switch": self._switch,
+            }
+            kind = function.class_name()
+            if kind not in kinds:
+                raise Untranslatable(f"{function.name()}, a {kind}")
+            code = kinds[kind](function)
+            if len(code) > _MOST_INSTRUCTIONS:
+                raise Untranslatable(f"{function.name()}, of {len(code)} instructions")
+            self._names[key] = f"@f{len(self._names)}"
+            self.texts.append(
+                code.text(self._names[key], [*_arguments(function), *_results(function)])
+            )
+        return self._names[key]
+
+    def _scalars(self, function: ca.Function) -> Code:
+        if function.n_instructions() > _MOST_INSTRUCTIONS:
+            raise Untranslatable(f"{function.name()}, of {function.n_instructions()} instructions")
+        code = Code(self.constants)
+        arguments, results = _arguments(function), _results(function)
+        # the value that each place of the interpreter's memory has at present
+        places: dict[int, Value] = {}
+        for k in range(function.n_instructions()):
+            what = function.instruction_id(k)
+            operands, target = function.instruction_input(k), function.instruction_output(k)
+            if what == ca.OP_CONST:
+                places[target[0]] = literal(function.instruction_constant(k))
+            elif what == ca.OP_INPUT:
+                places[target[0]] = code.load((arguments[operands[0]], operands[1]))
+            elif what == ca.OP_OUTPUT:
+                code.store(places[operands[0]], results[target[0]], target[1])
+            else:
+                places[target[0]] = code.apply(what, *[places[i] for i in operands])
+        return code
+
+    def _matrices(self, function: ca.Function) -> Code:
+        code = Code(self.constants)
+        arguments, results = _arguments(function), _results(function)
+        look_up_modes = iter(_look_up_modes(function))
+        # the numbers that each place of the interpreter's memory has at present
+        places: dict[int, Values] = {}
+        put_out: list[tuple[str, int, Values]] = []
+        for k in range(function.n_instructions()):
+            what, node = function.instruction_id(k), function.instruction_MX(k)
+            values: list[Values]
+            if what == ca.OP_INPUT:
+                part = node.info()
+                values = [elements(arguments[part["ind"]], node.nnz(), part["offset"])]
+            else:
+                operands = [
+                    # what is not there is zero
+                    places[place] if place >= 0 else literals(np.zeros(node.dep(i).nnz()))
+                    for i, place in enumerate(function.instruction_input(k))
+                ]
+                if what == ca.OP_OUTPUT:
+                    part = node.info()
+                    put_out.append((results[part["ind"]], part["offset"], operands[0]))
+                    continue
+                if what == ca.OP_CALL:
+                    values = self._call(code, node.which_function(), operands)
+                elif what == ca.OP_LOW:
+                    values = [look_up(code, operands, next(look_up_modes))]
+                else:
+                    values = translate_instruction(code, what, node, operands)
+            places |= dict(zip(function.instruction_output(k), values, strict=True))
+        # what is read before anything is written may be overwritten
+        for _, _, numbers in put_out:
+            for number in numbers:
+                code.load(number)
+        for pointer, first, numbers in put_out:
+            for i, number in enumerate(numbers):
+                code.store(number, pointer, first + i)
+        return code
+
+    def _call(self, code: Code, function: ca.Function, operands: list[Values]) -> list[Values]:
+        results = [code.buffer(function.nnz_out(i)) for i in range(function.n_out())]
+        pointers = [code.pointer(values) for values in operands]
+        code.call(self.function(function), [*pointers, *results])
+        return [elements(result, function.nnz_out(i)) for i, result in enumerate(results)]
+
+    def _map(self, function: ca.Function) -> Code:
+        """Translate a function that is evaluated with one set of columns after another."""
+        once, repetitions = function.info()["f"], function.info()["n"]
+        name = self.function(once)
+        code = Code(self.constants)
+        code.add("br label %next")
+        code.add("next:")
+        code.add("%i = phi i64 [0, %0], [%following, %next]")
+        pointers = []
+        for pointer, size in [
+            *zip(_arguments(once), _sizes_in(once), strict=True),
+            *zip(_results(once), _sizes_out(once), strict=True),
+        ]:
+            offset = code.new(f"mul i64 %i, {size}")
+            pointers.append(code.new(f"getelementptr double, ptr {pointer}, i64 {offset}"))
+        code.call(name, pointers)
+        code.add("%following = add i64 %i, 1")
+        code.add(f"%done = icmp sge i64 %following, {repetitions}")
+        code.add("br i1 %done, label %end, label %next")
+        code.add("end:")
+        return code
+
+    def _switch(self, function: ca.Function) -> Code:
+        """Translate a function whose first argument chooses one of several."""
+        cases = [*function.info()["f"], function.info()["f_def"]]
+        names = [self._case(function, case) for case in cases]
+        code = Code(self.constants)
+        index, *arguments = _arguments(function)
+        chosen = code.new(f"call i64 @index(double {code.load((index, 0))})")
+        choices = " ".join(f"i64 {i}, label %case{i}" for i in range(len(cases) - 1))
+        code.add(f"switch i64 {chosen}, label %case{len(cases) - 1} [{choices}]")
+        for i, name in enumerate(names):
+            code.add(f"case{i}:")
+            code.call(name, [*arguments, *_results(function)])
+            code.add("br label %end")
+        code.add("end:")
+        return code
+
+    def _case(self, function: ca.Function, case: ca.Function) -> str:
+        """Return the name of a case of a switch, with the switch's patterns of nonzeros."""
+        inner = self.function(case)
+        given_in = [function.sparsity_in(i + 1) for i in range(case.n_in())]
+        given_out = [function.sparsity_out(i) for i in range(case.n_out())]
+        wanted_in = [case.sparsity_in(i) for i in range(case.n_in())]
+        wanted_out = [case.sparsity_out(i) for i in range(case.n_out())]
+        if given_in == wanted_in and given_out == wanted_out:
+            return inner
+        code = Code(self.constants)
+        operands = [
+            projected(elements(pointer, given.nnz()), given, wanted)
+            for pointer, given, wanted in zip(_arguments(case), given_in, wanted_in, strict=True)
+        ]
+        values = self._call(code, case, operands)
+        for result, numbers, given, wanted in zip(
+            _results(case), values, wanted_out, given_out, strict=True
+        ):
+            for i, number in enumerate(projected(numbers, given, wanted)):
+                code.store(number, result, i)
+        name = f"@case{len(self.texts)}"
+        self.texts.append(code.text(name, [*_arguments(case), *_results(case)]))
+        return name
+
+
+def _look_up_modes(function: ca.Function) -> list[str]:
+    """Return how each table look-up of a matrix function searches, in the order of instructions.
+
+    Only the C code says it.
+    """
+    instructions = range(function.n_instructions())
+    if all(function.instruction_id(k) != ca.OP_LOW for k in instructions):
+        return []
+    generator = ca.CodeGenerator("modes")
+    generator.add(function)
+    source = generator.dump()
+    exported = re.search(r"\n}\n\nCASADI_SYMBOL_EXPORT int \w+\(const casadi_real\*\* arg", source)
+    assert exported is not None
+    body = source[source.rindex("\nstatic int casadi_f", 0, exported.start()) : exported.start()]
+    return [_LOOK_UP_MODES[mode] for mode in re.findall(r"= casadi_low\(.*, (\d)\);", body)]
+
+
+def _arguments(function: ca.Function) -> list[str]:
+    return [f"%a{i}" for i in range(function.n_in())]
+
+
+def _results(function: ca.Function) -> list[str]:
+    return [f"%r{i}" for i in range(function.n_out())]
+
+
+def _sizes_in(function: ca.Function) -> list[int]:
+    return [function.nnz_in(i) for i in range(function.n_in())]
+
+
+def _sizes_out(function: ca.Function) -> list[int]:
+    return [function.nnz_out(i) for i in range(function.n_out())]
