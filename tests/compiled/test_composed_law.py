@@ -5,9 +5,7 @@ import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from pfsc_drake.control.law.law_functions import completion_function, law_function
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
-from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.linear_algebra import solve
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
@@ -16,7 +14,7 @@ from tests.compiled.interpreter import SPECIAL, assert_same_bits, both
 
 
 def tick():
-    """Two ticks of the elastic law, with a table for the gains of the drives' friction."""
+    """Two ticks of an elastic law, with a table and two switches."""
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_elastic_3r")))
     plant.Finalize()
@@ -25,35 +23,26 @@ def tick():
     linearization = linearize(
         robot, "elastic", PathManifold(r, oriented=False), ActuationOptions(1e-3)
     )
-    m = linearization.num_outputs
-    gains = [gains_from_poles([-50.0] * r)] * m
-    stabilization = Stabilization(gains, r, ["eta", "xi_1", "xi_2"])
-    law = law_function(robot, linearization, stabilization, None)
-    completion = completion_function(linearization, np.full(n, 100.0))
+    m, law = linearization.num_outputs, linearization.function
     A, rhs = ca.SX.sym("A", m, n), ca.SX.sym("rhs", m)
     inverse = ca.Function("inverse", [A, rhs], [ca.densify(x) for x in solve(A, rhs)])
-    given = {name: ca.MX.sym(name, law.sparsity_in(name)) for name in law.name_in()}
+    given = [ca.MX.sym(law.name_in(i), law.sparsity_in(i)) for i in range(law.n_in())]
+    state, *others = given
+    v, before, results = ca.MX.sym("v", m), ca.MX.sym("before", n), []
+    last = before
     table = ca.DM(np.linspace(0.0, 2.0, 120))
-    held, results = ca.MX.sym("held", n), []
-    for state in (given["state"], 0.999 * given["state"]):
-        wanted = law(**given | {"state": state})
-        x, rcond = inverse(wanted["A"], wanted["rhs"])
-        place = ca.low(table, ca.norm_2(state[n : 2 * n]))
-        done = completion(
-            solution=x,
-            friction=ca.sin(ca.MX(table)[place] * state[n : 2 * n]),
-            last_held=results[-1][:n] if results else held,
-            lead=ca.if_else(place > 60.0, 0.5, 0.0),
-            rcond=rcond,
-            state=state,
-            tau_ext=given["tau_ext"],
-            **{name: wanted[name] for name in ("gain", "drift", "offset", "Y", "v")},
-        )
-        safe = ca.if_else(
-            done["check"] < 1e6, done["result"], ca.MX.zeros(done["result"].shape), True
-        )
-        results.append(safe)
-    return ca.Function("tick", [*given.values(), held], results)
+    for _ in range(2):
+        _, A, b, gain, drift, offset, _ = law(state, *others)
+        x, rcond = inverse(A, v - b)
+        speed = state[n : 2 * n]
+        place = ca.low(table, ca.norm_2(speed))
+        held = gain @ x + drift
+        lead = ca.if_else(place > 60.0, 0.5, 0.0)
+        wanted = held + lead * (held - last) + offset + ca.sin(ca.MX(table)[place] * speed)
+        drive = ca.fmin(ca.fmax(wanted, -100.0), 100.0)
+        results.append(ca.if_else(rcond > 1e-12, drive, ca.MX.zeros(n), True))
+        state, last = 0.999 * state, results[-1]
+    return ca.Function("tick", [*given, v, before], results)
 
 
 def test_law():
