@@ -31,7 +31,6 @@ from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.guidance import MODES, stiff_regions
-from diagrams.tasks.law import make_law
 from diagrams.tasks.law_warnings import law_warnings
 from diagrams.tasks.make import make_task
 from diagrams.tasks.path_following import PathTask
@@ -43,6 +42,7 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.fuse import fuse_blocks
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring

@@ -13,6 +13,7 @@ LAYERS = [
     ["identification"],
     ["reporting"],
     ["diagrams"],
+    ["pfsc_drake.following"],
     ["pfsc_drake.systems"],
     ["pfsc_drake.physics"],
     ["pfsc_drake.control"],

@@ -9,12 +9,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
 
 from diagrams.robots.part import Drives, RobotPart
-from diagrams.safety import safe_state, supervision
+from diagrams.safety import supervision
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.safety import safe_state
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters

@@ -1,9 +1,7 @@
 """What a scenario file says: its schema, one file per block."""
 
 from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
-from diagrams.scenario.controller import ControllerParameters, GainParameters, LawGains
-from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
-from diagrams.scenario.faults import BrakeParameters, FaultParameters
+from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -18,11 +16,14 @@ from diagrams.scenario.path import (
     PathParameters,
     Waypoints,
 )
-from diagrams.scenario.posture import PostureParameters
 from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
+from pfsc_drake.following.options.controller import ControllerParameters, GainParameters, LawGains
+from pfsc_drake.following.options.faults import BrakeParameters, FaultParameters
+from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.following.options.posture import PostureParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.link_hand import LinkHandParameters

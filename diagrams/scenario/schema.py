@@ -11,9 +11,7 @@ from diagrams.scenario.checks import (
     require_positive,
 )
 from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
-from diagrams.scenario.controller import ControllerParameters
-from diagrams.scenario.drives import JointFrictionParameters, ServoParameters
-from diagrams.scenario.faults import FaultParameters
+from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
@@ -27,6 +25,9 @@ from diagrams.scenario.simulation import SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.workpiece import WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.link_hand import LinkHandParameters

@@ -4,11 +4,11 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.friction_compensation import FrictionCompensationParameters
 from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.controller import ControllerParameters
 from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.fixtures import FixtureParameters
 from experiments.results.guidance_warnings import guidance_warnings, observed_lag
@@ -16,6 +15,7 @@ from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.following.options.controller import ControllerParameters
 from tests.control.fixtures.point_robot import (
     DAMPING,
     DELAY,

@@ -4,12 +4,47 @@ import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_not_negative, require_positive
-from diagrams.scenario.drives import JointFrictionParameters
+from pfsc_drake.checks import require, require_not_negative, require_positive
+from pfsc_drake.physics.friction import FrictionDrift
+from pfsc_drake.yaml.files import NAME_OR_FILE
 
 _SOURCES = ("none", "model", "observer")
 _OBSERVERS = ("disturbance", "kalman")
 _VELOCITIES = ("measured", "reference")
+
+
+_LARGEST = 1e9  # of friction; what it multiplies stays within a float
+
+
+@dc.dataclass
+class JointFrictionParameters:
+    """Coulomb and viscous friction of the joints; empty for none.
+
+    Attributes:
+        f_c: Coulomb friction of every joint [Nm or N].
+        f_v: Viscous friction of every joint [Nm s/rad or N s/m].
+        file: Instead, name of a shipped robot or YAML file with robot parameters, whose
+            friction of the first joints is taken.
+        drift: How it changes during the run; null for not at all.
+    """
+
+    f_c: list[float] = dc.field(default_factory=list)
+    f_v: list[float] = dc.field(default_factory=list)
+    file: str = dc.field(default="", metadata=NAME_OR_FILE)
+    drift: FrictionDrift | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("f_c", "f_v"):
+            values = getattr(self, key)
+            valid = all(0.0 <= value <= _LARGEST for value in values)
+            require(valid, key, values, f"finite numbers, none negative, at most {_LARGEST:g}")
+        given = bool(self.f_c or self.f_v)
+        require(not (self.file and given), "file", self.file, "either file, or f_c and f_v")
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there is any friction."""
+        return bool(self.f_c or self.f_v or self.file)
 
 
 @dc.dataclass

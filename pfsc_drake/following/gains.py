@@ -1,10 +1,8 @@
-"""Gains of a scenario: those given, and poles that are chosen for what they have to bear."""
+"""Gains of a law: those given, and poles that are chosen for what they have to bear."""
 
 import dataclasses as dc
 from collections.abc import Callable
 
-from diagrams.scenario import ControllerParameters, GainParameters, LawGains
-from diagrams.tasks.posture import make_posture
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.posture import Posture
@@ -17,6 +15,12 @@ from pfsc_drake.control.law.stabilization import (
     gains_from_poles,
 )
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.controller import (
+    ControllerParameters,
+    GainParameters,
+    LawGains,
+)
+from pfsc_drake.following.posture import make_posture
 from pfsc_drake.robot.robot_model import RobotModel
 
 _DIGITS = 3
@@ -28,7 +32,7 @@ def gains_of(
     """Return the gains of one kind of coordinate.
 
     Args:
-        parameters: What the scenario says.
+        parameters: What is chosen.
         relative_degree: ``r`` of the law.
         law: Name of the law.
         name: Of the kind, for messages.
@@ -62,7 +66,7 @@ def loop_gains(by_kind: LawGains, law: str, linearization: Linearization) -> Loo
     """Return all gains of a law; coordinates of a kind share theirs.
 
     Args:
-        by_kind: What the scenario says.
+        by_kind: What is chosen.
         law: Name of the law.
         linearization: The law.
 
@@ -111,7 +115,7 @@ def sampled_robot(
     """Return a law on its robot at rest.
 
     Args:
-        parameters: What the scenario says.
+        parameters: What is chosen.
         robot: The robot.
         linearization: The law, which commands torques.
         rest: Where the robot rests.
@@ -128,10 +132,10 @@ def choose_poles(
     linearization: Linearization,
     rest: Callable[[], RestPosture] | None,
 ) -> None:
-    """Fill in the poles that a scenario leaves open, by the rule of the fast pair.
+    """Fill in the poles that are left open, by the rule of the fast pair.
 
     Args:
-        parameters: What the scenario says; changed.
+        parameters: What is chosen; changed.
         robot: The robot.
         linearization: The law.
         rest: Tells where the robot starts at rest.

@@ -1,13 +1,9 @@
-"""The law of a scenario."""
+"""The law of a controller."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-from diagrams.safety import safe_state
-from diagrams.scenario import ControllerParameters, FaultParameters
-from diagrams.tasks.gains import choose_poles, loop_gains
-from diagrams.tasks.posture import make_posture
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (
@@ -18,6 +14,11 @@ from pfsc_drake.control.law.linearization import (
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.gains import choose_poles, loop_gains
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.posture import make_posture
+from pfsc_drake.following.safety import safe_state
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -31,7 +32,7 @@ def make_law(
     """Return the law that makes a robot follow a manifold.
 
     Args:
-        parameters: What the scenario says; poles that are to be chosen are filled in.
+        parameters: What is chosen; poles that are to be chosen are filled in.
         robot: The robot.
         manifold: What to follow.
         rest: Tells where the robot starts at rest; needed to choose poles.

@@ -1,13 +1,13 @@
-"""The controller of a scenario."""
+"""The controller."""
 
 import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_not_negative, require_positive
-from diagrams.scenario.friction_compensation import FrictionCompensationParameters
-from diagrams.scenario.posture import PostureParameters
+from pfsc_drake.checks import require, require_not_negative, require_positive
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.following.options.friction import FrictionCompensationParameters
+from pfsc_drake.following.options.posture import PostureParameters
 from pfsc_drake.yaml.files import NAME_OR_FILE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 

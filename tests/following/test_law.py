@@ -8,10 +8,10 @@ from diagrams.scenario import (
     GainParameters,
     LawGains,
 )
-from diagrams.tasks.law import make_law
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.law import make_law
 
 
 def by_poles(*poles):

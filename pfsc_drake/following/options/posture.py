@@ -1,10 +1,10 @@
-"""What the joints of a scenario's robot do that its task leaves free."""
+"""What the joints of a robot do that its task leaves free."""
 
 import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import (
+from pfsc_drake.checks import (
     LARGEST_ANGLE,
     require,
     require_not_negative,

@@ -1,10 +1,10 @@
-"""What a scenario's robot takes for a fault, and how it ends safely."""
+"""What a robot takes for a fault, and how it ends safely."""
 
 import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.checks import require, require_not_negative, require_positive
+from pfsc_drake.checks import require, require_not_negative, require_positive
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 
