@@ -19,13 +19,14 @@ from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.swing import SwingingReference
+from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
-from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.swinging_manifold import SwingingManifold
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -95,10 +96,9 @@ def add_place(
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     if not isinstance(task, SpaceTask):
         order = reference_order(following.scenario, linearization)
-        generator = builder.AddNamedSystem(
-            "reference_generator",
-            ReferenceGenerator(task.motion, order, linearization.num_outputs),
-        )
+        period = following.scenario.controller.sampling_time
+        timed = TimedReference(task.motion, order, linearization.num_outputs, period)
+        generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     period = following.scenario.controller.sampling_time

@@ -24,6 +24,7 @@ from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
+from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import (
     FourierCurve,
@@ -37,7 +38,6 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
@@ -106,7 +106,7 @@ class Chain:
             FollowingController(self.law, PERIOD, SupervisionParameters())
         )
         motion = rest_to_rest([0.0, 5.0], velocity=1.5, acceleration=5.0)
-        reference = builder.AddSystem(ReferenceGenerator(motion, r, m))
+        reference = builder.AddSystem(BlockSystem(TimedReference(motion, r, m, PERIOD), PERIOD))
         builder.ExportInput(measured.get_input_port(), "plant_state")
         builder.Connect(measured.get_output_port(), kinematics.GetInputPort("joint_state"))
         builder.Connect(measured.get_output_port(), controller.GetInputPort("joint_state"))

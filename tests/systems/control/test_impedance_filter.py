@@ -22,6 +22,7 @@ from pfsc_drake.control.compliance.impedance import (
     Profile,
 )
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
@@ -32,11 +33,11 @@ from pfsc_drake.geometry import (
 )
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.reference_generator import ReferenceGenerator
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
@@ -91,7 +92,7 @@ def test_over_time_it_is_the_law():
     """With a reference, a force and parameters that all vary."""
     law, eta_d = make_law(4), rest_to_rest([0.1, 0.4], velocity=0.5, acceleration=3.0)
     builder = DiagramBuilder()
-    source = builder.AddSystem(ReferenceGenerator(eta_d, 4, 3))
+    source = builder.AddSystem(BlockSystem(TimedReference(eta_d, 4, 3, PERIOD), PERIOD))
     system = builder.AddSystem(ImpedanceFilter(law))
     force = builder.AddSystem(MatrixGain(np.eye(3, 15) * [[80.0], [40.0], [0.0]]))
     measured = builder.AddSystem(MatrixGain(0.02 * np.ones((12, 15))))
