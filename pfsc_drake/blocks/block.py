@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, ClassVar
 
 
@@ -59,6 +59,8 @@ class Block:
         inputs: Ports by name.
         outputs: Ports by name.
         states: Sizes of what is remembered, by name.
+        inner: Sizes of what :meth:`output` finds beside the outputs and returns for :meth:`update`,
+            so that nothing is evaluated twice, by name.
         expands: Whether the methods' functions may be written out as scalars, which makes them
             faster. Not for a block whose rare cases are skipped (``short_circuit``).
     """
@@ -67,6 +69,7 @@ class Block:
     inputs: Mapping[str, Port]
     outputs: Mapping[str, Port]
     states: Mapping[str, int]
+    inner: Mapping[str, int] = MappingProxyType({})
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the start; what is left out is zero.
@@ -79,7 +82,7 @@ class Block:
         return {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """Return all outputs, those that :meth:`update` wants to read again among them.
+        """Return all outputs, and what is :attr:`inner`.
 
         Args:
             x: States.
@@ -94,7 +97,7 @@ class Block:
         Args:
             x: States.
             u: Inputs; None if an optional one is not connected.
-            y: Outputs at this tick, so that nothing is evaluated twice.
+            y: Outputs at this tick, and what is :attr:`inner`.
             t: Number of the present tick.
         """
         del x, u, y, t

@@ -79,7 +79,8 @@ class Network:
         groups = [node.results for node in cls.of(block).nodes] if unconnected else []
         inputs = {name: p for name, p in block.inputs.items() if name not in unconnected}
         x, u = _symbols(block.states), _symbols({name: p.size for name, p in inputs.items()})
-        y = _symbols({name: p.size for name, p in block.outputs.items()})
+        sizes = {name: p.size for name, p in block.outputs.items()} | dict(block.inner)
+        y = _symbols(sizes)
         t = ca.MX.sym("t")
         of_x, of_y = Values(**x), Values(**y)
         of_u = Values(**u, **dict.fromkeys(unconnected))
@@ -90,7 +91,6 @@ class Network:
         initials = _nodes(block, "initial", known, begin, [tuple(begin)])
         known |= {Source("state", name): symbol for name, symbol in x.items()}
         outputs = block.output(of_x, of_u, t)
-        sizes = {name: p.size for name, p in block.outputs.items()}
         _check(block, "output", outputs, sizes, every=True)
         nodes = _nodes(block, "output", known, outputs, groups)
         known |= {Source("wire", name): symbol for name, symbol in y.items()}

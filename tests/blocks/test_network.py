@@ -54,6 +54,18 @@ class Part(Block):
         return {"y": u.u[self.index]}
 
 
+class Square(Block):
+    """``y = x``, ``x+ = z + 1`` with ``z = u^2``, which output finds and does not put out."""
+
+    inputs, outputs, states, inner = {"u": Port(1)}, {"y": Port(1)}, {"x": 1}, {"z": 1}
+
+    def output(self, x, u, t):
+        return {"y": x.x, "z": u.u**2}
+
+    def update(self, x, u, y, t):
+        return {"x": y.z + 1.0}
+
+
 def test_a_block_calculates_on_numbers():
     out = Lag().output(Values(value=ca.DM([1.0, 2.0])), Values(value=ca.DM([3.0, 6.0])), 0)
     np.testing.assert_array_equal(out["rate"].full().ravel(), [0.5, 1.0])
@@ -135,6 +147,17 @@ def test_stages_share_what_they_evaluate():
         if function.instruction_id(k) == ca.OP_CALL
     ]
     assert sorted(calls) == 2 * ["Lag_output_0"] + 2 * ["Lag_output_1"] + 2 * ["Lag_update_0"]
+
+
+def test_what_is_found_on_the_way_is_remembered_and_not_put_out():
+    stepper = Stepper(Square())
+    outs = [stepper.step(u=float(u)) for u in range(4)]
+    assert [set(out) for out in outs] == 4 * [{"y"}]
+    assert [out["y"][0] for out in outs] == [0.0, 1.0, 2.0, 5.0]
+    # an inner value is no part of the outputs' feedthrough
+    program = Program(Network.of(Square()))
+    assert not program.stages[program.output("y")[0]].needs
+    assert not program.update_inputs
 
 
 def test_algebraic_loops_are_named():

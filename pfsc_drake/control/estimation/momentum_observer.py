@@ -70,6 +70,7 @@ class MomentumObserver(Block):
         self.outputs = {"estimate": Port(values, "Nm or N, per s, per s^2")}
         of_joints = ("momentum", "forces", "acting", "acted")
         self.states = {"estimate": values} | dict.fromkeys(of_joints, n) | {"seen": 1}
+        self.inner = {"momentum": n, "forces": n}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
@@ -77,28 +78,23 @@ class MomentumObserver(Block):
         p, f = self._momentum(u.joint_state)
         tau = x.acting + model.delay / T * (x.acted - x.acting)
         z_mean = model.sign * ((p - x.momentum) / T - (f + x.forces) / 2.0 - tau)
-        predicted = self._by_columns(x.estimate)
-        innovation = where(x.seen > 0.0, z_mean - predicted[:, 0], 0.0)
-        return {"estimate": ca.vec(predicted + innovation @ ca.DM(self._filter.gain).T)}
+        predicted = x.estimate[: model.dimension]
+        sample = where(x.seen > 0.0, z_mean, predicted)
+        estimate = self._filter.estimate(x.estimate, sample)
+        return {"estimate": estimate, "momentum": p, "forces": f}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
-        p, f = self._momentum(u.joint_state)
         acting = ca.DM(self._model.drive_weight) * u.drive_torque
         if u.known_torque is not None:
             acting += ca.DM(self._model.known_weight) * u.known_torque
-        predicted = self._by_columns(y.estimate) @ ca.DM(self._filter.transition).T
         sampled = {
-            "estimate": ca.vec(predicted),
-            "momentum": p,
-            "forces": f,
+            "estimate": self._filter.predict(y.estimate),
+            "momentum": y.momentum,
+            "forces": y.forces,
             "acting": acting,
             "acted": x.acting,
         }
         good = all_finite(*sampled.values())
         kept = {name: where(good, value, getattr(x, name)) for name, value in sampled.items()}
         return kept | {"seen": good}
-
-    def _by_columns(self, estimate: Any) -> Any:
-        """Return torque, first derivative, .. as columns."""
-        return ca.reshape(estimate, self._model.dimension, -1)

@@ -1,7 +1,9 @@
 """Derivatives of a sampled signal, as they are known at the last sample."""
 
 import math
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.errors import InputError
@@ -20,7 +22,7 @@ class SignalDerivatives:
 
     with the Taylor matrix Phi; all poles of the error are at beta. Signals that are
     polynomials of degree k are followed without lag. (N. Morrison, Introduction to Sequential
-    Smoothing and Prediction, 1969.)
+    Smoothing and Prediction, 1969.) Samples and states are numbers (``casadi.DM``) or expressions.
 
     Args:
         num_derivatives: Degree k, 0 to 2.
@@ -56,34 +58,45 @@ class SignalDerivatives:
             [[_taylor(period, column - row) for column in orders] for row in orders]
         )
 
-    def start(self, sample: np.ndarray) -> np.ndarray:
+    def start(self, sample: Any) -> Any:
         """Return the state of a signal that has always been at rest.
 
         Args:
             sample: First sample, shape (N,).
 
         Returns:
-            Shape (k + 1, N).
+            Shape ((k + 1) N,).
         """
-        state = np.zeros((len(self.gain), len(sample)))
-        state[0] = sample
-        return state
+        return ca.vertcat(sample, ca.DM.zeros(sample.numel() * (len(self.gain) - 1)))
 
-    def estimate(self, state: np.ndarray, sample: np.ndarray) -> np.ndarray:
-        """Return the signal and its derivatives at a sample, one row each.
+    def estimate(self, state: Any, sample: Any) -> Any:
+        """Return the signal and its derivatives at a sample, one after another.
 
         Args:
-            state: Prediction for this sample, shape (k + 1, N).
+            state: Prediction for this sample, shape ((k + 1) N,).
             sample: Shape (N,).
 
         Returns:
-            Shape (k + 1, N) [unit, unit/s, ..].
+            Shape ((k + 1) N,) [unit, unit/s, ..].
         """
-        return state + np.outer(self.gain, sample - state[0])
+        predicted = self._by_columns(state)
+        innovation = sample - predicted[:, 0]
+        return ca.vec(predicted + innovation @ ca.DM(self.gain).T)
 
-    def predict(self, estimate: np.ndarray) -> np.ndarray:
-        """Return the state for the next sample, shape (k + 1, N)."""
-        return self.transition @ estimate
+    def predict(self, estimate: Any) -> Any:
+        """Return the state for the next sample.
+
+        Args:
+            estimate: Signal and derivatives at this sample, shape ((k + 1) N,).
+
+        Returns:
+            Shape ((k + 1) N,).
+        """
+        return ca.vec(self._by_columns(estimate) @ ca.DM(self.transition).T)
+
+    def _by_columns(self, values: Any) -> Any:
+        """Return signal, first derivative, .. as columns, shape (N, k + 1)."""
+        return ca.reshape(values, -1, len(self.gain))
 
 
 def _taylor(period: float, order: int) -> float:

@@ -1,5 +1,6 @@
 """Derivatives of sampled signals, against the signals' own and against weighted least squares."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -11,11 +12,12 @@ PERIOD = 1e-3
 
 def follow(estimator, samples):
     """Return the estimates at all samples, shape (samples, k + 1, N)."""
+    samples = [ca.DM(sample) for sample in samples]
     state, estimates = estimator.start(samples[0]), []
     for sample in samples:
         estimates.append(estimator.estimate(state, sample))
         state = estimator.predict(estimates[-1])
-    return np.array(estimates)
+    return np.array([x.full().reshape(-1, sample.numel()) for x in estimates])
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
