@@ -11,10 +11,11 @@ from diagrams.surroundings.hand import connect_hand
 from diagrams.surroundings.mounting import Mounting, tool_transform
 from diagrams.surroundings.plate_plant import add_plate_plant
 from diagrams.tasks.task import StartPoint, Task
+from pfsc_drake.control.compliance.payload_compensation import PayloadCompensation
 from pfsc_drake.physics.hand_model import HandParameters, Place
 from pfsc_drake.physics.suction import holding_cups
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.payload_compensation import PayloadCompensation
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.mounting_operator import MountingOperator
 from pfsc_drake.systems.physics.suction_gripper import SuctionGripper
 from pfsc_drake.systems.physics.tool_motion import ToolMotion
@@ -136,14 +137,9 @@ def add_payload(
     """
     plate = mounting.parameters
     center = np.array([0.0, 0.0, plate.size[2] / 2.0])
+    load = PayloadCompensation(plate.believed_mass, center, np.array(scenario.robot.gravity))
     system = builder.AddNamedSystem(
-        "payload_compensation",
-        PayloadCompensation(
-            plate.believed_mass,
-            center,
-            np.array(scenario.robot.gravity),
-            scenario.controller.sampling_time,
-        ),
+        "payload_compensation", BlockSystem(load, scenario.controller.sampling_time)
     )
     inputs = {
         "wrench": "wrench_measured", "tool_pose": "tool_pose", "held": "held", "tared": "tared",

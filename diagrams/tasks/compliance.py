@@ -15,6 +15,7 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceLaw,
 )
 from pfsc_drake.control.compliance.led_motion import LedMotion
+from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
@@ -24,9 +25,9 @@ from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
 from pfsc_drake.systems.control.impedance_tuner import ImpedanceTuner
-from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.systems.control.pressing import Pressing
 
 # up to which derivative the filter knows the external reference, see ImpedanceLaw
@@ -119,10 +120,8 @@ def add_compliance(
     impedance = builder.AddNamedSystem(
         "impedance_filter", ImpedanceFilter(law, start="actual", limits=limits)
     )
-    transform = builder.AddNamedSystem(
-        "manifold_force_transform",
-        ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning),
-    )
+    along = ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning)
+    transform = builder.AddNamedSystem("manifold_force_transform", BlockSystem(along, period))
     reference = impedance.GetOutputPort("reference")
     force = transform.GetOutputPort("manifold_force")
     wrench, ready = "wrench_measured", "tared"

@@ -3,9 +3,10 @@
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
+from pfsc_drake.control.estimation.external_torque import ExternalTorque
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.external_torque import ExternalTorque
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 
 # by source the signals that tell, and the ports of ExternalTorque for them
@@ -47,7 +48,7 @@ def add_external_torque(
     period, degree = scenario.controller.sampling_time, controller.relative_degree
     if scenario.controller.posture.yields == "known":
         posture = ExternalTorque(robot, 0, period)
-        made |= _add(builder, "posture_torque", posture, _SEEN["known"], ports)
+        made |= _add(builder, "posture_torque", posture, period, _SEEN["known"], ports)
     if parameters.source not in _SEEN:
         return made
     if degree == 1:
@@ -56,7 +57,7 @@ def add_external_torque(
             f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
         )
     torque = ExternalTorque(robot, degree - 2, period, parameters.bandwidth)
-    made |= _add(builder, "tau_ext", torque, _SEEN[parameters.source], ports)
+    made |= _add(builder, "tau_ext", torque, period, _SEEN[parameters.source], ports)
     if "tau_ext" in made:
         builder.Connect(made["tau_ext"], controller.GetInputPort("tau_ext"))
     return made
@@ -66,6 +67,7 @@ def _add(
     builder: DiagramBuilder,
     name: str,
     torque: ExternalTorque,
+    period: float,
     seen: dict[str, str],
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
@@ -73,8 +75,8 @@ def _add(
     acting = {signal: ports[signal] for signal in seen if signal in ports}
     if not acting:
         return {}
-    builder.AddNamedSystem(_SYSTEMS[name], torque)
+    system = builder.AddNamedSystem(_SYSTEMS[name], BlockSystem(torque, period))
     for signal, port in acting.items():
-        builder.Connect(port, torque.GetInputPort(seen[signal]))
-    builder.Connect(ports["joint_state"], torque.GetInputPort("joint_state"))
-    return {name: torque.GetOutputPort("tau_ext")}
+        builder.Connect(port, system.GetInputPort(seen[signal]))
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    return {name: system.GetOutputPort("tau_ext")}

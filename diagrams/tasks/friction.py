@@ -5,6 +5,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
+from pfsc_drake.control.estimation.friction_model import FrictionModel
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
@@ -12,8 +13,6 @@ from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.friction_compensation import FrictionCompensation
-from pfsc_drake.systems.control.friction_estimator import FrictionEstimator
 
 # f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
 Coefficients = tuple[np.ndarray, np.ndarray]
@@ -56,7 +55,9 @@ def add_friction_compensation(
         signals["velocity"] = controller.GetOutputPort("reference_velocity")
     logged, compensated = {}, None
     if parameters.source == "model":
-        compensated = _add_model(builder, parameters, robot, believed, signals)
+        compensated = _add_model(
+            builder, parameters, believed, signals, scenario.controller.sampling_time
+        )
         logged = {"friction_estimate": compensated}
     if parameters.source == "observer" or parameters.watched:
         torque, estimate = _add_observer(builder, scenario, robot, believed, signals)
@@ -71,17 +72,15 @@ def add_friction_compensation(
 def _add_model(
     builder: DiagramBuilder,
     parameters: FrictionCompensationParameters,
-    robot: RobotModel,
     believed: Coefficients | None,
     ports: dict[str, OutputPort],
+    period: float,
 ) -> OutputPort:
     """Add friction of believed coefficients, and return its torque."""
     f_c, f_v = _required(believed, "source = model")
     velocity = ports.get("velocity", ports["joint_state"])
-    model = builder.AddNamedSystem(
-        "friction_compensation",
-        FrictionCompensation(f_c, f_v, parameters.smoothing, velocity.size()),
-    )
+    friction = FrictionModel(f_c, f_v, parameters.smoothing, velocity.size())
+    model = builder.AddNamedSystem("friction_compensation", BlockSystem(friction, period))
     builder.Connect(velocity, model.GetInputPort("velocity"))
     return model.GetOutputPort("friction_torque")
 
@@ -96,15 +95,13 @@ def _add_observer(
     """Add an observer of friction, and return the torque and all that it tells."""
     parameters, period = scenario.controller.friction, scenario.controller.sampling_time
     momentum = drive_momentum(robot).with_delay(velocity_delay(scenario))
-    system: BlockSystem | FrictionEstimator
-    torque = "estimate"
+    block: FrictionKalmanFilter | MomentumObserver
     if parameters.observer == "kalman":
         coefficients = _required(believed, "observer = kalman")
-        system = FrictionEstimator(_kalman(parameters, momentum, coefficients, period), period)
-        torque = "friction_torque"
+        block, torque = _kalman(parameters, momentum, coefficients, period), "friction_torque"
     else:
-        system = BlockSystem(MomentumObserver(momentum, parameters.rate, period), period)
-    observer = builder.AddNamedSystem("friction_observer", system)
+        block, torque = MomentumObserver(momentum, parameters.rate, period), "estimate"
+    observer = builder.AddNamedSystem("friction_observer", BlockSystem(block, period))
     for name in ("joint_state", "drive_torque", "velocity"):
         if name in ports and observer.HasInputPort(name):
             builder.Connect(ports[name], observer.GetInputPort(name))

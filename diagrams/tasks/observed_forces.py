@@ -8,11 +8,11 @@ from diagrams.scenario import Scenario
 from diagrams.tasks.friction import velocity_delay
 from pfsc_drake.control.estimation.generalized_momentum import link_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.control.estimation.tool_wrench import ToolWrench
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.tool_wrench import ToolWrench
 
 
 def add_observed_forces(
@@ -71,7 +71,9 @@ def add_observed_forces(
             builder, "tool_force_observer", robot, scenario, inputs, parameters.rate, 0
         )
         bands = (parameters.force_dead_band, parameters.torque_dead_band)
-        wrench = builder.AddNamedSystem("tool_wrench", ToolWrench(robot, parameters.damping, bands))
+        fit = ToolWrench(robot, parameters.damping, bands)
+        period = scenario.controller.sampling_time
+        wrench = builder.AddNamedSystem("tool_wrench", BlockSystem(fit, period))
         builder.Connect(torque, wrench.GetInputPort("tau_ext"))
         builder.Connect(ports["joint_state"], wrench.GetInputPort("joint_state"))
         ready = builder.AddNamedSystem("no_taring", ConstantVectorSource(np.ones(1)))

@@ -1,14 +1,16 @@
 """Coefficients of friction from how the joints move: the Kalman filter of App. A."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.control.estimation.friction_model import friction_torque, require_smoothing
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
-from pfsc_drake.control.estimation.sampled_estimator import SampledEstimator
 from pfsc_drake.errors import InputError
 
 INTERVALS = ("mean", "begin")
@@ -46,7 +48,7 @@ class FrictionNoise:
             raise InputError(f"noise: initial = {self.initial}; must be zero or positive, finite")
 
 
-class FrictionKalmanFilter(SampledEstimator):
+class FrictionKalmanFilter(Block):
     """Linear time-varying Kalman filter of ``x_i = [p_i, f_c,i, f_v,i]`` for each axis (A.5).
 
     Between two samples at times ``t_{k-1}`` and ``t_k = t_{k-1} + T`` the model is::
@@ -63,7 +65,26 @@ class FrictionKalmanFilter(SampledEstimator):
     (s for a velocity that goes evenly from one value to the other), and an axis at rest, below a
     velocity, is left alone: a drive that sticks tells nothing about its coefficients. Velocities
     and positions are those that friction acts on, of the motors. Where velocities are measured
-    with a delay, all is taken that much earlier.
+    with a delay, all is taken that much earlier. After a sample that is not finite the estimate
+    stands still, and the next sample starts a new interval.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        drive_torque (input): What the drives are told until the next tick, within their limits
+            [Nm or N], shape (N,).
+        known_torque (input, optional): What else is known to act until then, see
+            :class:`~pfsc_drake.control.estimation.generalized_momentum.MomentumModel`, shape
+            (N,); zero if not connected.
+        velocity (input, optional): For which the friction torque is wanted [rad/s or m/s],
+            shape (N,); the motors' measured one if not connected.
+        estimate (output): ``[tau_f, f_c, f_v]``, shape (3N,). What drives the joints may depend
+            on it.
+        friction_torque (output): ``tau_f`` alone, shape (N,).
+
+    State:
+        estimate (``[p, f_c, f_v]`` at the last tick), covariance (entries pp, pc, pv, cc, cv, vv
+        of P, each (N,)); position, velocity and forces of that tick, torques that act since then
+        (``acting``) and before (``acted``); whether there was a sample (``seen``).
 
     Args:
         model: Momenta and forces, of :func:`drive_momentum`; their delay is at most T.
@@ -100,98 +121,117 @@ class FrictionKalmanFilter(SampledEstimator):
         if not 0.0 <= resting_velocity < np.inf:
             raise InputError(f"resting_velocity = {resting_velocity}: must be zero or positive")
         require_smoothing(smoothing)
-        resting = resting_velocity if intervals == "mean" else -1.0
-        super().__init__(
-            _filter_function(model, noise, period, intervals == "mean", resting, smoothing), n
+        self._model, self._period, self._momentum = model, period, model.function()
+        self._first, self._noise, self._smoothing = ca.DM(first.ravel()), noise, smoothing
+        self._mean = intervals == "mean"
+        self._resting = resting_velocity if self._mean else -1.0
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "drive_torque": Port(n, "Nm or N"),
+            "known_torque": Port(n, "Nm or N", optional=True),
+            "velocity": Port(n, "rad/s or m/s", optional=True),
+        }
+        self.outputs = {
+            "estimate": Port(3 * n, "Nm or N, Nm s/rad or N s/m"),
+            "friction_torque": Port(n, "Nm or N"),
+        }
+        filtered, last = {"estimate": 3 * n, "covariance": 6 * n}, ("position", "velocity")
+        sampled = dict.fromkeys((*last, "forces"), n)
+        self.states = filtered | sampled | {"acting": n, "acted": n, "seen": 1}
+        self.inner = {"corrected": 3 * n, "covariance": 6 * n} | sampled
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        zero, one = ca.DM.zeros(self._model.dimension), ca.DM.ones(self._model.dimension)
+        P_0 = self._noise.initial
+        return {
+            "estimate": ca.vertcat(zero, self._first),
+            "covariance": ca.vertcat(zero, zero, zero, P_0 * one, zero, P_0 * one),
+        }
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        momentum, forces = self._momentum(u.joint_state)
+        n, delay = self._model.dimension, self._model.delay
+        q_M, v = ca.vertsplit(u.joint_state, n)[2:]
+        q = q_M - delay * v
+        found, P = self._filtered(x, momentum, forces, q, v)
+        wanted = v if u.velocity is None else u.velocity
+        torque = friction_torque(found[1], found[2], wanted, self._smoothing)
+        return {
+            "estimate": ca.vertcat(torque, *found[1:]),
+            "friction_torque": torque,
+            "corrected": ca.vertcat(*found),
+            "covariance": ca.vertcat(*P),
+            "position": q,
+            "velocity": v,
+            "forces": forces,
+        }
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        acting = ca.DM(self._model.drive_weight) * u.drive_torque
+        if u.known_torque is not None:
+            acting += ca.DM(self._model.known_weight) * u.known_torque
+        sampled = {
+            "estimate": y.corrected,
+            "covariance": y.covariance,
+            "position": y.position,
+            "velocity": y.velocity,
+            "forces": y.forces,
+            "acting": acting,
+            "acted": x.acting,
+        }
+        good = all_finite(*sampled.values())
+        kept = {name: where(good, value, getattr(x, name)) for name, value in sampled.items()}
+        return kept | {"seen": good}
+
+    def _filtered(
+        self, x: Values, momentum: Any, forces: Any, q: Any, v: Any
+    ) -> tuple[list[Any], list[Any]]:
+        """Return p, f_c, f_v, and the entries of P, after a sample; all axes at once."""
+        T, model, noise = self._period, self._model, self._noise
+        p, f_c, f_v = ca.vertsplit(x.estimate, model.dimension)
+        pp, pc, pv, cc, cv, vv = ca.vertsplit(x.covariance, model.dimension)
+        tau = x.acting + model.delay / T * (x.acted - x.acting)
+        v_0 = x.velocity
+        if self._mean:
+            turns = v * v_0 < 0.0
+            share = (ca.fabs(v) - ca.fabs(v_0)) / where(turns, v - v_0, 1.0)
+            s, w = T * where(turns, share, ca.sign(v + v_0)), q - x.position
+            forces = (forces + x.forces) / 2.0
+        else:
+            s, w, forces = T * ca.sign(v_0), T * v_0, x.forces
+        # prediction: Phi P Phi^T + Q with Phi = [[1, -s, -w], [0, 1, 0], [0, 0, 1]]
+        Q_p, Q_c, Q_v, R = (
+            ca.DM(value)
+            for value in (noise.momentum, noise.coulomb, noise.viscous, noise.measurement)
         )
-        self._velocity = self.arguments["velocity"]
-        self.initial_memory[n : 3 * n] = first.ravel()
-        # variances of f_c and f_v
-        for block in (6, 8):
-            self.initial_memory[block * n : (block + 1) * n] = noise.initial
-
-    def estimate(
-        self, memory: np.ndarray, state: np.ndarray, velocity: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Return friction torque [Nm or N], f_c and f_v at a sample, shape (3N,).
-
-        Args:
-            memory: From the last sample, as :attr:`initial_memory`.
-            state: ``[q_J, v_J, q_M, v_M]`` at this sample, shape (4N,).
-            velocity: For which the torque is wanted, shape (N,); the motors' if omitted.
-
-        Returns:
-            A view that the next evaluation overwrites.
-        """
-        self._velocity[:] = state[3 * self.num_joints :] if velocity is None else velocity
-        return super().estimate(memory, state)
-
-
-def _filter_function(
-    model: MomentumModel,
-    noise: FrictionNoise,
-    period: float,
-    mean: bool,
-    resting: float,
-    smoothing: float,
-) -> ca.Function:
-    """Return one step of the filter, all axes at once, elementwise.
-
-    ``(memory, state, velocity, drive_torque, known_torque) -> (estimate, next memory, check)``;
-    the check is finite only if the next memory is. Memory: p, f_c, f_v; the entries pp, pc, pv,
-    cc, cv, vv of P; position, velocity, forces and torques of the last sample, and the torques
-    of the one before; whether there was one.
-    """
-    n = model.dimension
-    memory, velocity = ca.SX.sym("memory", 14 * n + 1), ca.SX.sym("velocity", n)
-    drive, known = ca.SX.sym("drive_torque", n), ca.SX.sym("known_torque", n)
-    p, f_c, f_v, pp, pc, pv, cc, cv, vv, q_0, v_0, forces_0, last, before = ca.vertsplit(
-        memory[:-1], n
-    )
-    acting = last + model.delay / period * (before - last)
-    q, v = ca.vertsplit(model.state, n)[2:]
-    q = q - model.delay * v
-    if mean:
-        turns = v * v_0 < 0.0
-        share = (ca.fabs(v) - ca.fabs(v_0)) / ca.if_else(turns, v - v_0, 1.0)
-        s = period * ca.if_else(turns, share, ca.sign(v + v_0))
-        w = q - q_0
-        u = acting + (model.forces + forces_0) / 2.0
-    else:
-        s, w, u = period * ca.sign(v_0), period * v_0, acting + forces_0
-    # prediction: Phi P Phi^T + Q with Phi = [[1, -s, -w], [0, 1, 0], [0, 0, 1]]
-    Q_p, Q_c, Q_v, R = (
-        ca.DM(x) for x in (noise.momentum, noise.coulomb, noise.viscous, noise.measurement)
-    )
-    pc_1, pv_1 = pc - s * cc - w * cv, pv - s * cv - w * vv
-    pp_1 = pp - s * (pc + pc_1) - w * (pv + pv_1) + Q_p
-    cc_1, vv_1 = cc + Q_c, vv + Q_v
-    # correction
-    innovation = model.momentum - (p - s * f_c - w * f_v + period * u)
-    gain = [x / (pp_1 + R) for x in (pp_1, pc_1, pv_1)]
-    corrected = [
-        p - s * f_c - w * f_v + period * u + gain[0] * innovation,
-        f_c + gain[1] * innovation,
-        f_v + gain[2] * innovation,
-        pp_1 - gain[0] * pp_1,
-        pc_1 - gain[0] * pc_1,
-        pv_1 - gain[0] * pv_1,
-        cc_1 - gain[1] * pc_1,
-        cv - gain[1] * pv_1,
-        vv_1 - gain[2] * pv_1,
-    ]
-    # nothing is learned from an interval at rest, or whose begin is unknown
-    anew = [model.momentum, f_c, f_v, ca.SX(R), ca.SX(n, 1), ca.SX(n, 1), cc, cv, vv]
-    learns = ca.logic_and(memory[-1] > 0.0, ca.fmin(ca.fabs(v), ca.fabs(v_0)) > resting)
-    filtered = [ca.if_else(learns, a, b) for a, b in zip(corrected, anew, strict=True)]
-    told = ca.DM(model.drive_weight) * drive + ca.DM(model.known_weight) * known
-    following = ca.vertcat(*filtered, q, v, model.forces, told, last, 1.0)
-    torque = friction_torque(filtered[1], filtered[2], velocity, smoothing)
-    results = [ca.vertcat(torque, *filtered[1:3]), following, ca.sum1(following)]
-    return ca.Function(
-        "friction_kalman_filter",
-        [memory, model.state, velocity, drive, known],
-        ca.cse([ca.densify(result) for result in results]),
-        ["memory", "state", "velocity", "drive_torque", "known_torque"],
-        ["estimate", "next", "check"],
-    )
+        predicted = p - s * f_c - w * f_v + T * (tau + forces)
+        pc_1, pv_1 = pc - s * cc - w * cv, pv - s * cv - w * vv
+        pp_1 = pp - s * (pc + pc_1) - w * (pv + pv_1) + Q_p
+        cc_1, vv_1 = cc + Q_c, vv + Q_v
+        # correction
+        innovation = momentum - predicted
+        gain = [value / (pp_1 + R) for value in (pp_1, pc_1, pv_1)]
+        estimate = [
+            predicted + gain[0] * innovation,
+            f_c + gain[1] * innovation,
+            f_v + gain[2] * innovation,
+        ]
+        P = [
+            pp_1 - gain[0] * pp_1,
+            pc_1 - gain[0] * pc_1,
+            pv_1 - gain[0] * pv_1,
+            cc_1 - gain[1] * pc_1,
+            cv - gain[1] * pv_1,
+            vv_1 - gain[2] * pv_1,
+        ]
+        # nothing is learned from an interval at rest, or whose begin is unknown
+        moves = ca.fmin(ca.fabs(v), ca.fabs(v_0)) > self._resting
+        learns = ca.logic_and(x.seen > 0.0, moves)
+        anew = [momentum, f_c, f_v], [R, 0.0, 0.0, cc, cv, vv]
+        return (
+            [where(learns, a, b) for a, b in zip(estimate, anew[0], strict=True)],
+            [where(learns, a, b) for a, b in zip(P, anew[1], strict=True)],
+        )

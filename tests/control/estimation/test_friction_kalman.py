@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
 from pfsc_drake.errors import InputError
@@ -54,11 +55,14 @@ def swing(count=3 * COUNT):
 
 def estimate(kalman, states, drives, velocity=None):
     """Return the estimates at all samples, shape (samples, 3N)."""
-    memory, estimates = kalman.initial_memory.copy(), []
-    for k, state in enumerate(states):
-        estimates.append(kalman.estimate(memory, state, velocity).copy())
-        kalman.remember(memory, state, drives[min(k, len(drives) - 1)])
-    return np.array(estimates)
+    given = {} if velocity is None else {"velocity": velocity}
+    stepper = Stepper(kalman, tuple(given))
+    return np.array(
+        [
+            stepper.step(joint_state=state, drive_torque=drive, **given)["estimate"]
+            for state, drive in zip(states, [*drives, drives[-1]], strict=True)
+        ]
+    )
 
 
 def test_is_the_filter_of_the_appendix(drake_arm):
@@ -157,6 +161,23 @@ def test_a_lost_sample_costs_no_more_than_its_interval():
     assert np.isnan(estimates[300]).any()
     assert np.array_equal(estimates[301, 2:], estimates[299, 2:])
     np.testing.assert_allclose(estimates[-1, 2:], np.concatenate([F_C, F_V]), rtol=2e-3)
+
+
+def test_known_torques_are_taken_off(drake_arm):
+    """What acts besides, told as such, teaches the same as none."""
+    arm, push = drake_arm("rigid"), np.array([25.0, -40.0, 15.0])
+    drives = np.array([150.0, -250.0, 90.0]) * np.sin(0.3 * np.arange(40)[:, None] + [0, 1, 2])
+    model = drive_momentum(arm.chain)
+    states = arm.move(drives, lambda _: np.zeros(3), lambda _: np.zeros(3), PERIOD)
+
+    def ends(drives, **known):
+        stepper = Stepper(FrictionKalmanFilter(model, np.ones((2, 3)), noise(3), PERIOD), known)
+        for state, drive in zip(states, drives, strict=False):
+            out = stepper.step(joint_state=state, drive_torque=drive, **known)
+        assert np.array_equal(out["friction_torque"], out["estimate"][:3])
+        return out["estimate"]
+
+    np.testing.assert_allclose(ends(drives - push, known_torque=push), ends(drives), rtol=1e-9)
 
 
 def make(start=((1.0, 1.0), (1.0, 1.0)), **options):

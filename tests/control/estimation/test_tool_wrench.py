@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.estimation.tool_wrench import tool_wrench_function
+from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.estimation.tool_wrench import ToolWrench
 from pfsc_drake.errors import InputError
 
 WRENCH = np.array([12.0, -7.0, 30.0, 1.5, -0.8, 0.6])
@@ -16,16 +17,22 @@ def torques(robot, q, wrench):
     return J[3:].T @ wrench[:3] + J[:3].T @ wrench[3:]
 
 
+def wrench_of(block, q, tau):
+    n = len(q)
+    state = np.concatenate([q, np.ones(n), np.full(2 * n, np.nan)])
+    return Stepper(block).step(joint_state=state, tau_ext=tau)["wrench"]
+
+
 def test_the_wrench_of_six_torques(load_robot):
     robot = load_robot("comau_racer_1_4")
-    found = tool_wrench_function(robot.chain)(Q, torques(robot, Q, WRENCH))
-    np.testing.assert_allclose(np.array(found).ravel(), WRENCH, rtol=0, atol=1e-9)
+    found = wrench_of(ToolWrench(robot.chain), Q, torques(robot, Q, WRENCH))
+    np.testing.assert_allclose(found, WRENCH, rtol=0, atol=1e-9)
 
 
 def test_the_force_of_three_torques(load_robot):
     robot, force = load_robot("comau_racer_1_4_3r"), np.append(WRENCH[:3], np.zeros(3))
-    found = tool_wrench_function(robot.chain)(Q[:3], torques(robot, Q[:3], force))
-    np.testing.assert_allclose(np.array(found).ravel(), force, rtol=0, atol=1e-9)
+    found = wrench_of(ToolWrench(robot.chain), Q[:3], torques(robot, Q[:3], force))
+    np.testing.assert_allclose(found, force, rtol=0, atol=1e-9)
 
 
 def test_damping_keeps_a_singular_posture_from_blowing_up(load_robot):
@@ -35,7 +42,7 @@ def test_damping_keeps_a_singular_posture_from_blowing_up(load_robot):
     noise = 0.1 * np.array([1.0, -1.0, 1.0, 1.0, 1.0, -1.0])
     tau = torques(robot, straight, WRENCH) + noise
     wild, tame = (
-        np.abs(np.array(tool_wrench_function(robot.chain, damping)(straight, tau))).max()
+        np.abs(wrench_of(ToolWrench(robot.chain, damping), straight, tau)).max()
         for damping in (0.0, 0.02)
     )
     assert wild > 1e3
@@ -44,8 +51,8 @@ def test_damping_keeps_a_singular_posture_from_blowing_up(load_robot):
 
 def test_dead_bands_shorten(load_robot):
     robot = load_robot("comau_racer_1_4")
-    function = tool_wrench_function(robot.chain, dead_bands=(10.0, 5.0))
-    found = np.array(function(Q, torques(robot, Q, WRENCH))).ravel()
+    block = ToolWrench(robot.chain, dead_bands=(10.0, 5.0))
+    found = wrench_of(block, Q, torques(robot, Q, WRENCH))
     size = np.linalg.norm(WRENCH[:3])
     np.testing.assert_allclose(found[:3], WRENCH[:3] * (size - 10.0) / size, atol=1e-9)
     assert not found[3:].any()
@@ -54,17 +61,18 @@ def test_dead_bands_shorten(load_robot):
 def test_refused(load_robot):
     chain = load_robot("comau_racer_1_4").chain
     with pytest.raises(InputError, match="damping = -1"):
-        tool_wrench_function(chain, -1.0)
+        ToolWrench(chain, -1.0)
     with pytest.raises(InputError, match="dead bands = nan"):
-        tool_wrench_function(chain, dead_bands=(np.nan, 0.0))
+        ToolWrench(chain, dead_bands=(np.nan, 0.0))
     four = type(chain)(chain.links[:4])
     with pytest.raises(InputError, match="torques in 4 joints"):
-        tool_wrench_function(four)
+        ToolWrench(four)
 
 
 def test_force_and_torque_have_dead_bands_of_their_own(load_robot):
-    function = tool_wrench_function(load_robot("comau_racer_1_4").chain, dead_bands=(10.0, 0.5))
-    found = np.array(function(Q, torques(load_robot("comau_racer_1_4"), Q, WRENCH))).ravel()
+    robot = load_robot("comau_racer_1_4")
+    block = ToolWrench(robot.chain, dead_bands=(10.0, 0.5))
+    found = wrench_of(block, Q, torques(robot, Q, WRENCH))
     for part, width in ((slice(0, 3), 10.0), (slice(3, 6), 0.5)):
         size = np.linalg.norm(WRENCH[part])
         np.testing.assert_allclose(found[part], WRENCH[part] * (size - width) / size, atol=1e-9)

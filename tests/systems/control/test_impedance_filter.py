@@ -21,6 +21,7 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceStatus,
     Profile,
 )
+from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -36,7 +37,6 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
-from pfsc_drake.systems.control.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
@@ -256,7 +256,7 @@ def test_the_rotational_forces_may_depend_on_the_reference(path):
     R_d = Rotation.from_matrix(quaternion_to_matrix(point[manifold.layout.quaternion][:4]))
     builder = DiagramBuilder()
     system = builder.AddSystem(ImpedanceFilter(law))
-    transform = builder.AddSystem(ManifoldForceTransform(manifold))
+    transform = builder.AddSystem(BlockSystem(ManifoldForceTransform(manifold), PERIOD))
     builder.Connect(system.GetOutputPort("reference"), transform.GetInputPort("reference"))
     builder.Connect(transform.get_output_port(), system.GetInputPort("manifold_force"))
     simulator = Simulator(builder.Build())
@@ -299,7 +299,9 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
         "projector": builder.AddSystem(PathProjector(path, 2, PERIOD)),
         "controller": builder.AddSystem(controller),
         "filter": builder.AddSystem(ImpedanceFilter(make_law(far=60.0), start=start)),
-        "transform": builder.AddSystem(ManifoldForceTransform(PathManifold(2, oriented=False))),
+        "transform": builder.AddSystem(
+            BlockSystem(ManifoldForceTransform(PathManifold(2, oriented=False)), PERIOD)
+        ),
         "desired": builder.AddSystem(ConstantVectorSource(desired)),
         "wrench": builder.AddSystem(ConstantVectorSource(force)),
         "hold": builder.AddSystem(ZeroOrderHold(PERIOD, 3)),

@@ -1,0 +1,42 @@
+"""The velocity of the joints that a reference asks for, as the controller tells it."""
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+
+from pfsc_drake.systems.control.following_controller import FollowingController
+
+PERIOD = 1e-3
+V = np.array([0.2, -0.3, 0.4])
+
+
+def test_the_velocity_that_the_reference_asks_for(arm, path, make_law):
+    """The joints at that velocity have the reference's rate; told a tick later, zero before."""
+    law = make_law(tells_reference_velocity=True)
+    system, theta = FollowingController(law, PERIOD), 0.6
+    simulator = Simulator(system)
+    context = simulator.get_mutable_context()
+    q = arm.reach(path.position.derivatives(theta, 0)[0] + np.array([0.004, -0.006, 0.005]))
+    point = path.evaluator(2)(arm.pose(q)[:3].tolist(), theta)
+    reference = np.zeros(9)
+    reference[:6] = [point[1] + 0.01, 0.001, 0.0, 0.4, -0.1, 0.05]
+
+    def fix(v):
+        state = np.concatenate([q, v, q, v])
+        values = {"joint_state": state, "manifold_point": point, "reference": reference}
+        for name, value in values.items():
+            system.GetInputPort(name).FixValue(context, value)
+
+    fix(V)
+    simulator.Initialize()
+    told = system.GetOutputPort("reference_velocity")
+    assert not told.Eval(context).any()
+    simulator.AdvanceTo(PERIOD)
+    wanted = told.Eval(context).copy()
+    fix(wanted)
+    rate = system.GetOutputPort("manifold_state").Eval(context)[3:]
+    np.testing.assert_allclose(rate, reference[3:6], rtol=0, atol=1e-12)
+    assert np.abs(wanted - V).min() > 1e-3
+
+
+def test_a_law_that_does_not_tell_velocities_has_no_such_port(make_law):
+    assert not FollowingController(make_law(), PERIOD).HasOutputPort("reference_velocity")
