@@ -318,7 +318,7 @@ def _beside(scene: FaultScene) -> np.ndarray:
     point, layout = scene.now.signals["manifold_point"], scene.place.layout
     offset = scene.now.signals["tool_pose"][:3] - point[layout.position][:3]
     across = indices(scene.place.coordinates, Kind.TRANSVERSAL)
-    return scene.place.axes(point)[:, across].T @ offset
+    return scene.place.axes(point).full()[:, across].T @ offset
 
 
 def _place(scene: FaultScene) -> str:

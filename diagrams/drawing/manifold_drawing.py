@@ -86,7 +86,7 @@ class SurfaceDrawing:
         layout = self.manifold.layout
 
         def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return point[layout.position][:3], self.manifold.axes(point)
+            return point[layout.position][:3], self.manifold.axes(point).full()
 
         skin, lines = skin_and_lines(self.surface)
         drawing = builder.AddNamedSystem(

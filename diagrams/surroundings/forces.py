@@ -14,10 +14,11 @@ from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.physics.decoupled_force import DecoupledForce
 from pfsc_drake.physics.force_profile import ForceProfile
+from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.physics.decoupled_force import DecoupledForce
-from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
@@ -116,7 +117,9 @@ def _scripted(
     pulses = [pulse for pulse in scenario.forces if not pulse.link]
     if pulses:
         profile = ForceProfile(pulses)
-        operator = builder.AddNamedSystem("operator", ScriptedForce(profile, task.manifold, period))
+        operator = builder.AddNamedSystem(
+            "operator", BlockSystem(ScriptedForce(profile, task.manifold, period), period)
+        )
         if profile.needs_manifold:
             builder.Connect(ports["manifold_point"], operator.GetInputPort("manifold_point"))
         sources.append(operator.GetOutputPort("wrench"))
@@ -130,7 +133,7 @@ def _scripted(
         assert isinstance(manifold, PathManifold)
         shape = (pulse.begin, pulse.end, pulse.ramp, pulse.force)
         brake = builder.AddNamedSystem(
-            "hold_back", DecoupledForce(part.robot, manifold, shape, period)
+            "hold_back", BlockSystem(DecoupledForce(part.robot, manifold, shape, period), period)
         )
         for name in ("joint_state", "manifold_point"):
             builder.Connect(ports[name], brake.GetInputPort(name))

@@ -1,19 +1,18 @@
 """An operator whose hand guides the tool."""
 
 from collections.abc import Callable
-from typing import TypeVar
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.hand_model import HandParameters, Place
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.physics.operator_hand import OperatorHand
-
-Hand = TypeVar("Hand", bound=OperatorHand)
 
 
 def add_hand(
@@ -53,8 +52,8 @@ def connect_hand(
     task: Task,
     scenario: Scenario,
     joint_state: OutputPort,
-    make: Callable[[HandParameters, float, Place], Hand],
-) -> Hand:
+    make: Callable[[HandParameters, float, Place], OperatorHand],
+) -> BlockSystem:
     """Add a hand of some kind that sees where the tool really is.
 
     Args:
@@ -69,16 +68,16 @@ def connect_hand(
     Raises:
         InputError: See :func:`add_hand`.
     """
-    parameters = scenario.hand
+    parameters, period = scenario.hand, scenario.controller.sampling_time
     assert parameters is not None
     if parameters.frame == "manifold":
         for i, place in enumerate(parameters.places()[1]):
             task.check_place(place, f"hand.waypoints[{i}].position")
     try:
-        hand = make(parameters, scenario.controller.sampling_time, task.target())
+        block = make(parameters, period, task.target())
     except InputError as error:
         raise InputError(f"hand.{error}") from None
-    builder.AddNamedSystem("operator_hand", hand)
+    hand = builder.AddNamedSystem("operator_hand", BlockSystem(block, period))
     view = builder.AddNamedSystem("hand_view", ToolKinematics(robot))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))

@@ -12,13 +12,14 @@ from diagrams.surroundings.mounting import Mounting, tool_transform
 from diagrams.surroundings.plate_plant import add_plate_plant
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.payload_compensation import PayloadCompensation
-from pfsc_drake.physics.hand_model import HandParameters, Place
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.physics.mounting_hand import MountingHand
 from pfsc_drake.physics.suction import holding_cups
+from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.mounting_operator import MountingOperator
 from pfsc_drake.systems.physics.suction_gripper import SuctionGripper
-from pfsc_drake.systems.physics.tool_motion import ToolMotion
 
 
 def add_mounting(
@@ -52,7 +53,7 @@ def add_mounting(
     plate, period = mounting.parameters, scenario.controller.sampling_time
     places, gravity = mounting.plates(start), np.array(scenario.robot.gravity)
     world = add_plate_plant(builder, plate, mounting.X_WM, mounting.X_WF, places, gravity)
-    motion = builder.AddNamedSystem("tool_motion", ToolMotion(robot))
+    motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(robot), period))
     builder.Connect(joint_state, motion.GetInputPort("joint_state"))
     held = None
     if plate.start != "magazine":
@@ -107,13 +108,13 @@ def _add_operator(
     task: Task,
     scenario: Scenario,
     joint_state: OutputPort,
-) -> MountingOperator:
+) -> BlockSystem:
     operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
     goal = mounting.X_WF.translation(), mounting.X_WF.rotation().matrix()
 
-    def make(hand: HandParameters, period: float, place: Place) -> MountingOperator:
+    def make(hand: HandParameters, period: float, place: Place) -> MountingHand:
         assert operator is not None
-        return MountingOperator(hand, operator, goal, pin_length, period, place)
+        return MountingHand(hand, operator, goal, pin_length, period, place)
 
     return connect_hand(builder, robot, task, scenario, joint_state, make)
 

@@ -11,10 +11,10 @@ from diagrams.scenario import Scenario
 from diagrams.surroundings.operator_file import columns, read_controls
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, WISHES
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.live_hand import ASKED
+from pfsc_drake.physics.live_hand import ASKED, LiveHand
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.physics.live_hand import LiveHand
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 from pfsc_drake.systems.physics.recorded_controls import RecordedControls
 
@@ -145,8 +145,9 @@ def add_live_hand(
     if operator is None:
         return []
     assert scenario.operator is not None
+    period = scenario.controller.sampling_time
     hand = builder.AddNamedSystem(
-        "live_hand", LiveHand(scenario.operator.hand, scenario.controller.sampling_time)
+        "live_hand", BlockSystem(LiveHand(scenario.operator.hand, period), period)
     )
     view = builder.AddNamedSystem("live_hand_view", ToolKinematics(robot))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))

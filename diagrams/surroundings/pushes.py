@@ -12,10 +12,10 @@ from diagrams.scenario import ForcePulse, Scenario
 from diagrams.tasks.task import Task
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForceProfile
-from pfsc_drake.physics.link_hand import LinkHandParameters
+from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
+from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
-from pfsc_drake.systems.physics.link_hand import LinkHand
-from pfsc_drake.systems.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.plants.link_pushes import LinkPushes
 
 
@@ -68,12 +68,15 @@ def add_pushes(
     builder.Connect(hold.get_output_port(), system.GetInputPort("wrenches"))
     for k, push in enumerate(found):
         if push.hand is not None:
-            source = builder.AddNamedSystem(f"link_hand_{k + 1}", LinkHand(push.hand, period))
+            source = builder.AddNamedSystem(
+                f"link_hand_{k + 1}", BlockSystem(LinkHand(push.hand, period), period)
+            )
             builder.Connect(points.get_output_port(k), source.GetInputPort("point"))
         else:
             profile = ForceProfile(push.pulses)
             source = builder.AddNamedSystem(
-                f"link_script_{k + 1}", ScriptedForce(profile, task.manifold, period)
+                f"link_script_{k + 1}",
+                BlockSystem(ScriptedForce(profile, task.manifold, period), period),
             )
             if profile.needs_manifold:
                 builder.Connect(ports["manifold_point"], source.GetInputPort("manifold_point"))

@@ -160,7 +160,7 @@ class PathTask(Task):
         layout = self.place.layout
         evaluator = self.path.evaluator(layout.order)
         on_path = evaluator.evaluate_at(theta)
-        axes = self.place.axes(on_path)
+        axes = self.place.axes(on_path).full()
         beside = start.offset[0] * axes[:, 1], start.offset[1] * axes[:, 2]
         y_t = on_path[layout.position][:3] + beside[0] + beside[1] + shift
         point = evaluator(y_t.tolist(), theta)

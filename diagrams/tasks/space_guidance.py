@@ -21,7 +21,7 @@ from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.physics.hand_model import Place
+from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 

@@ -126,7 +126,7 @@ class SurfaceTask(Task):
         except InputError as error:
             raise InputError(f"start.theta: {error}") from None
         position = point[self.place.layout.position][:3]
-        return position + start.offset[0] * self.place.axes(point)[:, 2]
+        return position + start.offset[0] * self.place.axes(point).full()[:, 2]
 
     def _euler_warnings(self) -> list[str]:
         """Return :func:`euler_warnings` of the orientation where the tool starts."""
@@ -174,7 +174,7 @@ class SurfaceTask(Task):
         parameters, R_e = self._scenario.surface, start.target.R_e
         if parameters is None or parameters.orientation.kind != "normal" or R_e is None:
             return None
-        axes = self.place.axes(self.point(start))
+        axes = self.place.axes(self.point(start)).full()
         # the tangent stays, which leaves the frame right-handed
         turned = axes @ np.diag([1.0, -1.0, -1.0]) @ axes.T @ R_e
         advice = (

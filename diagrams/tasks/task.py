@@ -13,7 +13,7 @@ from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.geometry.surfaces.report import SurfaceReport
 from pfsc_drake.geometry.surfaces.residuals import Residuals
-from pfsc_drake.physics.hand_model import Place
+from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 

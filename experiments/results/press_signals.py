@@ -22,7 +22,7 @@ def add_pressing(
     workpiece, axes = station.workpiece, station.task.place.axes
     if workpiece is None or not is_pressed(station):
         return
-    normals = np.array([workpiece.normal(axes(point)) for point in points]).reshape(-1, 3)
+    normals = np.array([workpiece.normal(axes(point).full()) for point in points]).reshape(-1, 3)
     force = np.sum(raw["wrench_ext"][:, :3] * normals, axis=1, keepdims=True)
     log.add("normal_force", force, "N", ["f_n"])
 

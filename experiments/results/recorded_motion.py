@@ -56,9 +56,10 @@ def collect_motion(
 def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:
     """Return the tool's way above the workpiece that it gives way to, shape (frames, 3)."""
     workpiece, place = station.workpiece, station.task.place
-    if workpiece is None or len(points) == 0 or workpiece.normal(place.axes(points[0])) is None:
+    if workpiece is None or len(points) == 0:
         return None
-    return y_t + _LIFT * np.array([workpiece.normal(place.axes(point)) for point in points])
+    normals = [workpiece.normal(place.axes(point).full()) for point in points]
+    return None if normals[0] is None else y_t + _LIFT * np.array(normals)
 
 
 def _distance(times: FloatArray, xi: FloatArray, start: float) -> RecordedDistance | None:

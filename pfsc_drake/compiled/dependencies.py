@@ -4,11 +4,15 @@ The sparsity of a Jacobian does not say it: a place in a table has no derivative
 out what goes through it. Here a value depends on all that its calculation reads.
 """
 
+from typing import TypeAlias
+
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 
 __all__ = ["dependencies", "nonzero_dependencies"]
+
+Pattern: TypeAlias = sp.csr_array | np.ndarray
 
 # any result may come from any operand, and the Jacobian does not have all of them
 _READS_EVERYTHING = {
@@ -29,12 +33,11 @@ def dependencies(function: ca.Function) -> np.ndarray:
         Array of bool (number of results, number of arguments). It follows from the structure, not
         from values: true wherever a dependency cannot be excluded.
     """
-    elements = nonzero_dependencies(function).tocoo()
-    rows = np.searchsorted(_ends(_sizes_out(function)), elements.row, side="right")
-    columns = np.searchsorted(_ends(_sizes_in(function)), elements.col, side="right")
-    result = np.zeros((function.n_out(), function.n_in()), dtype=bool)
-    result[rows, columns] = True
-    return result
+    # of each element the argument that it belongs to, which is less than the elements
+    arguments = np.repeat(np.eye(function.n_in(), dtype=bool), _sizes_in(function), axis=0)
+    elements = _Walk().through(function, arguments)
+    results = np.split(elements, _ends(_sizes_out(function))[:-1])
+    return np.array([rows.any(axis=0) for rows in results]).reshape(-1, function.n_in())
 
 
 def nonzero_dependencies(function: ca.Function) -> sp.csr_array:
@@ -64,10 +67,17 @@ class _Walk:
             self._known[key] = function, sp.csr_array(self._of_its_kind(function))
         return self._known[key][1]
 
+    def through(self, function: ca.Function, arguments: np.ndarray) -> np.ndarray:
+        """Return what results depend on, from the same of the arguments' elements."""
+        if function.class_name() == "MXFunction":
+            return self._matrices(function, arguments)
+        return np.asarray(self.function(function) @ arguments)
+
     def _of_its_kind(self, function: ca.Function) -> sp.sparray:
         kind, parts = function.class_name(), function.info()
         if kind == "MXFunction":
-            return self._matrices(function)
+            n_in = sum(_sizes_in(function))
+            return self._matrices(function, sp.eye_array(n_in, dtype=bool, format="csr"))
         if kind == "SXFunction" and not _calls(function):
             return _jacobian(function)
         if kind == "Map":
@@ -76,13 +86,12 @@ class _Walk:
             return self._switch([*parts["f"], parts["f_def"]])
         return _everything(sum(_sizes_out(function)), sum(_sizes_in(function)))
 
-    def _matrices(self, function: ca.Function) -> sp.sparray:
+    def _matrices(self, function: ca.Function, arguments: Pattern) -> Pattern:
         """Return the same of a function of matrix expressions, instruction by instruction."""
-        n_in = sum(_sizes_in(function))
-        arguments = sp.eye_array(n_in, dtype=bool, format="csr")
         first = [0, *_ends(_sizes_in(function))]
+        nothing = arguments[:0]
         # what the elements at each place of the interpreter's memory depend on at present
-        places: dict[int, sp.csr_array] = {}
+        places: dict[int, Pattern] = {}
         results = []
         for k in range(function.n_instructions()):
             node, operation = function.instruction_MX(k), function.instruction_id(k)
@@ -91,13 +100,13 @@ class _Walk:
                 values = arguments[start : start + node.nnz()]
             else:
                 read = [
-                    places[place] if place >= 0 else _nothing(node.dep(i).nnz(), n_in)
+                    places[place] if place >= 0 else _nothing(node.dep(i).nnz(), nothing)
                     for i, place in enumerate(function.instruction_input(k))
                 ]
                 if operation == ca.OP_OUTPUT:
                     results.append((node.info()["ind"], node.info()["offset"], read[0]))
                     continue
-                values = self._instruction(operation, node, _stack(read, n_in))
+                values = self._instruction(operation, node, _stack(read, nothing))
             # a node of several results has no size of its own
             several = node.is_call() or node.n_out() > 1
             row = 0
@@ -107,9 +116,9 @@ class _Walk:
                     places[place] = values[row : row + n_rows]
                 row += n_rows
         results.sort(key=lambda result: result[:2])
-        return _stack([values for _, _, values in results], n_in)
+        return _stack([values for _, _, values in results], nothing)
 
-    def _instruction(self, operation: int, node: ca.MX, operands: sp.csr_array) -> sp.csr_array:
+    def _instruction(self, operation: int, node: ca.MX, operands: Pattern) -> Pattern:
         """Return what an instruction's results depend on, from the same of its operands."""
         if operation == ca.OP_CALL:
             return self.function(node.which_function()) @ operands
@@ -118,7 +127,11 @@ class _Walk:
         if operation == ca.OP_LOW:
             table, sought = node.dep(0).nnz(), node.dep(1).nnz()
             one_by_one = sp.eye_array(sought, dtype=bool)
-            return sp.csr_array(sp.hstack([_everything(sought, table), one_by_one]) @ operands)
+            return sp.csr_array(sp.hstack([_everything(sought, table), one_by_one])) @ operands
+        if node.is_unary() or node.is_binary():
+            pattern = _entry_by_entry(node, operands)
+            if pattern is not None:
+                return pattern
         # by itself, so that its pattern says nothing but what this instruction does
         symbols = [ca.MX.sym(f"x{i}", node.dep(i).sparsity()) for i in range(node.n_dep())]
         return _jacobian(ca.Function("f", symbols, node.eval_mx(symbols))) @ operands
@@ -135,6 +148,18 @@ class _Walk:
         """Return the same of a function whose first argument chooses one of several."""
         any_case = sum((self.function(case) for case in cases[1:]), self.function(cases[0]))
         return sp.hstack([_everything(any_case.shape[0], 1), any_case])
+
+
+def _entry_by_entry(node: ca.MX, operands: Pattern) -> Pattern | None:
+    """Return the same of an operation on each entry; None where entries do not correspond."""
+    sizes = [node.dep(i).nnz() for i in range(node.n_dep())]
+    if any(size not in (1, node.nnz()) for size in sizes):
+        return None
+    pattern = operands[:0]
+    for size, last in zip(sizes, _ends(sizes), strict=True):
+        rows = operands[np.arange(last - size, last) if size > 1 else [last - 1] * node.nnz()]
+        pattern = pattern + rows if pattern.shape[0] else rows
+    return pattern
 
 
 def _jacobian(function: ca.Function) -> sp.csr_array:
@@ -162,14 +187,19 @@ def _everything(n_rows: int, n_columns: int) -> sp.csr_array:
     return sp.csr_array(np.ones((n_rows, n_columns), dtype=bool))
 
 
-def _nothing(n_rows: int, n_columns: int) -> sp.csr_array:
+def _nothing(n_rows: int, like: Pattern) -> Pattern:
     """Return a pattern in which nothing depends on anything."""
-    return sp.csr_array((n_rows, n_columns), dtype=bool)
+    shape = n_rows, like.shape[1]
+    if isinstance(like, np.ndarray):
+        return np.zeros(shape, dtype=bool)
+    return sp.csr_array(shape, dtype=bool)
 
 
-def _stack(patterns: list[sp.csr_array], n_columns: int) -> sp.csr_array:
+def _stack(patterns: list[Pattern], nothing: Pattern) -> Pattern:
     """Return patterns below each other; there may be none."""
-    return sp.vstack([_nothing(0, n_columns), *patterns], format="csr")
+    if isinstance(nothing, np.ndarray):
+        return np.vstack([nothing, *patterns])
+    return sp.vstack([nothing, *patterns], format="csr")
 
 
 def _sizes_in(function: ca.Function) -> list[int]:

@@ -1,10 +1,69 @@
 """A wrench that slows a robot down along its path and does nothing else."""
 
+from typing import Any
+
 import casadi as ca
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, all_of, where
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.control.manifolds.path import PathManifold, path_coordinates
+from pfsc_drake.physics.force_profile import smooth_pulse
 from pfsc_drake.robot.robot_model import RobotModel
+
+_LOOKS_BEFORE = 0.1  # s
+
+
+class DecoupledForce(Block):
+    """A pulse of the wrench of :func:`decoupled_force_function`.
+
+    The wrench's direction is that of the last tick; its size follows the time smoothly.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        manifold_point (input): The path next to the tool.
+        wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
+            shape (6,) [N, Nm].
+
+    State:
+        The wrench of ``unit`` size; looked for while there is a force or will be soon.
+
+    Args:
+        robot: A robot with six axes.
+        manifold: A path with orientation.
+        pulse: ``begin, end, ramp`` [s] and ``force`` along the tangent [N].
+        period: Sampling time [s].
+    """
+
+    expands = False  # the wrench is long, and rarely needed
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        manifold: PathManifold,
+        pulse: tuple[float, float, float, float],
+        period: float,
+    ) -> None:
+        self._begin, self._end, self._ramp, self._force = pulse
+        self._size, self._period = robot.dimension, period
+        self._wrench = decoupled_force_function(robot, manifold)
+        self.inputs = {
+            "joint_state": Port(4 * robot.dimension, "rad, rad/s or m, m/s"),
+            "manifold_point": Port(manifold.layout.size),
+        }
+        self.outputs, self.states = {"wrench": Port(6, "N, Nm")}, {"unit": 6}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        pulse = smooth_pulse(t * self._period, self._begin, self._end, self._ramp)
+        return {"wrench": self._force * pulse * x.unit}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        time, q = t * self._period, u.joint_state[: self._size]
+        near = all_of(time >= self._begin - _LOOKS_BEFORE, time <= self._end)
+        unit = ca.if_else(near, self._wrench(q, u.manifold_point), x.unit, True)
+        return {"unit": where(all_finite(unit), unit, x.unit)}
 
 
 def decoupled_force_function(robot: RobotModel, manifold: PathManifold) -> ca.Function:

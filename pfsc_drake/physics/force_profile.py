@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.errors import InputError
@@ -10,21 +12,21 @@ from pfsc_drake.errors import InputError
 FRAMES = ("world", "manifold")
 
 
-def smooth_step(x: float) -> float:
+def smooth_step(x: Any) -> Any:
     """Return ``10 x^3 - 15 x^4 + 6 x^5``, 0 before x = 0 and 1 after x = 1; C^2."""
-    x = min(max(x, 0.0), 1.0)
+    x = ca.fmin(ca.fmax(x, 0.0), 1.0)
     return x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
 
-def smooth_step_slope(x: float) -> float:
+def smooth_step_slope(x: Any) -> Any:
     """Return the derivative of :func:`smooth_step`."""
-    x = min(max(x, 0.0), 1.0)
+    x = ca.fmin(ca.fmax(x, 0.0), 1.0)
     return 30.0 * x * x * (1.0 - x) * (1.0 - x)
 
 
-def smooth_pulse(time: float, begin: float, end: float, ramp: float) -> float:
+def smooth_pulse(time: Any, begin: float, end: float, ramp: float) -> Any:
     """Return 1 from ``begin + ramp`` to ``end - ramp``, 0 outside ``begin .. end``; C^2."""
-    return min(smooth_step((time - begin) / ramp), smooth_step((end - time) / ramp))
+    return ca.fmin(smooth_step((time - begin) / ramp), smooth_step((end - time) / ramp))
 
 
 def require_vector(key: str, value: np.ndarray) -> np.ndarray:
@@ -84,10 +86,14 @@ class ForcePulse:
         if self.frame not in FRAMES:
             raise InputError(f"frame = {self.frame!r}: must be one of {', '.join(FRAMES)}")
 
-    def at(self, time: float) -> np.ndarray:
-        """Return ``[force, torque]`` in the pulse's own frame, shape (6,) [N, Nm]."""
+    def at(self, time: Any) -> Any:
+        """Return ``[force, torque]`` in the pulse's own frame, shape (6,) [N, Nm].
+
+        Args:
+            time: [s].
+        """
         scale = smooth_pulse(time, self.begin, self.end, self.ramp)
-        return scale * np.concatenate([self.force, self.torque])
+        return scale * ca.DM(np.concatenate([self.force, self.torque]))
 
 
 class ForceProfile:
@@ -101,28 +107,21 @@ class ForceProfile:
         self._by_frame = {
             frame: [pulse for pulse in pulses if pulse.frame == frame] for frame in FRAMES
         }
-        self._spans = [(pulse.begin, pulse.end) for pulse in pulses]
 
     @property
     def needs_manifold(self) -> bool:
         """Whether a pulse is given in manifold coordinates."""
         return bool(self._by_frame["manifold"])
 
-    def is_active(self, begin: float, end: float) -> bool:
-        """Return whether a pulse acts between two times, both included [s]."""
-        return any(first <= end and begin <= last for first, last in self._spans)
-
-    def at(self, time: float, axes: np.ndarray) -> np.ndarray:
+    def at(self, time: Any, axes: Any) -> Any:
         """Return the wrench in world axes, shape (6,) [N, Nm].
 
         Args:
             time: [s].
             axes: Directions of the frame ``manifold`` as columns, shape (3, 3).
         """
-        if not self.is_active(time, time):
-            return np.zeros(6)
         sums = {
-            frame: sum((pulse.at(time) for pulse in pulses), np.zeros(6)).reshape(2, 3)
+            frame: ca.reshape(sum((p.at(time) for p in pulses), ca.DM.zeros(6)), 3, 2)
             for frame, pulses in self._by_frame.items()
         }
-        return (sums["world"] + sums["manifold"] @ axes.T).ravel()
+        return ca.vec(sums["world"] + axes @ sums["manifold"])

@@ -1,17 +1,17 @@
 """A human hand on the tool: a spring-damper towards a moving target, that may turn it too."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.cases import where
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.physics.force_profile import FRAMES, smooth_step
-from pfsc_drake.physics.hand_orientation import OrientationTarget, leg_at, rotation_vectors
+from pfsc_drake.physics.hand_orientation import OrientationTarget, rotation_vector
+from pfsc_drake.physics.hand_way import HandWay, Place
 from pfsc_drake.physics.wandering import Wander
-
-# from coordinates and their rates, shape (3,) each, to position and velocity in the world
-Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 _FARTHEST = 1e4  # m
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
@@ -143,7 +143,7 @@ class HandParameters:
 
 
 class HandModel:
-    """Force of a hand on the tool.
+    """Force of a hand on the tool, as expressions of time and of what it sees.
 
     The hand wants ``f_c = K (p_d - y_t) + D (p_d' - y_t')`` and
     ``tau_c = K_r r + D_r (w_d - w)``, and
@@ -165,18 +165,19 @@ class HandModel:
     """
 
     def __init__(self, parameters: HandParameters, place: Place | None = None) -> None:
-        self._parameters, self._place = parameters, None
+        self._parameters = parameters
         if parameters.frame == "manifold":
             require(place is not None, "frame", parameters.frame, "world without a path")
-            self._place = place
-        self._times, self._positions = parameters.places()
+        else:
+            place = None
+        times, positions = parameters.places()
+        self._times, self._way = times, HandWay(times, positions, place)
         self._orientation = parameters.orientation()
         random = np.random.default_rng(parameters.seed)
         low, high = parameters.tremor_band
         steps = np.arange(_TREMOR_LINES) + random.uniform(size=(3, _TREMOR_LINES))
         self._pulsations = 2.0 * np.pi * (low + (high - low) * steps / _TREMOR_LINES)
         self._phases = random.uniform(0.0, 2.0 * np.pi, (3, _TREMOR_LINES))
-        self._amplitude = parameters.tremor * np.sqrt(2.0 / _TREMOR_LINES)
 
     @property
     def begin(self) -> float:
@@ -188,37 +189,29 @@ class HandModel:
         """When the target comes to rest for good [s]."""
         return float(self._times[-1])
 
-    def target(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+    def target(self, time: Any) -> tuple[Any, Any]:
         """Return ``p_d`` [m] and ``p_d'`` [m/s], in the world, shape (3,) each."""
-        coordinates, rates = self._coordinates(time)
-        return (coordinates, rates) if self._place is None else self._place(coordinates, rates)
+        return self._way.at(time)
 
-    def _coordinates(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the target in the hand's own frame, and its rate, shape (3,) each."""
-        i, share, rate = leg_at(self._times, time)
-        if i == len(self._times) - 1:
-            return self._positions[i], np.zeros(3)
-        way = self._positions[i + 1] - self._positions[i]
-        return self._positions[i] + share * way, rate * way
-
-    def tremor(self, time: float) -> np.ndarray:
+    def tremor(self, time: Any) -> Any:
         """Return the trembling force, shape (3,) [N]."""
-        return self._amplitude * np.cos(self._pulsations * time + self._phases).sum(axis=1)
+        amplitude = self._parameters.tremor * np.sqrt(2.0 / _TREMOR_LINES)
+        if amplitude == 0.0:
+            return ca.DM.zeros(3)
+        lines = ca.cos(ca.DM(self._pulsations) * time + ca.DM(self._phases))
+        return amplitude * ca.sum2(lines)
 
-    def grip(self, time: float) -> float:
+    def grip(self, time: Any) -> Any:
         """Return how firmly the hand holds the tool, from 0 to 1."""
-        ramp = self._parameters.grip_ramp
-        taking = smooth_step((time - self._times[0]) / ramp)
-        return taking * (1.0 - smooth_step((time - self._parameters.release) / ramp))
+        hand = self._parameters
+        taking = smooth_step((time - self.begin) / hand.grip_ramp)
+        if not np.isfinite(hand.release):
+            return taking
+        return taking * (1.0 - smooth_step((time - hand.release) / hand.grip_ramp))
 
     def wanted(
-        self,
-        time: float,
-        y_t: np.ndarray,
-        twist: np.ndarray,
-        R_e: np.ndarray | None = None,
-        reach: float = np.inf,
-    ) -> np.ndarray:
+        self, time: Any, y_t: Any, twist: Any, R_e: Any = None, reach: float = np.inf
+    ) -> Any:
         """Return ``[f_c, tau_c]``, world axes, shape (6,) [N, Nm].
 
         Args:
@@ -228,31 +221,30 @@ class HandModel:
             R_e: Orientation of the tool, shape (3, 3); None where there is nothing to turn.
             reach: Distance from which on a target counts as one that waits [m].
         """
-        p_d, v_d = self.target(time)
-        if np.linalg.norm(p_d - y_t) > reach:
-            v_d = np.zeros(3)
-        hand = self._parameters
+        hand, (p_d, v_d) = self._parameters, self.target(time)
+        if np.isfinite(reach):
+            v_d = where(ca.norm_2(p_d - y_t) > reach, 0.0, v_d)
         force = hand.stiffness * (p_d - y_t) + hand.damping * (v_d - twist[:3])
         torque = -hand.rotational_damping * twist[3:]
         if self._orientation is not None and R_e is not None:
             R_d, w_d = self._orientation.at(time)
-            (turn,) = rotation_vectors((R_d @ R_e.T)[None])
+            turn = rotation_vector(R_d @ R_e.T)
             torque += hand.rotational_stiffness * turn + hand.rotational_damping * w_d
-        return np.concatenate([force, torque])
+        return ca.vertcat(force, torque)
 
-    def delivered(self, time: float, wanted: np.ndarray) -> np.ndarray:
+    def delivered(self, time: Any, wanted: Any) -> Any:
         """Return the wrench on the tool, world axes, shape (6,) [N, Nm].
 
         Args:
             time: [s].
             wanted: What the hand wanted one reaction delay ago, shape (6,).
         """
-        force = _limited(wanted[:3] + self.tremor(time), self._parameters.force_limit)
-        torque = _limited(wanted[3:], self._parameters.torque_limit)
-        return self.grip(time) * np.concatenate([force, torque])
+        force = limited(wanted[:3] + self.tremor(time), self._parameters.force_limit)
+        torque = limited(wanted[3:], self._parameters.torque_limit)
+        return self.grip(time) * ca.vertcat(force, torque)
 
 
-def observed_twist(before: np.ndarray, now: np.ndarray, period: float) -> np.ndarray:
+def observed_twist(before: Any, now: Any, period: float) -> Any:
     """Return ``[y_t', w]`` between two tool poses, world axes, shape (6,) [m/s, rad/s].
 
     ``w`` from the antisymmetric part of ``R_now R_before'``, for turns much below a radian.
@@ -262,11 +254,16 @@ def observed_twist(before: np.ndarray, now: np.ndarray, period: float) -> np.nda
         now: The same, later.
         period: Time between them [s].
     """
-    turn = now[3:].reshape(3, 3) @ before[3:].reshape(3, 3).T
-    S = (turn - turn.T) / 2.0
-    return np.concatenate([now[:3] - before[:3], [S[2, 1], S[0, 2], S[1, 0]]]) / period
+    turn = orientation(now) @ orientation(before).T
+    return ca.vertcat(now[:3] - before[:3], ca.inv_skew((turn - turn.T) / 2.0)) / period
 
 
-def _limited(vector: np.ndarray, limit: float) -> np.ndarray:
-    norm = float(np.linalg.norm(vector))
-    return vector if norm <= limit else vector * (limit / norm)
+def orientation(pose: Any) -> Any:
+    """Return ``R_e`` of a tool pose ``[y_t, R_e by rows]``, shape (3, 3)."""
+    return ca.reshape(pose[3:], 3, 3).T
+
+
+def limited(vector: Any, limit: float) -> Any:
+    """Return a vector, or one of the same direction and the length of a limit."""
+    size = ca.norm_2(vector)
+    return where(size > limit, vector * (limit / size), vector)

@@ -1,30 +1,17 @@
 """How a hand wants the tool to be turned over time."""
 
+from typing import Any
+
+import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pfsc_drake.control.cases import first_of, where
 from pfsc_drake.geometry import zyx_to_matrix
-from pfsc_drake.physics.force_profile import smooth_step, smooth_step_slope
+from pfsc_drake.physics.hand_way import Legs
 
-
-def leg_at(times: np.ndarray, time: float) -> tuple[int, float, float]:
-    """Return which leg of a way with rests a time is in, and how far along it, with minimum jerk.
-
-    Args:
-        times: At the ends of the legs, ascending, shape (k,) [s].
-        time: [s].
-
-    Returns:
-        Index of the leg's begin, the share of the leg, 0 to 1, and its rate [1/s]; the last of the
-        times and a share of zero once the way is over.
-    """
-    last = len(times) - 1
-    i = min(max(int(np.searchsorted(times, time, side="right")) - 1, 0), last)
-    if i == last:
-        return last, 0.0, 0.0
-    duration = float(times[i + 1] - times[i])
-    x = (time - float(times[i])) / duration
-    return i, smooth_step(x), smooth_step_slope(x) / duration
+# rad; below, the sine of half an angle is its series
+_SMALL = 1e-3
 
 
 class OrientationTarget:
@@ -38,23 +25,47 @@ class OrientationTarget:
     """
 
     def __init__(self, times: np.ndarray, zyx_deg: np.ndarray) -> None:
-        self._times, self._R = times, zyx_to_matrix(np.deg2rad(zyx_deg))
-        turns = self._R[1:] @ np.swapaxes(self._R[:-1], 1, 2)
-        self._turns = np.vstack([rotation_vectors(turns), np.zeros(3)])
+        self._legs, R = Legs(times), zyx_to_matrix(np.deg2rad(zyx_deg))
+        turns = np.zeros((len(R), 3))
+        if len(R) > 1:
+            turns[:-1] = Rotation.from_matrix(R[1:] @ np.swapaxes(R[:-1], 1, 2)).as_rotvec()
+        angles = np.linalg.norm(turns, axis=1)
+        axes = turns / np.maximum(angles, np.finfo(float).tiny)[:, None]
+        self._table = ca.MX(ca.DM(np.vstack([R.reshape(-1, 9).T, axes.T, angles])))
 
-    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, time: Any) -> tuple[Any, Any]:
         """Return ``R_d``, shape (3, 3), and its angular velocity, world axes, (3,) [rad/s].
 
         Args:
             time: [s].
         """
-        i, share, rate = leg_at(self._times, time)
-        turn = Rotation.from_rotvec(share * self._turns[i]).as_matrix()
-        return turn @ self._R[i], rate * self._turns[i]
+        leg, share, rate = self._legs.at(time)
+        row = self._table[:, leg]
+        R, axis, angle = ca.reshape(row[:9], 3, 3).T, row[9:12], row[12]
+        S, turned = ca.skew(axis), share * angle
+        turn = ca.DM.eye(3) + ca.sin(turned) * S + 2.0 * ca.sin(turned / 2.0) ** 2 * (S @ S)
+        return turn @ R, rate * angle * axis
 
 
-def rotation_vectors(R: np.ndarray) -> np.ndarray:
-    """Return axis times angle, at most pi, of rotation matrices (k, 3, 3), shape (k, 3) [rad]."""
-    if len(R) == 0:
-        return np.zeros((0, 3))
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+def rotation_vector(R: Any) -> Any:
+    """Return axis times angle, at most pi, of a rotation, shape (3,) [rad].
+
+    By way of the quaternion that loses no digits: that of four with the largest divisor.
+
+    Args:
+        R: Rotation matrix, shape (3, 3).
+    """
+    x, y, z = R[0, 0], R[1, 1], R[2, 2]
+    a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    d, e, f = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    q = first_of(
+        (ca.fmin(x + y, ca.fmin(y + z, x + z)) >= 0.0, ca.vertcat(1.0 + x + y + z, a, b, c)),
+        (ca.fmin(x - y, x - z) >= 0.0, ca.vertcat(a, 1.0 + x - y - z, d, e)),
+        (y >= z, ca.vertcat(b, d, 1.0 - x + y - z, f)),
+        otherwise=ca.vertcat(c, e, f, 1.0 - x - y + z),
+    )
+    q = where(q[0] < 0.0, -q, q) / ca.norm_2(q)
+    sine = ca.norm_2(q[1:])
+    angle = 2.0 * ca.atan2(sine, q[0])
+    per_sine = where(sine < _SMALL, 2.0 + sine * sine / 3.0, angle / ca.fmax(sine, _SMALL))
+    return per_sine * q[1:]

@@ -1,9 +1,13 @@
 """A hand that takes hold of a link, moves by a given way, and lets go or comes back."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, all_of, any_of, where
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import require_vector
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
@@ -72,23 +76,57 @@ class LinkHandParameters:
         )
 
 
-class LinkHandModel:
-    """Force of a hand on a point of a link, see :class:`HandModel`.
+class LinkHand(Block):
+    """A spring-damper from a point of a link to a hand that moves, see :class:`HandModel`.
+
+    The hand sees the point once per period, takes its velocity from the last two looks, and
+    holds its force until the next. Its way begins where the point is when it takes hold.
+
+    Ports:
+        point (input): Where the point is in the world, shape (3,) [m].
+        wrench (output): ``[force, torque]`` on the robot at the point, world axes, the torque
+            zero, shape (6,) [N, Nm]; zero before the hand takes hold, and where the point is not
+            finite.
+
+    State:
+        wrench; the point at the last look (``last``), and whether it was ``seen`` then; where it
+        was when the hand took hold (``start``), and whether it ``holds``.
 
     Args:
-        parameters: Its properties.
+        parameters: Properties of the hand.
+        period: Sampling time [s].
     """
 
-    def __init__(self, parameters: LinkHandParameters) -> None:
+    expands = False  # tables
+
+    def __init__(self, parameters: LinkHandParameters, period: float) -> None:
         self._begin, self._hand = parameters.begin, HandModel(parameters.hand())
+        self._period = period
+        self.inputs = {"point": Port(3, "m")}
+        self.outputs = {"wrench": Port(6, "N, Nm")}
+        self.states = {"wrench": 6, "last": 3, "seen": 1, "start": 3, "holds": 1}
 
-    def holds(self, time: float) -> bool:
-        """Return whether the hand has taken hold at a time [s], whether or not it let go since."""
-        return time >= self._begin
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"wrench": x.wrench}
 
-    def force(
-        self, time: float, point: np.ndarray, velocity: np.ndarray, start: np.ndarray
-    ) -> np.ndarray:
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        time, sees = t * self._period, all_finite(u.point)
+        takes = all_of(ca.logic_not(x.holds), time >= self._begin, sees)
+        start = where(takes, u.point, x.start)
+        holds = any_of(x.holds, takes)
+        force = self.force(time, u.point, (u.point - x.last) / self._period, start)
+        acts = all_of(holds, x.seen, sees)
+        return {
+            "wrench": ca.vertcat(where(acts, force, 0.0), ca.DM.zeros(3)),
+            "last": u.point,
+            "seen": sees,
+            "start": start,
+            "holds": holds,
+        }
+
+    def force(self, time: Any, point: Any, velocity: Any, start: Any) -> Any:
         """Return the force on the link, world axes, shape (3,) [N].
 
         Args:
@@ -97,6 +135,5 @@ class LinkHandModel:
             velocity: Of the point [m/s], shape (3,).
             start: Where the point was when the hand took hold [m], shape (3,).
         """
-        twist = np.concatenate([velocity, np.zeros(3)])
-        wanted = self._hand.wanted(time, point - start, twist)
-        return self._hand.delivered(time, wanted)[:3]
+        twist = ca.vertcat(velocity, ca.DM.zeros(3))
+        return self._hand.delivered(time, self._hand.wanted(time, point - start, twist))[:3]

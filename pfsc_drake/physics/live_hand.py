@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.errors import require
+from pfsc_drake.physics.hand_model import limited, observed_twist
 
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
 _SLOWEST = 10.0  # s
@@ -50,8 +53,8 @@ class LiveHandParameters:
         require(0.0 < time <= _SLOWEST, "response_time", time, f"positive, at most {_SLOWEST:g} s")
 
 
-class LiveHandModel:
-    """Force of a hand that is asked for a push, and to hold the tool at a place.
+class LiveHand(Block):
+    """A hand that is asked for a push, and to hold the tool at a place.
 
     ``f = limit(f_2 + g_2 (K (p_2 - y_t) - D y_t'))``, ``tau = limit(-g_2 D_r w)``: what is asked -
     push f, grip g (0 or 1) and target p - passes two lags of first order,
@@ -59,67 +62,53 @@ class LiveHandModel:
     whatever a slider does. The target of an open hand is taken at once: a hand closes where it is
     asked to hold, not on the way there from where it held before.
 
+    It sees tool and person once per period, and holds its wrench until the next.
+
+    Ports:
+        asked (input): Push, world axes [N], 1 to hold and 0 not to, place to hold at, world axes
+            [m], shape (7,).
+        tool_pose (input): ``[y_t, R_e]``, shape (12,); see :class:`ToolKinematics`.
+        wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
+            shape (6,) [N, Nm]; zero before the first tick, and while the tool pose is not finite.
+
+    State:
+        wrench; last_pose, and whether the tool was ``seen`` then; lags ``first`` and ``second`` of
+        what is asked.
+
     Args:
-        parameters: Its properties.
-        period: Time over which what is asked is held [s].
+        parameters: Properties of the hand.
+        period: Sampling time [s].
     """
 
     def __init__(self, parameters: LiveHandParameters, period: float) -> None:
-        bound = BoundFunction(_hand_function(parameters, period))
-        self._arguments, self._evaluate = list(bound.arguments.values()), bound.evaluate
-        self._lags, self._wrench = bound.results["lags"], bound.results["wrench"]
+        self._hand, self._period = parameters, period
+        self.inputs = {"asked": Port(ASKED, "N, 1, m"), "tool_pose": Port(12, "m, 1")}
+        self.outputs = {"wrench": Port(6, "N, Nm")}
+        sizes = {"wrench": 6, "last_pose": 12, "seen": 1}
+        self.states = sizes | {"first": ASKED, "second": ASKED}
 
-    @property
-    def rest(self) -> np.ndarray:
-        """The memory of an open hand that does nothing, shape (14,)."""
-        return np.zeros(2 * ASKED)
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"wrench": x.wrench}
 
-    def advance(
-        self, memory: np.ndarray, asked: np.ndarray, last: np.ndarray, pose: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return both lags one period later, shape (14,), and the wrench on the tool.
-
-        The wrench is ``[force, torque]``, world axes, shape (6,) [N, Nm].
-
-        Args:
-            memory: Both lags, shape (14,).
-            asked: Push, world axes [N], 1 to hold and 0 not to, place to hold at, world axes [m],
-                shape (7,).
-            last: ``[y_t, R_e by rows]`` one period ago, shape (12,).
-            pose: The same now.
-        """
-        for argument, value in zip(self._arguments, (memory, asked, last, pose), strict=True):
-            argument[:] = value
-        self._evaluate()
-        return self._lags.copy(), self._wrench.copy()
-
-
-def _hand_function(hand: LiveHandParameters, period: float) -> ca.Function:
-    """Return ``(memory, asked, last, pose) -> (lags, wrench)``, see :class:`LiveHandModel`."""
-    memory, asked = ca.SX.sym("memory", 2 * ASKED), ca.SX.sym("asked", ASKED)
-    last, pose = ca.SX.sym("last", 12), ca.SX.sym("pose", 12)
-    share = -math.expm1(-period / hand.response_time)
-    first, second = ca.vertsplit(memory, ASKED)
-    is_open = ca.logic_and(ca.SX(np.arange(ASKED) >= TARGET.start), first[HOLD] < _OPEN)
-    first, second = ca.if_else(is_open, asked, first), ca.if_else(is_open, asked, second)
-    second += share * (first - second)
-    first += share * (asked - first)
-    grip = second[HOLD]
-    velocity = (pose[:3] - last[:3]) / period
-    turn = ca.reshape(pose[3:], 3, 3).T @ ca.reshape(last[3:], 3, 3)
-    spin = ca.inv_skew((turn - turn.T) / 2.0) / period
-    held = hand.stiffness * (second[TARGET] - pose[:3]) - hand.damping * velocity
-    force = _limited(second[PUSH] + grip * held, hand.force_limit)
-    torque = _limited(-grip * hand.rotational_damping * spin, hand.torque_limit)
-    return ca.Function(
-        "live_hand",
-        [memory, asked, last, pose],
-        ca.cse([ca.vertcat(first, second), ca.vertcat(force, torque)]),
-        ["memory", "asked", "last", "pose"],
-        ["lags", "wrench"],
-    )
-
-
-def _limited(vector: ca.SX, limit: float) -> ca.SX:
-    size = ca.norm_2(vector)
-    return ca.if_else(size > limit, vector * (limit / size), vector)
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        hand, asked, pose = self._hand, u.asked, u.tool_pose
+        sees = all_finite(pose)
+        share = -math.expm1(-self._period / hand.response_time)
+        is_taken = ca.DM(np.arange(ASKED) >= TARGET.start) * (x.first[HOLD] < _OPEN)
+        first, second = where(is_taken, asked, x.first), where(is_taken, asked, x.second)
+        second += share * (first - second)
+        first += share * (asked - first)
+        grip = second[HOLD]
+        twist = where(x.seen, observed_twist(x.last_pose, pose, self._period), 0.0)
+        held = hand.stiffness * (second[TARGET] - pose[:3]) - hand.damping * twist[:3]
+        force = limited(second[PUSH] + grip * held, hand.force_limit)
+        torque = limited(-grip * hand.rotational_damping * twist[3:], hand.torque_limit)
+        return {
+            "wrench": where(sees, ca.vertcat(force, torque), 0.0),
+            "last_pose": pose,
+            "seen": sees,
+            "first": where(sees, first, x.first),
+            "second": where(sees, second, x.second),
+        }

@@ -1,19 +1,21 @@
 """An operator who takes a plate from a magazine and inserts its pins into the bores of a frame."""
 
 from enum import IntEnum
+from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.physics.hand_model import HandModel
+from pfsc_drake.blocks.block import Port, Values
+from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.physics.hand_model import HandParameters, limited, orientation
+from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_parameters import MountingHandParameters
+from pfsc_drake.physics.operator_hand import OperatorHand
 
 _LARGEST_ERROR = 2.0  # standard deviations of what the eye errs by
-# parts of the state
-_PHASE, _SINCE, _CLOCK, _FORCE, _TORQUE, _DEEPEST, _WHEN = (
-    0, 1, 2, slice(3, 6), slice(6, 9), 9, 10
-)  # fmt: skip
-STATE_SIZE = 11
+_NOTHING = ca.DM.zeros(3)
 
 
 class MountingPhase(IntEnum):
@@ -28,13 +30,14 @@ class MountingPhase(IntEnum):
     DONE = 6
 
 
-class MountingHand:
-    """Force of an operator who mounts a plate, phase by phase.
+class MountingHand(OperatorHand):
+    """A hand that mounts a plate, phase by phase.
 
     The *goal* is the tool's pose when the plate is seated; the operator sees it in a wrong place,
-    by what is drawn once per run. ``lead`` is a hand that follows waypoints, see
-    :class:`HandModel`; its times count from when the plate hangs on the gripper, or from when it
-    has been let go.
+    by what is drawn once per run. The hand leads by its waypoints, as :class:`OperatorHand`; their
+    times count from when the plate hangs on the gripper, or from when it has been let go. It sees
+    the tool once per period, answers after its reaction delay, trembles, and is limited in force
+    as that one is.
 
     ========  ====================================================================================
     grip      presses along the tool's axis until all cups hold
@@ -48,204 +51,197 @@ class MountingHand:
     done      does nothing
     ========  ====================================================================================
 
-    The *state*, shape (11,): phase, when it began [s], zero of the waypoints' clock [s], lasting
-    force [N] and moment [Nm], world axes, deepest depth [m] and when it was reached [s].
+    Ports, beside those of :class:`OperatorHand`:
+        held (input): Share of the gripper's cups that hold, shape (1,).
+        vacuum (output): 1 while it has the vacuum on, shape (1,).
+        phase (output): :class:`MountingPhase`, shape (1,).
+
+    State, beside:
+        phase, ``since`` when [s], zero of the waypoints' ``clock`` [s], lasting ``force`` [N] and
+        ``torque`` [Nm], world axes, ``deepest`` depth [m] and ``when`` it was reached [s].
 
     Args:
-        parameters: How it goes about.
-        lead: The hand that leads.
-        goal_p: Where the tool point is when the plate is seated [m], shape (3,).
-        goal_R: Orientation of the tool then, shape (3, 3).
-        pin_length: Of the pins [m].
+        parameters: Properties of the hand; its waypoints lead.
+        mounting: How it goes about.
+        goal: Tool point and orientation when the plate is seated, shapes (3,) and (3, 3).
+        pin_length: Of the plate [m].
         period: Sampling time [s].
+        place: See :class:`OperatorHand`.
+
+    Raises:
+        InputError: See :class:`OperatorHand`.
     """
 
     def __init__(
         self,
-        parameters: MountingHandParameters,
-        lead: HandModel,
-        goal_p: np.ndarray,
-        goal_R: np.ndarray,
+        parameters: HandParameters,
+        mounting: MountingHandParameters,
+        goal: tuple[np.ndarray, np.ndarray],
         pin_length: float,
         period: float,
+        place: Place | None = None,
     ) -> None:
-        self._parameters, self._lead = parameters, lead
-        self._pin_length, self._period = pin_length, period
-        random = np.random.default_rng(parameters.seed)
+        super().__init__(parameters, period, place)
+        self._mounting, self._pin_length = mounting, pin_length
+        self._returns = mounting.task == "return"
+        random = np.random.default_rng(mounting.seed)
         errors = np.clip(random.standard_normal(5), -_LARGEST_ERROR, _LARGEST_ERROR)
-        across = np.append(parameters.eye_error * errors[:2], 0.0)
-        self._p = goal_p + goal_R @ across
-        turn = Rotation.from_rotvec(parameters.eye_angle * errors[2:]).as_matrix()
-        self._R, self._axis = goal_R @ turn, goal_R[:, 2]
+        goal_p, goal_R = goal
+        turn = Rotation.from_rotvec(mounting.eye_angle * errors[2:]).as_matrix()
+        self._p = ca.DM(goal_p + goal_R @ np.append(mounting.eye_error * errors[:2], 0.0))
+        self._R, self._axis = ca.DM(goal_R @ turn), ca.DM(goal_R[:, 2])
+        self.inputs = {**self.inputs, "held": Port(1)}
+        self.outputs = {**self.outputs, "vacuum": Port(1), "phase": Port(1)}
+        sizes = {"phase": 1, "since": 1, "clock": 1, "force": 3, "torque": 3}
+        self.states = {**self.states, **sizes, "deepest": 1, "when": 1}
 
-    def start(self) -> np.ndarray:
-        """Return the state at the start."""
-        state = np.zeros(STATE_SIZE)
-        returns = self._parameters.task == "return"
-        state[_PHASE] = MountingPhase.RELEASE if returns else MountingPhase.GRIP
-        state[_SINCE] = self._lead.begin
-        state[_DEEPEST] = -np.inf
-        return state
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {
+            "phase": float(MountingPhase.RELEASE if self._returns else MountingPhase.GRIP),
+            "since": self._hand.begin,
+            "deepest": -np.inf,
+        }
 
-    @staticmethod
-    def phase(state: np.ndarray) -> MountingPhase:
-        """Return what the operator is doing."""
-        return MountingPhase(int(state[_PHASE]))
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        off = [MountingPhase.LEAVE, MountingPhase.RELEASE, MountingPhase.DONE]
+        if self._returns:
+            off = [MountingPhase.LEAVE, MountingPhase.LEAD]
+        vacuum = ca.logic_not(any_of(*[x.phase == phase for phase in off]))
+        return super().output(x, u, t) | {"vacuum": vacuum, "phase": x.phase}
 
-    def vacuum(self, state: np.ndarray) -> bool:
-        """Return whether the operator has the vacuum on."""
-        phase, returns = self.phase(state), self._parameters.task == "return"
-        if phase is MountingPhase.RELEASE:
-            return returns
-        if phase is MountingPhase.LEAVE:
-            return False
-        if phase is MountingPhase.LEAD:
-            return not returns
-        return phase is not MountingPhase.DONE or returns
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        after = self.following(x, t * self._period, u.tool_pose, u.held)
+        sees = all_finite(u.tool_pose)
+        after = {name: where(sees, value, getattr(x, name)) for name, value in after.items()}
+        return super().update(x, u, y, t) | after
 
-    def wanted(
-        self, state: np.ndarray, time: float, pose: np.ndarray, twist: np.ndarray
-    ) -> np.ndarray:
-        """Return force and torque that the operator wants on the tool, world axes, shape (6,).
+    def wanted(self, x: Values, time: Any, pose: Any, twist: Any) -> Any:
+        """See :class:`OperatorHand`."""
+        hand, tool_axis = self._mounting, orientation(pose)[:, 2]
+        lead = self._hand.wanted(time - x.clock, pose[:3], twist, reach=hand.reach)
+        return first_of(
+            (x.phase == MountingPhase.LEAD, lead),
+            (x.phase == MountingPhase.GRIP, ca.vertcat(hand.press * tool_axis, _NOTHING)),
+            (x.phase == MountingPhase.LEAVE, ca.vertcat(-hand.leave * tool_axis, _NOTHING)),
+            (_places(x), self._placing(x, time, pose)),
+            otherwise=0.0,
+        )
+
+    def _placing(self, x: Values, time: Any, pose: Any) -> Any:
+        """Return what brings the plate into the bores."""
+        hand, across, angle = self._mounting, *self._seen(x, time, pose)
+        captured, sticks = self._is_captured(x, pose), time - x.when > hand.patience
+        wobble = hand.wobble * self._circle((time - x.when) / hand.search_period)
+        force = x.force + where(captured, 0.0, hand.stiffness * across)
+        torque = x.torque + first_of(
+            (ca.logic_not(captured), hand.turning_stiffness * angle),
+            (sticks, wobble),
+            otherwise=0.0,
+        )
+        above = -(self._pin_length + hand.hover) - self._depth(pose)
+        stopping = ca.fmin(ca.fmax(hand.stiffness * above, -hand.insert), hand.insert)
+        along = where(x.phase == MountingPhase.INSERT, hand.insert, stopping)
+        return ca.vertcat(force + along * self._axis, torque)
+
+    def _depth(self, pose: Any) -> Any:
+        """Return how deep the plate is, negative before it is seated [m]."""
+        return ca.dot(self._axis, pose[:3] - self._p)
+
+    def _is_captured(self, x: Values, pose: Any) -> Any:
+        depth = self._mounting.captured - self._pin_length
+        return all_of(x.phase == MountingPhase.INSERT, self._depth(pose) > depth)
+
+    def _seen(self, x: Values, time: Any, pose: Any) -> tuple[Any, Any]:
+        """Return how far across [m] and how much turned [rad] the goal is seen, world axes."""
+        away = self._p + self._spiral(x, time) - pose[:3]
+        across = away - self._axis * ca.dot(self._axis, away)
+        turn = self._R @ orientation(pose).T
+        return across, ca.inv_skew((turn - turn.T) / 2.0)
+
+    def _spiral(self, x: Values, time: Any) -> Any:
+        """Return where the bores are felt for beside where they are seen [m], shape (3,)."""
+        hand = self._mounting
+        searching = time - x.since - hand.patience
+        radius = hand.search_radius * ca.fmin(searching / hand.search_time, 1.0)
+        searches = all_of(x.phase == MountingPhase.INSERT, searching >= 0.0)
+        return where(searches, radius * self._circle(searching / hand.search_period), 0.0)
+
+    def _circle(self, turns: Any) -> Any:
+        """Return a direction across the axis of the bores after a number of turns, shape (3,)."""
+        angle = 2.0 * np.pi * turns
+        return self._R @ ca.vertcat(ca.cos(angle), ca.sin(angle), 0.0)
+
+    def following(self, x: Values, time: Any, pose: Any, held: Any) -> dict[str, Any]:
+        """Return the operator's states one period later, those of the hand left out.
 
         Args:
-            state: See the class.
+            x: States.
             time: [s].
             pose: ``[y_t, R_e by rows]``, shape (12,).
-            twist: ``[y_t', w]``, shape (6,).
-        """
-        phase, hand = self.phase(state), self._parameters
-        if phase is MountingPhase.LEAD:
-            return self._lead.wanted(time - state[_CLOCK], pose[:3], twist, reach=hand.reach)
-        tool_axis = pose[3:].reshape(3, 3)[:, 2]
-        if phase is MountingPhase.GRIP:
-            return np.concatenate([hand.press * tool_axis, np.zeros(3)])
-        if phase is MountingPhase.LEAVE:
-            return np.concatenate([-hand.leave * tool_axis, np.zeros(3)])
-        if phase in (MountingPhase.ALIGN, MountingPhase.INSERT):
-            return self._place(state, time, pose)
-        return np.zeros(6)
-
-    def _place(self, state: np.ndarray, time: float, pose: np.ndarray) -> np.ndarray:
-        """Return what brings the plate into the bores."""
-        hand, across, angle = self._parameters, *self._seen(state, time, pose)
-        force, torque = state[_FORCE].copy(), state[_TORQUE].copy()
-        if not self._is_captured(state, pose):
-            force += hand.stiffness * across
-            torque += hand.turning_stiffness * angle
-        elif time - state[_WHEN] > hand.patience:
-            turn = 2.0 * np.pi * (time - state[_WHEN]) / hand.search_period
-            torque += hand.wobble * self._R @ np.array([np.cos(turn), np.sin(turn), 0.0])
-        if self.phase(state) is MountingPhase.INSERT:
-            return np.concatenate([force + hand.insert * self._axis, torque])
-        above = -(self._pin_length + hand.hover) - self._depth(pose)
-        along = np.clip(hand.stiffness * above, -hand.insert, hand.insert)
-        return np.concatenate([force + along * self._axis, torque])
-
-    def _depth(self, pose: np.ndarray) -> float:
-        """Return how deep the plate is, negative before it is seated [m]."""
-        return float(self._axis @ (pose[:3] - self._p))
-
-    def _is_captured(self, state: np.ndarray, pose: np.ndarray) -> bool:
-        inserting = self.phase(state) is MountingPhase.INSERT
-        return inserting and self._depth(pose) > self._parameters.captured - self._pin_length
-
-    def _seen(
-        self, state: np.ndarray, time: float, pose: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far across [m] and how much turned [rad] the goal is seen, world axes."""
-        away = self._p + self._spiral(state, time) - pose[:3]
-        across = away - self._axis * (self._axis @ away)
-        turn = self._R @ pose[3:].reshape(3, 3).T
-        S = (turn - turn.T) / 2.0
-        return across, np.array([S[2, 1], S[0, 2], S[1, 0]])
-
-    def _spiral(self, state: np.ndarray, time: float) -> np.ndarray:
-        """Return where the bores are felt for beside where they are seen [m], shape (3,)."""
-        hand = self._parameters
-        searching = time - state[_SINCE] - hand.patience
-        if self.phase(state) is not MountingPhase.INSERT or searching < 0.0:
-            return np.zeros(3)
-        radius = hand.search_radius * min(searching / hand.search_time, 1.0)
-        turn = 2.0 * np.pi * searching / hand.search_period
-        return radius * self._R @ np.array([np.cos(turn), np.sin(turn), 0.0])
-
-    def step(self, state: np.ndarray, time: float, pose: np.ndarray, held: float) -> np.ndarray:
-        """Return the state one period later.
-
-        Args:
-            state: See the class.
-            time: [s].
-            pose: See :meth:`wanted`.
             held: Share of the cups that hold.
         """
-        after, phase = state.copy(), self.phase(state)
-        if phase in (MountingPhase.ALIGN, MountingPhase.INSERT):
-            self._persist(after, time, pose)
-        if phase is MountingPhase.LEAD and self._is_ahead(state, time, pose):
-            after[_CLOCK] += self._period
-        following = self._following(after, time, pose, held)
-        if following is not phase:
-            after[_PHASE], after[_SINCE], after[_WHEN] = following, time, time
-            after[_DEEPEST] = self._depth(pose)
-            if following is MountingPhase.LEAD:
-                after[_CLOCK] = time - self._lead.begin
-        return after
+        target, _ = self._hand.target(time - x.clock)
+        is_ahead = ca.norm_2(target - pose[:3]) > self._mounting.reach
+        waits = all_of(x.phase == MountingPhase.LEAD, is_ahead)
+        kept = Values(
+            phase=x.phase, since=x.since, clock=x.clock + self._period * waits,
+            **self._persisting(x, time, pose),
+        )  # fmt: skip
+        phase = self._next_phase(kept, time, pose, held)
+        begins, leads = phase != x.phase, phase == MountingPhase.LEAD
+        return vars(kept) | {
+            "phase": phase,
+            "since": where(begins, time, kept.since),
+            "when": where(begins, time, kept.when),
+            "deepest": where(begins, self._depth(pose), kept.deepest),
+            "clock": where(all_of(begins, leads), time - self._hand.begin, kept.clock),
+        }
 
-    def _is_ahead(self, state: np.ndarray, time: float, pose: np.ndarray) -> bool:
-        target, _ = self._lead.target(time - state[_CLOCK])
-        return bool(np.linalg.norm(target - pose[:3]) > self._parameters.reach)
-
-    def _persist(self, state: np.ndarray, time: float, pose: np.ndarray) -> None:
+    def _persisting(self, x: Values, time: Any, pose: Any) -> dict[str, Any]:
         """Let force and moment grow as long as something is seen to be off, in place."""
-        hand, depth = self._parameters, self._depth(pose)
-        if depth > state[_DEEPEST] + hand.eye_gap / 2.0:
-            state[_DEEPEST], state[_WHEN] = depth, time
-        if self._is_captured(state, pose):
-            kept = 1.0 - min(self._period / hand.relaxation, 1.0)
-            state[_FORCE] *= kept
-            state[_TORQUE] *= kept
-        if self.phase(state) is not MountingPhase.ALIGN:
-            return  # against something that is touched nobody pushes more and more
-        across, angle = self._seen(state, time, pose)
-        force = state[_FORCE] + self._period * hand.persistence * across
-        torque = state[_TORQUE] + self._period * hand.turning_persistence * angle
-        state[_FORCE] = _limited(force, hand.side_limit)
-        state[_TORQUE] = _limited(torque, hand.turning_limit)
+        hand, depth = self._mounting, self._depth(pose)
+        deeper = all_of(_places(x), depth > x.deepest + hand.eye_gap / 2.0)
+        relaxed = 1.0 - min(self._period / hand.relaxation, 1.0)
+        share = where(self._is_captured(x, pose), relaxed, 1.0)
+        across, angle = self._seen(x, time, pose)
+        force = x.force + self._period * hand.persistence * across
+        torque = x.torque + self._period * hand.turning_persistence * angle
+        # against something that is touched nobody pushes more and more
+        grows = x.phase == MountingPhase.ALIGN
+        return {
+            "force": where(grows, limited(force, hand.side_limit), share * x.force),
+            "torque": where(grows, limited(torque, hand.turning_limit), share * x.torque),
+            "deepest": where(deeper, depth, x.deepest),
+            "when": where(deeper, time, x.when),
+        }
 
-    def _following(
-        self, state: np.ndarray, time: float, pose: np.ndarray, held: float
-    ) -> MountingPhase:
+    def _next_phase(self, x: Values, time: Any, pose: Any, held: Any) -> Any:
         """Return the phase after this instant."""
-        phase, hand = self.phase(state), self._parameters
-        lasted, returns = time - state[_SINCE], hand.task == "return"
-        if phase is MountingPhase.GRIP and held >= 1.0 and lasted >= 0.0:
-            return MountingPhase.DONE if returns else MountingPhase.LEAD
-        if phase is MountingPhase.LEAD and time - state[_CLOCK] >= self._lead.end:
-            return MountingPhase.GRIP if returns else MountingPhase.ALIGN
-        if phase is MountingPhase.ALIGN and (
-            self._is_aligned(state, time, pose) or lasted > hand.look_time
-        ):
-            return MountingPhase.INSERT
-        if (
-            phase is MountingPhase.INSERT
-            and self._depth(pose) > -hand.eye_gap
-            and time - state[_WHEN] > hand.patience
-        ):
-            return MountingPhase.RELEASE
-        if phase is MountingPhase.RELEASE and lasted > hand.patience:
-            return MountingPhase.LEAD if returns else MountingPhase.LEAVE
-        if phase is MountingPhase.LEAVE and self._depth(pose) < -hand.leave_distance:
-            return MountingPhase.DONE
-        return phase
+        hand, Phase, depth = self._mounting, MountingPhase, self._depth(pose)
+        lasted, still = time - x.since, time - x.when > hand.patience
+        placed = any_of(self._is_aligned(x, time, pose), lasted > hand.look_time)
+        grip, lead, release = Phase.LEAD, Phase.ALIGN, Phase.LEAVE
+        if self._returns:
+            grip, lead, release = Phase.DONE, Phase.GRIP, Phase.LEAD
+        return first_of(
+            (all_of(x.phase == Phase.GRIP, held >= 1.0, lasted >= 0.0), grip),
+            (all_of(x.phase == Phase.LEAD, time - x.clock >= self._hand.end), lead),
+            (all_of(x.phase == Phase.ALIGN, placed), Phase.INSERT),
+            (all_of(x.phase == Phase.INSERT, depth > -hand.eye_gap, still), Phase.RELEASE),
+            (all_of(x.phase == Phase.RELEASE, lasted > hand.patience), release),
+            (all_of(x.phase == Phase.LEAVE, depth < -hand.leave_distance), Phase.DONE),
+            otherwise=x.phase,
+        )
 
-    def _is_aligned(self, state: np.ndarray, time: float, pose: np.ndarray) -> bool:
-        hand, across, angle = self._parameters, *self._seen(state, time, pose)
-        near = abs(self._depth(pose) + self._pin_length + hand.hover) < hand.hover / 2.0
+    def _is_aligned(self, x: Values, time: Any, pose: Any) -> Any:
+        hand, across, angle = self._mounting, *self._seen(x, time, pose)
+        near = ca.fabs(self._depth(pose) + self._pin_length + hand.hover) < hand.hover / 2.0
         seen = max(hand.eye_error, hand.eye_gap / 2.0), max(hand.eye_angle, 1e-3)
-        return bool(near and np.linalg.norm(across) < seen[0] and np.linalg.norm(angle) < seen[1])
+        return all_of(near, ca.norm_2(across) < seen[0], ca.norm_2(angle) < seen[1])
 
 
-def _limited(vector: np.ndarray, limit: float) -> np.ndarray:
-    size = float(np.linalg.norm(vector))
-    return vector if size <= limit else vector * (limit / size)
+def _places(x: Values) -> Any:
+    return any_of(x.phase == MountingPhase.ALIGN, x.phase == MountingPhase.INSERT)

@@ -1,5 +1,6 @@
 """A hand that turns the tool: its target, its torque, and a body in it."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -7,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
-from pfsc_drake.physics.hand_orientation import OrientationTarget
+from pfsc_drake.physics.hand_orientation import OrientationTarget, rotation_vector
 from pfsc_drake.physics.wandering import Wander
 from pfsc_drake.yaml.typed import load_typed
 
@@ -20,6 +21,11 @@ def rotation(zyx_deg):
     return Rotation.from_euler("ZYX", zyx_deg, degrees=True)
 
 
+def numbers(expression):
+    """Return what an expression without symbols is, a vector or a matrix."""
+    return ca.evalf(ca.MX(expression)).full().squeeze()
+
+
 def turning_hand(*zyx_deg, **changes):
     way = [HandWaypoint(1.0 + i, np.zeros(3), angles) for i, angles in enumerate(zyx_deg)]
     options = {"waypoints": way, "rotational_stiffness": 5.0, "torque_limit": 100.0}
@@ -29,7 +35,7 @@ def turning_hand(*zyx_deg, **changes):
 def test_the_target_rests_in_every_orientation():
     target = OrientationTarget(TIMES, ANGLES)
     for time, angles in zip([0.0, *TIMES, 99.0], ANGLES[[0, 0, 1, 2, 2]], strict=True):
-        R_d, w_d = target.at(time)
+        R_d, w_d = map(numbers, target.at(time))
         assert R_d == pytest.approx(rotation(angles).as_matrix(), abs=1e-12)
         assert not np.any(w_d)
 
@@ -40,16 +46,29 @@ def test_the_target_turns_about_one_axis_the_shorter_way():
     assert np.linalg.norm(whole) < np.deg2rad(40.0)  # not 340 deg back through zero
     h = 1e-6
     for time in (1.3, 2.0, 2.9, 3.5):
-        (R_0, _), (R_d, w_d), (R_1, _) = (target.at(time + dt) for dt in (-h, 0.0, h))
+        (R_0, _), (R_d, w_d), (R_1, _) = (map(numbers, target.at(time + dt)) for dt in (-h, 0.0, h))
         turned = (Rotation.from_matrix(R_1) * Rotation.from_matrix(R_0).inv()).as_rotvec()
         assert turned / (2.0 * h) == pytest.approx(w_d, abs=1e-7)
         if time < 3.0:
             assert np.cross(w_d, whole) == pytest.approx(np.zeros(3), abs=1e-12)
     # minimum jerk: half of the way in half of the time, at 1.875 of the mean rate
-    R_d, w_d = target.at(2.0)
+    R_d, w_d = map(numbers, target.at(2.0))
     half = (Rotation.from_matrix(R_d) * rotation(ANGLES[0]).inv()).as_rotvec()
     assert half == pytest.approx(whole / 2.0)
     assert w_d == pytest.approx(1.875 * whole / 2.0)
+
+
+def test_rotation_vectors_are_scipys():
+    """Of small turns, of any, and of nearly half a turn about all axes."""
+    random = np.random.default_rng(0)
+    R = ca.MX.sym("R", 3, 3)
+    function = ca.Function("f", [R], [rotation_vector(R)])
+    for size in (0.0, 1e-9, 1e-4, 1.9e-3, 2.1e-3, 0.1, 1.0, 2.0, 3.0, np.pi - 1e-6):
+        axes = np.vstack([random.normal(size=(20, 3)), np.eye(3), -np.eye(3)])
+        for axis in axes / np.linalg.norm(axes, axis=1)[:, None]:
+            matrix = Rotation.from_rotvec(size * axis).as_matrix()
+            found = function(matrix).full().ravel()
+            np.testing.assert_allclose(found, size * axis, atol=1e-14, rtol=1e-9)
 
 
 def test_it_turns_like_a_spring_and_a_damper():
@@ -57,18 +76,20 @@ def test_it_turns_like_a_spring_and_a_damper():
     axis, angle = np.array([0.6, 0.0, -0.8]), 0.4
     R_e = (Rotation.from_rotvec(-angle * axis) * rotation([10, 20, 30])).as_matrix()
     twist = np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3])
-    wanted = hand.wanted(5.0, np.zeros(3), twist, R_e)
+    wanted = numbers(hand.wanted(5.0, ca.DM.zeros(3), twist, R_e))
     assert wanted[3:] == pytest.approx(5.0 * angle * axis - 0.5 * twist[3:])
     assert not np.any(wanted[:3])
 
 
 def test_it_damps_what_is_not_its_own_turning():
     hand = turning_hand([0.0, 0.0, 0.0], [40.0, 0.0, 0.0], rotational_damping=0.5)
-    _, w_d = OrientationTarget(np.array([1.0, 2.0]), np.array([[0, 0, 0], [40, 0, 0]])).at(1.5)
+    target = OrientationTarget(np.array([1.0, 2.0]), np.array([[0, 0, 0], [40, 0, 0]]))
+    w_d = numbers(target.at(1.5)[1])
     R_e = rotation([20.0, 0.0, 0.0]).as_matrix()
     along = np.concatenate([np.zeros(3), w_d])
-    assert hand.wanted(1.5, np.zeros(3), along, R_e) == pytest.approx(STILL, abs=1e-12)
-    assert hand.wanted(1.5, np.zeros(3), STILL, R_e)[3:] == pytest.approx(0.5 * w_d)
+    wanted = [numbers(hand.wanted(1.5, ca.DM.zeros(3), twist, R_e)) for twist in (along, STILL)]
+    assert wanted[0] == pytest.approx(STILL, abs=1e-12)
+    assert wanted[1][3:] == pytest.approx(0.5 * w_d)
 
 
 def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
@@ -77,10 +98,13 @@ def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
     hand = turning_hand([0.0, 0.0, 35.0], rotational_damping=D_r, rotational_stiffness=K_r)
     R_e, w, angles = Rotation.identity(), np.zeros(3), []
     times = 2.0 + step * np.arange(2000)  # the grip is firm
+    time, rate, R = ca.MX.sym("time"), ca.MX.sym("twist", 6), ca.MX.sym("R_e", 3, 3)
+    wrench = hand.delivered(time, hand.wanted(time, ca.DM.zeros(3), rate, R))
+    torque = ca.Function("torque", [time, rate, R], [wrench[3:]])
     for time in times:
         angles.append(R_e.as_rotvec()[0])
-        wanted = hand.wanted(time, np.zeros(3), np.append(np.zeros(3), w), R_e.as_matrix())
-        w = w + step * hand.delivered(time, wanted)[3:] / inertia
+        twist = np.append(np.zeros(3), w)
+        w = w + step * torque(time, twist, R_e.as_matrix()).full().ravel() / inertia
         R_e = Rotation.from_rotvec(step * w) * R_e
     goal = np.deg2rad(35.0)
     solution = solve_ivp(
@@ -97,13 +121,14 @@ def test_a_body_in_the_hand_turns_as_a_damped_oscillator():
 def test_an_orientation_that_is_left_out_stays():
     way = [HandWaypoint(0.0, np.zeros(3), [0.0, 0.0, 20.0]), HandWaypoint(1.0, np.ones(3))]
     target = HandParameters(waypoints=way, rotational_stiffness=1.0).orientation()
-    assert target.at(2.0)[0] == pytest.approx(rotation([0.0, 0.0, 20.0]).as_matrix())
+    R_d = numbers(target.at(2.0)[0])
+    assert R_d == pytest.approx(rotation([0.0, 0.0, 20.0]).as_matrix())
 
 
 def test_a_hand_without_stiffness_does_not_turn():
     assert HandParameters().orientation() is None
-    wanted = HandModel(HandParameters()).wanted(0.0, np.zeros(3), STILL, np.diag([-1.0, -1, 1]))
-    assert not np.any(wanted)
+    hand, turned = HandModel(HandParameters()), np.diag([-1.0, -1, 1])
+    assert not np.any(numbers(hand.wanted(0.0, ca.DM.zeros(3), STILL, turned)))
 
 
 @pytest.mark.parametrize(

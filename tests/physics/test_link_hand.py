@@ -1,10 +1,12 @@
 """A hand on a link: where it pulls, how much, and when it lets go."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.link_hand import LinkHandModel, LinkHandParameters
+from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
 
 START = np.array([0.4, -0.1, 0.9])
 REST = np.zeros(3)
@@ -12,7 +14,8 @@ PUSH = {"link": "link_4", "way": [0.0, 0.15, 0.0], "begin": 1.0, "duration": 0.5
 
 
 def force(time, point=START, velocity=REST, **changes):
-    return LinkHandModel(LinkHandParameters(**PUSH | changes)).force(time, point, velocity, START)
+    hand = LinkHand(LinkHandParameters(**PUSH | changes), 1e-3)
+    return ca.evalf(hand.force(time, point, velocity, START)).full().ravel()
 
 
 def test_spring_and_damper_towards_the_hand():
@@ -61,3 +64,35 @@ def test_it_comes_back_before_it_lets_go():
 def test_wrong_properties_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
         LinkHandParameters(**PUSH | changes)
+
+
+def pushed(place):
+    """Return the forces [N] on a point that is somewhere at each time, and the times."""
+    block = LinkHand(
+        LinkHandParameters("link_4", way=[0, 0.1, 0], begin=0.2, duration=0.3, hold=0.2), 1e-3
+    )
+    stepper, times = Stepper(block), 1e-3 * np.arange(1001)
+    wrenches = np.array([stepper.step(point=place(time))["wrench"] for time in times])
+    assert not wrenches[:, 3:].any()
+    return times, wrenches[:, :3]
+
+
+def test_the_way_begins_where_the_point_was_then():
+    time, found = pushed(lambda t: [0.5 * t, 0.0, 0.0])
+    assert not found[time <= 0.2].any()
+    k = np.flatnonzero(np.isclose(time, 0.6))[0]
+    # the output at 0.6 s is what was seen a tick before
+    expected = [-300 * (0.599 - 0.2) * 0.5 - 30 * 0.5, 300 * 0.1, 0.0]
+    expected *= min(1.0, 45.0 / np.linalg.norm(expected)) * np.ones(3)
+    assert found[k] == pytest.approx(expected, abs=1e-6)
+    assert not found[time > 0.91].any()
+
+
+def test_a_point_that_is_nowhere_is_let_go():
+    time, found = pushed(lambda t: np.full(3, np.nan if t > 0.5 else 0.0))
+    assert found[np.isclose(time, 0.49)].any()
+    assert not found[time > 0.51].any()
+    # and is taken hold of again, where the hand is by then
+    time, found = pushed(lambda t: np.full(3, np.nan if 0.3 < t < 0.4 else 0.0))
+    assert not found[(time > 0.302) & (time < 0.4)].any()
+    assert found[np.isclose(time, 0.45)].any()

@@ -1,11 +1,14 @@
 """An operator who mounts a plate, on poses that are prescribed."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pfsc_drake.blocks.block import Values
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
+from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.mounting_hand import MountingHand, MountingPhase
 from pfsc_drake.physics.mounting_parameters import MountingHandParameters
 
@@ -17,11 +20,50 @@ BEGIN, END = 0.5, 1.5  # s, of the waypoints
 SURE = {"eye_error": 0.0, "eye_angle": 0.0, "reach": 10.0}
 
 
+SIZES = {"time": 1, "pose": 12, "twist": 6, "held": 1}
+
+
+class Operator:
+    """The block's expressions as functions of its state, in one vector."""
+
+    def __init__(self, block):
+        self.block, self._sizes = block, list(block.states.values())
+        state = ca.MX.sym("state", sum(self._sizes))
+        parts = ca.vertsplit(state, np.cumsum([0, *self._sizes]).tolist())
+        x = Values(**dict(zip(block.states, parts, strict=True)))
+        time, pose, twist, held = (ca.MX.sym(name, n) for name, n in SIZES.items())
+        after = ca.vertcat(*(vars(x) | block.following(x, time, pose, held)).values())
+        vacuum = block.output(x, Values(), 0.0)["vacuum"]
+        wanted = block.wanted(x, time, pose, twist)
+        self._step = ca.Function("step", [state, time, pose, held], [after])
+        self._wanted = ca.Function("wanted", [state, time, pose, twist], [wanted])
+        self._shown = ca.Function("shown", [state], [x.phase, vacuum])
+
+    def start(self, **changes):
+        begun = self.block.initial(Values(), 0.0) | changes
+        return ca.vertcat(
+            *[ca.DM(begun.get(name, np.zeros(n))) for name, n in self.block.states.items()]
+        )
+
+    def go(self, state, time, ticks, where, held):
+        times = time + PERIOD * np.arange(ticks)
+        poses, helds = np.tile(where[:, None], ticks), np.full((1, ticks), held)
+        return self._step.fold(ticks)(state, times[None], poses, helds)
+
+    def wanted(self, state, time, where, twist):
+        return self._wanted(state, time, where, twist).full().ravel()
+
+    def phase(self, state):
+        return MountingPhase(int(self._shown(state)[0]))
+
+    def vacuum(self, state):
+        return bool(self._shown(state)[1])
+
+
 def hand(**changes):
     waypoints = [HandWaypoint(BEGIN, [0.7, -0.4, 0.5]), HandWaypoint(END, pose(-0.02)[:3])]
-    lead = HandModel(HandParameters(waypoints=waypoints, stiffness=250.0))
-    parameters = MountingHandParameters(**changes)
-    return MountingHand(parameters, lead, GOAL_P, GOAL_R.as_matrix(), PINS, PERIOD)
+    lead, mounting = HandParameters(waypoints, stiffness=250.0), MountingHandParameters(**changes)
+    return Operator(MountingHand(lead, mounting, (GOAL_P, GOAL_R.as_matrix()), PINS, PERIOD))
 
 
 def pose(depth=-0.1, beside=(0.0, 0.0), turn=(0.0, 0.0, 0.0)):
@@ -32,9 +74,8 @@ def pose(depth=-0.1, beside=(0.0, 0.0), turn=(0.0, 0.0, 0.0)):
 
 def go(operator, state, time, duration, where, held=1.0):
     """Return state and time after a while at a pose."""
-    for _ in range(round(duration / PERIOD)):
-        state, time = operator.step(state, time, where, held), time + PERIOD
-    return state, time
+    ticks = round(duration / PERIOD)
+    return operator.go(state, time, ticks, where, held), time + ticks * PERIOD
 
 
 def test_it_mounts_phase_by_phase():
@@ -174,10 +215,9 @@ def test_the_eye_errs_by_what_the_seed_says_and_never_much():
     """Seen from the push on a tool that is in place: the same for a seed, within two deviations."""
     p, seen = MountingHandParameters(), []
     for seed in range(40):
-        operator, state, time = inserting(
-            seed=seed, persistence=0.0, turning_persistence=0.0, eye_error=p.eye_error
-        )
-        force = operator.wanted(state, time, pose(-PINS), np.zeros(6))[:3]
+        operator = hand(seed=seed, eye_angle=0.0)
+        state = operator.start(phase=float(MountingPhase.INSERT), since=0.0)
+        force = operator.wanted(state, 0.1, pose(-PINS), np.zeros(6))[:3]
         seen.append(GOAL_R.inv().apply(force)[:2] / p.stiffness)
     assert np.abs(seen).max() <= 2.0 * p.eye_error * (1.0 + 1e-9)
     assert np.std(seen) == pytest.approx(p.eye_error, rel=0.3)
@@ -223,3 +263,57 @@ def test_once_the_pins_are_in_the_moment_relaxes_too():
     state, time = go(operator, state, time, p.relaxation, deep)
     after = GOAL_R.inv().apply(operator.wanted(state, time, deep, np.zeros(6))[3:])
     assert after[2] / before[2] == pytest.approx(np.exp(-1.0), rel=1e-2)
+
+
+DELAY, TAKES, RAMP = 0.05, 0.1, 0.02
+
+
+def over_time(held, duration):
+    """Return times and outputs of an operator over a tool that does not move."""
+    lead = HandParameters(
+        [HandWaypoint(TAKES, [0.0, 0.0, 0.5]), HandWaypoint(1.0, [0.0, 0.0, 0.6])],
+        reaction_delay=DELAY,
+        grip_ramp=RAMP,
+        force_limit=30.0,
+    )
+    goal, mounting = (np.array([0.3, 0.0, 0.5]), np.eye(3)), MountingHandParameters(press=40.0)
+    stepper = Stepper(MountingHand(lead, mounting, goal, 0.01, PERIOD))
+    still = np.concatenate([[0.0, 0.0, 0.5], np.eye(3).ravel()])
+    time = PERIOD * np.arange(round(duration / PERIOD))
+    found = [stepper.step(tool_pose=still, held=held) for _ in time]
+    return time, {name: np.array([values[name] for values in found]) for name in found[0]}
+
+
+def test_it_grips_with_a_limited_force_after_its_reaction_delay():
+    time, log = over_time(held=0.0, duration=0.4)
+    assert (log["phase"] == MountingPhase.GRIP).all()
+    assert (log["vacuum"] == 1.0).all()
+    size = np.linalg.norm(log["wrench"][:, :3], axis=1)
+    assert not size[time <= TAKES].any()
+    # of the 40 N that it wants; along the tool's axis
+    np.testing.assert_allclose(log["wrench"][time > TAKES + RAMP + 2e-3, 2], 30.0, rtol=1e-9)
+    assert not log["wrench"][:, :2].any()
+
+
+def test_it_leads_once_the_plate_hangs():
+    time, log = over_time(held=1.0, duration=0.6)
+    first = time[np.argmax(log["phase"][:, 0] == MountingPhase.LEAD)]
+    assert first == pytest.approx(TAKES, abs=2.0 * PERIOD)
+    # until the delay is over it still delivers what it wanted while gripping
+    after = (time > first + RAMP) & (time < first + DELAY - 2.0 * PERIOD)
+    np.testing.assert_allclose(log["wrench"][after, 2], 30.0, rtol=1e-9)
+    later = time > first + DELAY + 2.0 * PERIOD
+    assert np.abs(log["wrench"][later, 2]).max() < 29.0
+
+
+def test_what_it_does_stands_still_while_it_does_not_see_the_tool():
+    stepper = Stepper(hand(**SURE).block)
+    for _ in range(round(BEGIN / PERIOD) + 10):
+        stepper.step(tool_pose=pose(), held=1.0)
+    states = stepper.states
+    assert states["phase"][0] == MountingPhase.LEAD
+    for _ in range(5):
+        stepper.step(tool_pose=np.full(12, np.nan), held=1.0)
+    for name in ("phase", "since", "clock", "force", "torque", "deepest", "when"):
+        assert np.array_equal(stepper.states[name], states[name])
+    assert not stepper.states["wrench"].any()

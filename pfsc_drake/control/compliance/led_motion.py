@@ -1,7 +1,7 @@
 """A tool that a hand leads along a path or a surface, as far as the robot can follow."""
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _ACROSS = 1e-6
 class LeadingManifold(Manifold, Protocol):
     """A path or a surface."""
 
-    def axes(self, point: np.ndarray) -> np.ndarray:
+    def axes(self, point: Any) -> Any:
         """Return the axes at a point as columns, the tangential ones first, shape (3, 3)."""
 
 
@@ -73,7 +73,7 @@ class LedMotion:
             ``eta'``, and by how much of each kind of limit it is held [m/s^2], shape (kinds,).
         """
         held = np.zeros(len(self.kinds))
-        t, w = self._axes(point)[:, : self._count], wanted.copy()
+        t, w = self._axes(point).full()[:, : self._count], wanted.copy()
         if not math.isfinite(float(t.sum()) + float(w.sum())):
             return w, held
         along = [_along(limit, t) for limit in self._limits.rows(q, v, 0)]

@@ -1,7 +1,7 @@
 """What a law needs to know of a manifold: a path, a moving point, and others to come."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -116,11 +116,11 @@ class Manifold(Protocol):
                 manifold's orientation turns.
         """
 
-    def axes(self, point: np.ndarray) -> np.ndarray:
+    def axes(self, point: Any) -> Any:
         """Return the directions of the translational coordinates as columns, shape (3, 3).
 
         Args:
-            point: The manifold's point, shape (layout.size,).
+            point: The manifold's point, shape (layout.size,): an expression, or numbers.
         """
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,12 +18,12 @@ from pfsc_drake.control.manifolds.orientation_force import (
 )
 from pfsc_drake.control.manifolds.path_force import (
     frame_turning_force,
+    path_axes,
     translational_force,
     turning_force,
 )
 from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix
-from pfsc_drake.geometry.paths.frame import manifold_axes
 from pfsc_drake.jets import Jet
 
 _TRANSLATIONAL = (
@@ -242,6 +243,6 @@ class PathManifold:
             torque = torque_across_axis(torque, quaternion_matrix(quaternion), phi, alignment)
         return torque, rotational_force(in_axes_of(quaternion, torque), phi, alignment)
 
-    def axes(self, point: np.ndarray) -> np.ndarray:
+    def axes(self, point: Any) -> Any:
         """Return ``[e_par, e_perp, e_cross]`` as columns, shape (3, 3)."""
-        return manifold_axes(point[self.layout.position][3:6], point[self.layout.normal])
+        return path_axes(point, self.layout)

@@ -1,5 +1,7 @@
 """External wrench at the tool point to generalized forces along the coordinates of a path."""
 
+from typing import Any
+
 import casadi as ca
 
 from pfsc_drake.control.manifolds.orientation_force import turning_torque
@@ -34,9 +36,20 @@ def force_components(force: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.
         point: Path point, laid out by ``layout``.
         layout: Layout of ``point``.
     """
+    return path_axes(point, layout).T @ force
+
+
+def path_axes(point: Any, layout: PathPointLayout) -> Any:
+    """Return ``[e_par, e_perp, e_par x e_perp]`` as columns, (3.1)-(3.5), shape (3, 3).
+
+    Args:
+        point: Path point, laid out by ``layout``.
+        layout: Layout of ``point``.
+    """
     slope, e_perp = point[layout.position][3:6], point[layout.normal]
+    # a path that stands still has no direction, which is not finite
     e_par = slope / ca.norm_2(slope)
-    return ca.vertcat(*[ca.dot(e, force) for e in (e_par, e_perp, ca.cross(e_par, e_perp))])
+    return ca.horzcat(e_par, e_perp, ca.cross(e_par, e_perp))
 
 
 def turning_force(torque: ca.SX, point: ca.SX, layout: PathPointLayout) -> ca.SX:

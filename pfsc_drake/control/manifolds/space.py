@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -163,6 +164,6 @@ class SpaceManifold:
         turned = rotational_force(in_axes_of(quaternion, torque), phi, alignment)
         return ca.vertcat(force, turned)
 
-    def axes(self, point: np.ndarray) -> np.ndarray:
+    def axes(self, point: Any) -> Any:
         """Return the world's axes, shape (3, 3)."""
-        return np.eye(3)
+        return ca.DM.eye(3)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -18,13 +18,13 @@ from pfsc_drake.control.manifolds.orientation_force import (
 from pfsc_drake.control.manifolds.surface_force import (
     frame_turning_force,
     quaternion_turning_force,
+    surface_axes,
     tangent_plane,
     translational_force,
 )
 from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import check_rotation_matrix, quaternion_to_matrix
-from pfsc_drake.geometry.surfaces.frame import surface_axes
 from pfsc_drake.geometry.surfaces.partials import partial_index, partial_orders
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.jets import Jet
@@ -236,7 +236,7 @@ class SurfaceManifold:
         """Return the reference orientation of places, shape (samples, 3, 3)."""
         if self.offset is None:
             return quaternion_to_matrix(points[:, self.layout.quaternion][:, :4])
-        return np.array([self.axes(point) for point in points]) @ self.offset
+        return np.array([self.axes(point).full() for point in points]) @ self.offset
 
     def geometry(self, point: ca.SX) -> SurfaceGeometry:
         """Return the parts of a surface point as the maps need them."""
@@ -291,6 +291,6 @@ class SurfaceManifold:
             rotational = rotational_force(R_d.T @ torque, phi, alignment)
         return ca.vertcat(translational, rotational)
 
-    def axes(self, point: np.ndarray) -> np.ndarray:
+    def axes(self, point: Any) -> Any:
         """Return ``[t_1, e_perp x t_1, e_perp]`` as columns, shape (3, 3)."""
-        return surface_axes(*point[self.layout.position][3:9].reshape(2, 3))
+        return surface_axes(point, self.layout)

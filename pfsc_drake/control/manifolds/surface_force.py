@@ -1,6 +1,7 @@
 """External wrench at the tool point to generalized forces along the coordinates of a surface."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -34,19 +35,28 @@ def tangent_plane(point: ca.SX, layout: SurfacePointLayout) -> TangentPlane:
         layout: Layout of ``point``.
     """
     _, s_1, s_2, s_11, s_12, s_22 = ca.vertsplit(point[layout.position][:18], 3)
-    speed = ca.norm_2(s_1)
-    t_1, cross = s_1 / speed, ca.cross(s_1, s_2)
-    normal = cross / ca.norm_2(cross)
-    t_2 = ca.cross(normal, t_1)
+    speed, axes = ca.norm_2(s_1), surface_axes(point, layout)
+    t_1, t_2, normal = ca.horzsplit(axes)
     Sigma = ca.vertcat(ca.horzcat(speed, ca.dot(t_1, s_2)), ca.horzcat(0.0, ca.dot(t_2, s_2)))
     # parameters per length along t_1 and t_2
     inverse = ca.inv(Sigma)
     second = ca.blockcat([[ca.dot(normal, s_11), ca.dot(normal, s_12)],
                           [ca.dot(normal, s_12), ca.dot(normal, s_22)]])  # fmt: skip
     along = ca.horzcat(ca.dot(t_2, s_11), ca.dot(t_2, s_12)) / speed
-    return TangentPlane(
-        ca.horzcat(t_1, t_2, normal), Sigma, inverse.T @ second @ inverse, (along @ inverse).T
-    )
+    return TangentPlane(axes, Sigma, inverse.T @ second @ inverse, (along @ inverse).T)
+
+
+def surface_axes(point: Any, layout: SurfacePointLayout) -> Any:
+    """Return ``[t_1, t_2, e_perp]`` as columns, (4.2), (4.3), shape (3, 3).
+
+    Args:
+        point: Surface point.
+        layout: Layout of ``point``.
+    """
+    s_1, s_2 = ca.vertsplit(point[layout.position][3:9], 3)
+    t_1, cross = s_1 / ca.norm_2(s_1), ca.cross(s_1, s_2)
+    normal = cross / ca.norm_2(cross)
+    return ca.horzcat(t_1, ca.cross(normal, t_1), normal)
 
 
 def translational_force(force: ca.SX, plane: TangentPlane, xi: ca.SX) -> ca.SX:

@@ -123,7 +123,7 @@ def test_virtual_work_with_the_jacobian_of_a_robot(load_robot, orientation):
 def test_half_way_to_the_axis_of_a_cylinder_the_force_around_it_is_half():
     manifold = SurfaceManifold(1)
     _, _, point = place(manifold, "cylinder", np.random.default_rng(0))
-    around, along, normal = manifold.axes(point).T
+    around, along, normal = manifold.axes(point).full().T
     wrench = np.append(3.0 * around + 5.0 * along + 7.0 * normal, np.zeros(3))
     tau = force(manifold, wrench, point, [0.3, 0.1, 0.125])
     assert tau == pytest.approx([1.5, 5.0, 7.0], abs=1e-12)
@@ -139,4 +139,4 @@ def test_what_is_not_finite_stays_so():
     assert np.isnan(tau).all()
     nowhere = np.full_like(point, np.nan)
     assert np.isnan(force(manifold, np.ones(6), nowhere, np.zeros(6), with_turning=True)).all()
-    assert np.isnan(manifold.axes(nowhere)).all()
+    assert np.isnan(manifold.axes(nowhere).full()).all()

@@ -45,7 +45,7 @@ def test_its_normal_turns_with_it(station):
 def contacts(station, depth):
     """Return how many surfaces touch, the tool point being so deep in the workpiece [m]."""
     start = station.task.start(np.zeros(3))
-    normal = station.workpiece.normal(station.task.place.axes(station.task.point(start)))
+    normal = station.workpiece.normal(station.task.place.axes(station.task.point(start)).full())
     vertices, _ = station.workpiece.mesh()
     foot = vertices[np.argmin(np.linalg.norm(vertices - start.target.y_t, axis=1))]
     target = dataclasses.replace(start.target, y_t=foot - depth * normal)

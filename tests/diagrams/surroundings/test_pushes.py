@@ -55,7 +55,7 @@ def test_a_push_moves_the_arm_as_in_drakes_own_simulation(three_axes, load_arm):
     moved = []
     for k in range(len(log.time) - 1):
         # the log has what was held up to its time
-        force, torque = log["push_force"].values[k + 1], PULSE.at(log.time[k])[3:]
+        force, torque = log["push_force"].values[k + 1], PULSE.at(log.time[k]).full().ravel()[3:]
         tau_d = log["tau_d"].values[k]
 
         def rate(_, state, force=force, torque=torque, tau_d=tau_d):
@@ -128,7 +128,7 @@ def test_forces_on_links_are_in_manifold_axes_if_wanted(three_axes):
     three_axes.forces = [pulse]
     station, log = run(three_axes, 0.06)
     y_t, theta = log["y_t"].values[0].tolist(), station.initial_place[0]
-    axes = station.task.manifold.axes(np.array(station.path.evaluator(2)(y_t, theta)))
+    axes = station.task.manifold.axes(np.array(station.path.evaluator(2)(y_t, theta))).full()
     assert log["push_force"].values[-1] == pytest.approx(axes @ [0.0, 50.0, 0.0], abs=0.1)
 
 

@@ -12,16 +12,17 @@ from pydrake.systems.primitives import LogVectorOutput, MatrixGain, ZeroOrderHol
 from pfsc_drake.control.compliance.tool_load import SensorFault, ToolCompensationParameters
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
+from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
 from pfsc_drake.systems.physics.force_torque_sensor import (
     ForceTorqueParameters,
     ForceTorqueSensor,
     reaction_index,
 )
-from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 
 PERIOD = 1e-3
@@ -103,9 +104,8 @@ def run(
             PERIOD,
         )
     )
-    script = builder.AddSystem(
-        ScriptedForce(ForceProfile(pulses), PathManifold(2, oriented=False), PERIOD)
-    )
+    force = ScriptedForce(ForceProfile(pulses), PathManifold(2, oriented=False), PERIOD)
+    script = builder.AddSystem(BlockSystem(force, PERIOD))
     external = builder.AddSystem(ExternalWrench(tool, chain))
     connect = builder.Connect
     connect(plant.get_state_output_port(), encoders.get_input_port())

@@ -4,17 +4,24 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.geometry import FourierCurve, Path
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
+from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.physics.scripted_force import ScriptedForce
 
 PERIOD = 1e-3
 MANIFOLD = PathManifold(2, oriented=False)
 LAYOUT = MANIFOLD.layout
+
+
+def scripted(pulses):
+    return BlockSystem(ScriptedForce(ForceProfile(pulses), MANIFOLD, PERIOD), PERIOD)
 
 
 def simulate(path, pulses, tool, duration):
@@ -22,7 +29,7 @@ def simulate(path, pulses, tool, duration):
     builder = DiagramBuilder()
     way = builder.AddSystem(TrajectorySource(tool))
     projector = builder.AddSystem(PathProjector(path, 2, PERIOD))
-    script = builder.AddSystem(ScriptedForce(ForceProfile(pulses), MANIFOLD, PERIOD))
+    script = builder.AddSystem(scripted(pulses))
     builder.Connect(way.get_output_port(), projector.get_input_port())
     builder.Connect(projector.get_output_port(), script.GetInputPort("manifold_point"))
     logs = [LogVectorOutput(s.get_output_port(), builder, PERIOD) for s in (script, projector)]
@@ -33,7 +40,7 @@ def simulate(path, pulses, tool, duration):
 
 
 def test_in_the_world_it_needs_no_path():
-    script = ScriptedForce(ForceProfile([ForcePulse(0.1, 1.0, [3.0, 0, 0])]), MANIFOLD, PERIOD)
+    script = scripted([ForcePulse(0.1, 1.0, [3.0, 0, 0])])
     assert script.num_input_ports() == 0
     context = script.CreateDefaultContext()
     for time, value in ((0.0, 0.0), (0.125, 1.5), (0.5, 3.0), (2.0, 0.0)):
@@ -41,7 +48,8 @@ def test_in_the_world_it_needs_no_path():
         assert script.get_output_port().Eval(context)[0] == pytest.approx(value, abs=1e-12)
 
 
-def test_against_the_motion_is_along_the_path(path):
+def test_against_the_motion_is_along_the_path():
+    path = Path(FourierCurve.bent_lemniscate())
     begin, end = path.evaluator(2).evaluate_at(0.05), path.evaluator(2).evaluate_at(0.4)
     pose = np.concatenate([np.zeros(3), np.eye(3).ravel()])
     samples = np.column_stack([pose, pose])
@@ -60,41 +68,29 @@ def test_against_the_motion_is_along_the_path(path):
     assert np.allclose(torque, 2.0 * e_cross, rtol=0, atol=1e-9)
 
 
+def along_y():
+    """Return a path point with e_par along y, e_perp along z, e_cross along x."""
+    point = np.zeros(LAYOUT.size)
+    point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
+    return point
+
+
 def test_a_lost_path_point_leaves_the_direction():
-    builder = DiagramBuilder()
     profile = ForceProfile([ForcePulse(-1.0, 1.0, [5.0, 0, 0], frame="manifold")])
-    script = builder.AddSystem(ScriptedForce(profile, MANIFOLD, PERIOD))
-    lost = builder.AddSystem(ConstantVectorSource(np.full(LAYOUT.size, np.nan)))
-    builder.Connect(lost.get_output_port(), script.get_input_port())
-    simulator = Simulator(builder.Build())
-    context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    simulator.Initialize()
-    assert not np.any(script.get_output_port().Eval(context))
-    context.SetDiscreteState(np.eye(3)[:, [1, 2, 0]].ravel())
-    simulator.AdvanceTo(0.01)
-    assert script.get_output_port().Eval(context) == pytest.approx([0, 5.0, 0, 0, 0, 0])
+    stepper, lost = Stepper(ScriptedForce(profile, MANIFOLD, PERIOD)), np.full(LAYOUT.size, np.nan)
+    assert not np.any(stepper.step(manifold_point=lost)["wrench"])
+    assert not np.any(stepper.step(manifold_point=along_y())["wrench"])
+    for _ in range(10):
+        wrench = stepper.step(manifold_point=lost)["wrench"]
+        assert wrench == pytest.approx([0, 5.0, 0, 0, 0, 0])
 
 
 def test_it_does_not_feed_through():
-    profile = ForceProfile([ForcePulse(frame="manifold")])
-    assert not ScriptedForce(profile, MANIFOLD, PERIOD).HasAnyDirectFeedthrough()
+    assert not scripted([ForcePulse(frame="manifold")]).HasAnyDirectFeedthrough()
 
 
-def test_the_path_is_looked_at_in_time():
-    """Well before a force the direction is not kept up to date, from 100 ticks before it is."""
-    builder = DiagramBuilder()
-    profile = ForceProfile([ForcePulse(0.3, 0.5, [5.0, 0, 0], frame="manifold")])
-    script = builder.AddSystem(ScriptedForce(profile, MANIFOLD, PERIOD))
-    point = np.zeros(LAYOUT.size)
-    point[LAYOUT.position][3:6], point[LAYOUT.normal] = [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]
-    manifold_point = builder.AddSystem(ConstantVectorSource(point))
-    builder.Connect(manifold_point.get_output_port(), script.get_input_port())
-    simulator = Simulator(builder.Build())
-    context = script.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    simulator.AdvanceTo(0.19)
-    assert not np.any(context.get_discrete_state_vector().value())
-    simulator.AdvanceTo(0.21)
-    axes = context.get_discrete_state_vector().value().reshape(3, 3)
-    np.testing.assert_allclose(axes[:, 0], [0.0, 1.0, 0.0], atol=1e-15)
-    simulator.AdvanceTo(0.4)
-    assert script.get_output_port().Eval(context) == pytest.approx([0, 5.0, 0, 0, 0, 0])
+def test_the_direction_is_there_from_the_start():
+    profile = ForceProfile([ForcePulse(-1.0, 1.0, [5.0, 0, 0], frame="manifold")])
+    stepper = Stepper(ScriptedForce(profile, MANIFOLD, PERIOD))
+    wrench = stepper.step(manifold_point=along_y())["wrench"]
+    assert wrench == pytest.approx([0, 5.0, 0, 0, 0, 0])

@@ -1,4 +1,4 @@
-"""The hand as a system, on prescribed motions, on a free mass and on the robot."""
+"""The hand in a diagram, on prescribed motions, on a free mass and on the robot."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,11 @@ from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
+from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.physics.operator_hand import OperatorHand
 from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 
 PERIOD = 1e-3
@@ -67,7 +68,7 @@ def watch(position, parameters, duration):
     """Return the wrenches for a prescribed motion; sample k is from before the tick at k T."""
     builder = DiagramBuilder()
     tool = builder.AddSystem(Pose(position))
-    system = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    system = builder.AddSystem(BlockSystem(OperatorHand(parameters, PERIOD), PERIOD))
     builder.Connect(tool.get_output_port(), system.get_input_port())
     log = LogVectorOutput(system.get_output_port(), builder, PERIOD)
     simulator = Simulator(builder.Build())
@@ -79,7 +80,7 @@ def guide_mass(parameters, duration, mass=4.0, friction=20.0, start=(0.0, 0.0, 0
     """Return positions, velocities and wrenches of a mass in the hand."""
     builder = DiagramBuilder()
     tool = builder.AddSystem(FreeMass(mass, friction))
-    system = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    system = builder.AddSystem(BlockSystem(OperatorHand(parameters, PERIOD), PERIOD))
     builder.Connect(tool.get_output_port(), system.get_input_port())
     builder.Connect(system.get_output_port(), tool.get_input_port())
     log = LogVectorOutput(system.get_output_port(), builder, PERIOD)
@@ -165,7 +166,8 @@ def test_it_lets_go_while_it_does_not_see_the_tool():
 
 
 def test_it_does_not_feed_through():
-    assert not OperatorHand(hand(), PERIOD).HasAnyDirectFeedthrough()
+    system = BlockSystem(OperatorHand(hand(), PERIOD), PERIOD)
+    assert not system.HasAnyDirectFeedthrough()
 
 
 def test_a_robot_with_soft_joints_gives_way_to_the_target():
@@ -190,7 +192,7 @@ def test_a_robot_with_soft_joints_gives_way_to_the_target():
     target = y_0 + np.array([0.05, 0.1, -0.05])
     waypoints = [HandWaypoint(0.0, y_0), HandWaypoint(1.0, target)]
     parameters = HandParameters(waypoints=waypoints, stiffness=600.0, damping=60.0)
-    operator = builder.AddSystem(OperatorHand(parameters, PERIOD))
+    operator = builder.AddSystem(BlockSystem(OperatorHand(parameters, PERIOD), PERIOD))
     external = builder.AddSystem(ExternalWrench(tool, chain))
     connect = builder.Connect
     connect(plant.get_state_output_port(), encoders.get_input_port())

@@ -1,0 +1,103 @@
+"""Where a hand goes: from place to place, at rest in each."""
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.geometry.curves.piecewise_fit import fit_pieces
+from pfsc_drake.physics.force_profile import smooth_step, smooth_step_slope
+
+# from coordinates and their rates, shape (3,) each, to position and velocity in the world
+Place = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+_DEGREE = 7
+_TOLERANCE = 1e-11  # m
+
+
+class Legs:
+    """A way with rests, from one place to the next with minimum jerk.
+
+    Args:
+        times: At the ends of the legs, ascending, shape (k,) [s].
+    """
+
+    def __init__(self, times: np.ndarray) -> None:
+        # the last leg, on which nothing moves, never ends
+        self._begins = ca.MX(ca.DM(np.append(times, times[-1] + 1.0)))
+        self._durations = ca.MX(ca.DM(np.append(np.diff(times), 1.0)))
+
+    def at(self, time: Any) -> tuple[Any, Any, Any]:
+        """Return which leg a time is in, the share of it that is gone, and its rate [1/s].
+
+        Args:
+            time: [s].
+        """
+        leg = ca.low(self._begins, time, {"lookup_mode": "binary"})
+        duration = self._durations[leg]
+        x = (time - self._begins[leg]) / duration
+        return leg, smooth_step(x), smooth_step_slope(x) / duration
+
+
+class HandWay:
+    """The way of a hand in the world, over time.
+
+    Along a manifold it is a table of polynomials of the share of each leg, made once.
+
+    Args:
+        times: At the waypoints, ascending, shape (k,) [s].
+        positions: Of the waypoints, shape (k, 3).
+        place: Where these are in the world; None if they are world coordinates [m].
+    """
+
+    def __init__(
+        self, times: np.ndarray, positions: np.ndarray, place: Place | None = None
+    ) -> None:
+        self._legs, last = Legs(times), len(times) - 1
+        ways = np.vstack([np.diff(positions, axis=0), np.zeros(3)])
+        if place is None:
+            breaks = np.arange(last + 2.0)
+            table = np.stack([np.hstack([positions, ways]), np.pad(ways, [(0, 0), (0, 3)])], axis=1)
+        else:
+            breaks, table = _fitted(positions, ways, place)
+        self._breaks = ca.MX(ca.DM(breaks))
+        self._table = ca.MX(ca.DM(table.reshape(len(table), -1).T))
+
+    def at(self, time: Any) -> tuple[Any, Any]:
+        """Return position [m] and velocity [m/s], shape (3,) each.
+
+        Args:
+            time: [s].
+        """
+        leg, share, rate = self._legs.at(time)
+        piece = ca.low(self._breaks, leg + share, {"lookup_mode": "binary"})
+        # from the begin of the leg, so that nothing is lost of the share
+        u = share - (self._breaks[piece] - leg)
+        rows = ca.horzsplit(ca.reshape(self._table[:, piece], 6, -1))
+        values = rows[-1]
+        for row in rows[-2::-1]:
+            values = row + u * values
+        return values[:3], rate * values[3:]
+
+
+def _fitted(positions: np.ndarray, ways: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    """Return polynomials of place and slope over the number of the leg plus the share of it."""
+    last = len(positions) - 1
+
+    def along(number: float) -> np.ndarray:
+        leg = int(number)
+        share = number - leg
+        return np.concatenate(place(positions[leg] + share * ways[leg], ways[leg]))
+
+    breaks, table = np.zeros(1), np.zeros((0, _DEGREE + 1, 6))
+    if last > 0:
+        breaks, table = fit_pieces(
+            lambda numbers: np.array([along(number) for number in numbers.tolist()]),
+            np.arange(last + 1.0),
+            degree=_DEGREE,
+            tolerance=_TOLERANCE,
+        )
+    rest = np.zeros((1, _DEGREE + 1, 6))
+    rest[0, 0] = along(float(last))
+    return np.append(breaks, last + 1.0), np.concatenate([table, rest])
