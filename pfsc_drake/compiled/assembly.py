@@ -24,11 +24,17 @@ _BLOCK = 200
 _CONNECTIVES = {ca.OP_AND: "and", ca.OP_OR: "or"}
 
 
+class Table(list[Value]):
+    """Literals, perhaps very many."""
+
+
 class Constants:
     """Tables of numbers that functions share, each content once."""
 
     def __init__(self) -> None:
         self._names: dict[tuple[Value, ...], str] = {}
+        # to look at 100,000 numbers again takes long
+        self._seen: dict[int, tuple[Table, str]] = {}
 
     def pointer(self, values: Sequence[Value]) -> str:
         """Return the pointer to a table.
@@ -36,9 +42,13 @@ class Constants:
         Args:
             values: Literals.
         """
+        if id(values) in self._seen:
+            return self._seen[id(values)][1]
         key = tuple(values)
         if key not in self._names:
             self._names[key] = f"@table{len(self._names)}"
+        if isinstance(values, Table):
+            self._seen[id(values)] = values, self._names[key]
         return self._names[key]
 
     def text(self) -> str:
@@ -172,7 +182,7 @@ class Code:
         """Return a pointer to numbers one behind the other; they are not to be overwritten."""
         if not values:
             return "null"
-        if all(_is_literal(value) for value in values):
+        if isinstance(values, Table) or all(_is_literal(value) for value in values):
             return self._constants.pointer(values)
         start = values[0]
         if isinstance(start, tuple):
@@ -193,9 +203,9 @@ class Code:
         self._lines.append(f"call void {name}({', '.join(f'ptr {p}' for p in pointers)})")
 
 
-def literals(values: np.ndarray) -> Values:
+def literals(values: np.ndarray) -> Table:
     """Return constants, shape (n,)."""
-    return [literal(value) for value in values.tolist()]
+    return Table(map(literal, values.tolist()))
 
 
 def elements(pointer: str, size: int, first: int = 0) -> Values:

@@ -163,4 +163,4 @@ def literal(value: float) -> str:
     """Return a constant with all its bits; LLVM wants decimals to be exact."""
     if math.isnan(value):
         return "0x7FF8000000000000"
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+    return f"0x{struct.pack('>d', value).hex()}"
