@@ -15,7 +15,6 @@ from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
 from experiments.length import check_frames, check_length
 from experiments.results.targets import check_targets
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.files import resolve_files
@@ -91,8 +90,7 @@ def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Stat
     def tell(fraction: float, phase: str) -> None:
         progress(0.0, f"{phase}, {fraction:.0%}")
 
-    with compiled_when_bound():
-        return build_station(settings, folder, tell)
+    return build_station(settings, folder, tell)
 
 
 def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Station, Integration]:
@@ -104,8 +102,7 @@ def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Sta
     longest = min(settings.simulation.max_step, station.controller.period)
     settings.simulation = integration.applied_to(settings.simulation)
     if integration.step < longest:  # friction is made for the step
-        with compiled_when_bound():
-            station = build_station(settings, folder, task=station.task)
+        station = build_station(settings, folder, task=station.task)
     return station, integration
 
 

@@ -25,7 +25,6 @@ from identification.measurement.servo import (
 from identification.measurement.sources import add_curves, add_lines, add_sines, add_sum
 from identification.measurement.station import add_feed_forward
 from identification.model.subject import Subject
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.friction import bristles_for_step
@@ -143,8 +142,7 @@ def simulate_excited(
     check_effort(subject, rigid + friction_torques(v, coulomb, viscous))
     mounts = subject.mounts or [RotorMount(0, np.eye(3)[2], np.inf)] * n
     builder = DiagramBuilder()
-    with compiled_when_bound():
-        plant = builder.AddNamedSystem("plant", FullElasticPlant(chain, mounts))
+    plant = builder.AddNamedSystem("plant", FullElasticPlant(chain, mounts))
     joint_state = plant.GetOutputPort("joint_state")
     motor = builder.AddNamedSystem("motor_state", MatrixGain(np.eye(4 * n)[2 * n :]))
     builder.Connect(joint_state, motor.get_input_port())

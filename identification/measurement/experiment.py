@@ -12,7 +12,6 @@ from identification.measurement.record import Record
 from identification.measurement.servo import Servo, friction_torques, rigid_torques
 from identification.measurement.station import Station, build_station
 from identification.model.subject import Subject
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 
@@ -104,12 +103,11 @@ def run_experiment(
     usual = _usual_friction(subject)
     coulomb, viscous = faults.friction(*usual, random)
     run = _checked_run(subject, trajectory, periods, servo)
-    with compiled_when_bound():
-        _, *motion = run.sample(1.0 / servo.period)
-        rigid = rigid_torques(subject, *motion)
-        check_effort(subject, rigid + friction_torques(motion[1], *usual))
-        friction = (coulomb, viscous)
-        station = build_station(subject, run, faults, servo, friction, rigid, usual, random)
+    _, *motion = run.sample(1.0 / servo.period)
+    rigid = rigid_torques(subject, *motion)
+    check_effort(subject, rigid + friction_torques(motion[1], *usual))
+    friction = (coulomb, viscous)
+    station = build_station(subject, run, faults, servo, friction, rigid, usual, random)
     t, signals = _simulate(station, run, servo, progress)
     # what acts up to a tick and what acts from it on
     feedback = signals["feedback"].copy()

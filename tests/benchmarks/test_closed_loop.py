@@ -9,7 +9,6 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -19,8 +18,7 @@ SPAN = 0.2
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
 def test_closed_loop(benchmark, name):
     scenario = load_file(Scenario, SCENARIOS / f"{name}.yaml")
-    with compiled_when_bound():
-        station = build_station(scenario, SCENARIOS)
+    station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
     configure(simulator, integration.scheme, integration.step)

@@ -14,7 +14,6 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
@@ -44,8 +43,7 @@ class Loop:
         self.scenario = load_file(Scenario, file)
         for pulse in self.scenario.forces:
             pulse.begin, pulse.end = 0.1, 10.0
-        with compiled_when_bound():
-            self.station = build_station(self.scenario, SCENARIOS)
+        self.station = build_station(self.scenario, SCENARIOS)
         self.simulator = Simulator(self.station.diagram)
         simulation = self.scenario.simulation
         ApplySimulatorConfig(

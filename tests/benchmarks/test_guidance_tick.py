@@ -17,7 +17,6 @@ from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
@@ -72,8 +71,7 @@ def test_whole_chain(benchmark):
     scenario.fixtures.regions += clear[: REGIONS - len(scenario.fixtures.regions)]
     scenario.hand.waypoints = scenario.hand.waypoints[:1]
     scenario.hand.waypoints[0].position = start + np.array([0.03, 0.0, 0.0])
-    with compiled_when_bound():
-        station = build_station(scenario, file.parent)
+    station = build_station(scenario, file.parent)
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)
     configure(simulator, integration.scheme, integration.step)

@@ -15,7 +15,6 @@ from diagrams.scenario import PostureParameters, Scenario
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.yaml.typed import load_file
 
 POSTURES = {
@@ -33,8 +32,7 @@ def test_tick_of_seven_elastic_axes(benchmark, posture):
     scenario = load_file(Scenario, find_scenario("pfc_elastic_7r"))
     scenario.controller.posture = POSTURES[posture]
     scenario.reference.dwell = 0.02
-    with compiled_when_bound():
-        station = build_station(scenario, Path())
+    station = build_station(scenario, Path())
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, 0.02)
     configure(simulator, integration.scheme, integration.step)

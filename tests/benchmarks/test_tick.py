@@ -13,7 +13,6 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 from scipy.optimize import least_squares
 
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, link_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.control.law.decoupling import DecouplingInverse
@@ -184,8 +183,7 @@ def make_law(robot, law, oriented):
 
 @pytest.fixture(scope="module", params=CASES, name="chain")
 def fixture_chain(request):
-    with compiled_when_bound():
-        return Chain(*CASES[request.param])
+    return Chain(*CASES[request.param])
 
 
 def test_whole_tick(chain, benchmark):

@@ -1,31 +1,22 @@
 """The bound function against an ordinary call of the same function."""
 
-import sys
+import gc
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.compiled import native_code
-from pfsc_drake.compiled.bound_function import BoundFunction, compiled_when_bound
+from pfsc_drake.compiled import bound_function
+from pfsc_drake.compiled.bound_function import BoundFunction
 
 A, B = ca.SX.sym("A", 2, 3), ca.SX.sym("b", 3)
 FUNCTION = ca.Function("f", [A, B], [A @ B, ca.sin(A)], ["A", "b"], ["product", "sine"])
 
 
-@pytest.fixture(name="compile_after", params=[0, 3, 10**9])
-def fixture_compile_after(request, monkeypatch):
-    monkeypatch.setattr(BoundFunction, "compile_after", request.param)
-    return request.param
-
-
-@pytest.fixture(name="no_llvmlite")
-def fixture_no_llvmlite(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(native_code, "_compiled", {})
-    native_code._llvm.cache_clear()
-    for name in ("llvmlite", "llvmlite.binding"):
-        monkeypatch.setitem(sys.modules, name, None)
+@pytest.fixture(name="code", params=["machine code", "interpreter"])
+def fixture_code(request, monkeypatch):
+    if request.param == "interpreter":
+        monkeypatch.setattr(bound_function, "native_code", lambda _: None)
 
 
 def check_values(bound, rounds=6):
@@ -38,17 +29,11 @@ def check_values(bound, rounds=6):
         np.testing.assert_allclose(bound.results["sine"], np.sin(a).ravel(order="F"), rtol=1e-15)
 
 
-def test_values_by_columns(compile_after):
+def test_values_by_columns(code):
     check_values(BoundFunction(FUNCTION))
 
 
-def test_values_without_llvmlite(compile_after, no_llvmlite):
-    bound = BoundFunction(FUNCTION)
-    check_values(bound)
-    assert not bound.compile()
-
-
-def test_shared_arrays_need_no_copy(compile_after):
+def test_shared_arrays_need_no_copy(code):
     block = np.zeros(5)
     first = BoundFunction(FUNCTION, b=block[:3], product=block[3:])
     second = BoundFunction(FUNCTION, b=block[:3])
@@ -60,27 +45,23 @@ def test_shared_arrays_need_no_copy(compile_after):
     np.testing.assert_array_equal(second.results["product"], [6.0, 6.0])
 
 
-def test_compiles_when_it_pays_and_once(monkeypatch):
+def test_it_is_compiled_when_bound(monkeypatch):
     asked = []
-    monkeypatch.setattr("pfsc_drake.compiled.bound_function.native_code", asked.append)
-    monkeypatch.setattr(BoundFunction, "compile_after", 4)
+    monkeypatch.setattr(bound_function, "native_code", asked.append)
     bound = BoundFunction(FUNCTION)
-    counts = []
-    for _ in range(7):
-        bound.evaluate()
-        counts.append(len(asked))
-    assert counts == [0, 0, 0, 0, 1, 1, 1]
+    assert len(asked) == 1
+    check_values(bound)
+    assert len(asked) == 1
 
 
-def test_a_method_that_was_kept_uses_machine_code(monkeypatch):
+def test_evaluate_keeps_code_and_arrays_alive(code):
     bound = BoundFunction(FUNCTION)
-    evaluate = bound.evaluate
-    assert bound.compile()
-    monkeypatch.setattr(bound, "_buffer", None)
+    evaluate, product = bound.evaluate, bound.results["product"]
     bound.arguments["A"][:] = bound.arguments["b"][:] = 1.0
     del bound
+    gc.collect()
     evaluate()
-    np.testing.assert_array_equal(evaluate.__self__.results["product"], [3.0, 3.0])
+    np.testing.assert_array_equal(product, [3.0, 3.0])
 
 
 @pytest.mark.parametrize(
@@ -95,13 +76,3 @@ def test_refuses_sparse_results():
     x = ca.SX.sym("x", 2)
     with pytest.raises(ValueError, match=r"y: has .* must be dense"):
         BoundFunction(ca.Function("f", [x], [ca.diag(x)], ["x"], ["y"]))
-
-
-def test_compiled_when_bound(monkeypatch):
-    asked = []
-    monkeypatch.setattr("pfsc_drake.compiled.bound_function.native_code", asked.append)
-    with pytest.raises(RuntimeError), compiled_when_bound():
-        BoundFunction(FUNCTION)
-        raise RuntimeError
-    BoundFunction(FUNCTION)
-    assert len(asked) == 1

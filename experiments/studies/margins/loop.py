@@ -15,7 +15,6 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.tasks.task import Task
 from experiments.simulation import configure
-from pfsc_drake.compiled.bound_function import compiled_when_bound
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.margins.modes import in_loop
 from pfsc_drake.systems.can_fail import FailingSystem
@@ -51,8 +50,7 @@ class StationLoop:
     def __init__(self, settings: Scenario, folder: Path, task: Task | None = None) -> None:
         # each system's part of the state is looked for
         settings = replace(settings, simulation=replace(settings.simulation, fused=False))
-        with compiled_when_bound():
-            self.station: Station = build_station(settings, folder, task=task, with_slope=True)
+        self.station: Station = build_station(settings, folder, task=task, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
         self.spring = _only(diagram, SurfaceSpring)
         self._sensor = _only(diagram, ToolCompensation)
