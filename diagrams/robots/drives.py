@@ -8,14 +8,14 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
 
+from diagrams.believed import believed_robot
 from diagrams.robots.part import Drives, RobotPart
-from diagrams.safety import supervision
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.safety import safe_state
+from pfsc_drake.following.safety import safe_state, supervision
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
@@ -82,7 +82,10 @@ def _add_servo(
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
     effort = chain.gather("effort_limit") * scenario.controller.effort_scale
-    watched = replace(supervision(scenario, chain), joint_limits=False)
+    seen = believed_robot(scenario, chain)
+    watched = replace(
+        supervision(scenario.controller.law, scenario.faults, seen), joint_limits=False
+    )
     system = builder.AddNamedSystem(
         "velocity_servo",
         VelocityServo(

@@ -8,7 +8,6 @@ from diagrams.scenario.checks import (
     require,
     require_between,
     require_not_negative,
-    require_positive,
 )
 from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
 from pfsc_drake.control.compliance.press import PressParameters
@@ -16,6 +15,7 @@ from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.compliance.still_components import STILL_TIME
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
+from pfsc_drake.following.options.compliance import ObservedForceParameters
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
 
 SOURCES = ("sensor", "observed")
@@ -23,28 +23,6 @@ SOURCES = ("sensor", "observed")
 _OF_PLACES = (1e-3, 1e4, 1e7, 1e9, "kg", "N s/m", "N/m")
 _OF_ANGLES = (1e-6, 1e4, 1e6, 1e8, "kg m^2", "Nm s/rad", "Nm/rad")
 _BOUNDS = {"tangential": _OF_PLACES, "transversal": _OF_PLACES, "rotational": _OF_ANGLES}
-
-
-@dc.dataclass
-class ObservedForceParameters:
-    """Forces on the tool from the torques in the joints, without a sensor.
-
-    Attributes:
-        rate: Of the observer [1/s].
-        damping: Of the inverse of the Jacobian in singular postures.
-        force_dead_band: [N]; friction and model errors are taken for forces below it.
-        torque_dead_band: [Nm].
-    """
-
-    rate: float = 100.0
-    damping: float = 0.02
-    force_dead_band: float = 0.0
-    torque_dead_band: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive("rate", self.rate)
-        for key in ("damping", "force_dead_band", "torque_dead_band"):
-            require_not_negative(key, getattr(self, key))
 
 
 @dc.dataclass

@@ -6,15 +6,11 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
-from diagrams.safety import supervision
+from diagrams.believed import believed_robot
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.compliance import add_compliance, has_impedance, reference_order
-from diagrams.tasks.external_torque import add_external_torque
-from diagrams.tasks.friction import Coefficients, add_friction_compensation
 from diagrams.tasks.guidance import add_guidance
-from diagrams.tasks.observed_forces import add_observed_forces
-from diagrams.tasks.posture import add_posture_reference
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -22,6 +18,8 @@ from pfsc_drake.control.law.swing import SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.believed import Coefficients
+from pfsc_drake.following.controller import add_controller
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
@@ -33,8 +31,6 @@ from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 # what guidance tells, for the log
 _GUIDANCE = {"guidance": "record", "mode": "mode"}
-# what an observer tells, for the log
-_OBSERVED = ("tau_ext_observed", "wrench_observed")
 
 
 @dataclass(frozen=True)
@@ -156,24 +152,18 @@ def add_law(
     Raises:
         InputError: If compliance, external torques or friction do not suit the law.
     """
-    scenario, law, signals = following.scenario, following.law, place.signals | forces
-    controller = builder.AddNamedSystem(
-        "following_controller",
-        FollowingController(
-            law, scenario.controller.sampling_time, supervision(scenario, following.robot)
-        ),
+    scenario, law = following.scenario, following.law
+    yields = scenario.compliance.is_given and scenario.compliance.source == "observed"
+    controller, signals, made = add_controller(
+        builder,
+        law,
+        believed_robot(scenario, following.robot, following.friction),
+        scenario.controller,
+        scenario.faults,
+        place.signals | forces,
+        scenario.compliance.observed if yields else None,
     )
-    made = {"law": controller.GetOutputPort("law")}
-    signals |= add_external_torque(builder, following.robot, scenario, controller, signals)
-    friction, logged = add_friction_compensation(
-        builder, following.robot, scenario, controller, following.friction, signals
-    )
-    made |= logged
-    if friction is not None:
-        signals["friction"] = friction
-    signals |= add_observed_forces(builder, following.robot, scenario, controller, signals)
-    made |= {name: signals[name] for name in _OBSERVED if name in signals}
-    made |= add_posture_reference(builder, following.robot, scenario, law, controller, signals)
+    made |= {"law": controller.GetOutputPort("law")}
     desired = place.desired_reference
     if desired is None:
         guidance = _add_guidance(builder, following, signals)
@@ -200,8 +190,6 @@ def add_law(
         )
     _connect_alarms(builder, controller, forces, made)
     builder.Connect(made["reference"], controller.GetInputPort("reference"))
-    for name in ("joint_state", "manifold_point"):
-        builder.Connect(signals[name], controller.GetInputPort(name))
     return controller, made
 
 

@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
-from diagrams.tasks.posture import warn_unused
 from diagrams.tasks.untold_forces import untold_forces, untold_friction
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.compliance.observed_inertia import (
@@ -21,6 +20,7 @@ from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.following.gains import sampled_robot
+from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.robot_model import RobotModel
 

@@ -3,15 +3,25 @@
 from collections.abc import Callable
 
 import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from pfsc_drake.control.compliance.null_space_impedance import (
+    NullSpaceImpedance,
+    NullSpaceImpedanceParameters,
+)
+from pfsc_drake.control.compliance.yielding_posture import YieldingPosture
+from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.posture import Posture, PostureCoordinate, range_weight
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.posture import PostureParameters
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
+from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.control.posture_reference import PostureReference
 
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs
@@ -68,3 +78,96 @@ def _swivel(parameters: PostureParameters, robot: RobotModel, q: np.ndarray) -> 
     joints = (shoulder, elbow, wrist)
     upward = upward_direction(robot, q, joints)
     return lambda jets: swivel_angle(robot, jets, joints, upward)
+
+
+def add_posture_reference(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    options: ControllerParameters,
+    law: FollowingLaw,
+    controller: FollowingController,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Add the posture reference of a robot with more joints than outputs.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot as it is believed.
+        options: What is chosen of the controller.
+        law: The law that follows it.
+        controller: The controller of this law.
+        ports: ``joint_state``, ``manifold_point``, and ``posture_torque`` if it is to yield.
+
+    Returns:
+        ``posture_reference``, derivatives 0..r by rows, shape ((r + 1) N,), if there is one.
+
+    Raises:
+        InputError: If the posture does not suit the robot.
+    """
+    if law.posture is None:
+        return {}
+    parameters, manifold = options.posture, law.linearization.manifold
+    impedance = NullSpaceImpedance(
+        NullSpaceImpedanceParameters(
+            parameters.inertia,
+            parameters.damping,
+            0.0 if parameters.is_pulled else parameters.stiffness,
+            parameters.filter_rate,
+        ),
+        law.linearization.relative_degree,
+        controller.period,
+    )
+    pulled = (parameters.task, parameters.stiffness) if parameters.is_pulled else ("", 0.0)
+    posture = builder.AddNamedSystem(
+        "posture_reference",
+        PostureReference(
+            YieldingPosture(robot, manifold, law.posture, impedance, *pulled),
+            robot.dimension,
+            manifold.layout.size,
+            controller.period,
+            _goal(parameters, robot),
+        ),
+    )
+    for name in ("joint_state", "manifold_point"):
+        builder.Connect(ports[name], posture.GetInputPort(name))
+    if "posture_torque" in ports:
+        builder.Connect(ports["posture_torque"], posture.GetInputPort("tau_ext"))
+    reference = posture.GetOutputPort("posture_reference")
+    builder.Connect(reference, controller.GetInputPort("posture_reference"))
+    return {"posture_reference": reference}
+
+
+def _goal(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:
+    """Return where the posture goes, shape (N,) [rad or m], or None for where it starts."""
+    given, key = parameters.reference_deg, f"{_KEY}.reference_deg"
+    if not given:
+        return None
+    if len(given) != robot.dimension:
+        raise InputError(f"{key}: {len(given)} values; the robot has {robot.dimension} joints")
+    goal = np.where(robot.gather("is_revolute"), np.deg2rad(given), given)
+    lower, upper = robot.gather("position_limits").T
+    for value, q, low, high, name in zip(given, goal, lower, upper, robot.names, strict=True):
+        if not low <= q <= high:
+            turns = robot.gather("is_revolute")[robot.names.index(name)]
+            ends = np.rad2deg([low, high]) if turns else np.array([low, high])
+            raise InputError(
+                f"{key}: {value:g} of {name}; its limits are {ends[0]:.4g} to {ends[1]:.4g} "
+                f"{'deg' if turns else 'm'}"
+            )
+    return goal
+
+
+def warn_unused(parameters: ControllerParameters, law: FollowingLaw) -> list[str]:
+    """Return what is said of a posture that a robot cannot choose, one sentence each.
+
+    Args:
+        parameters: What is chosen.
+        law: The law.
+    """
+    if law.posture is not None or parameters.posture == PostureParameters():
+        return []
+    m = law.linearization.num_outputs
+    return [
+        f"{_KEY} is not used: the task's {m} outputs leave none of the {m} joints free; "
+        "path.orientation.task: tool_axis, yaw or none would"
+    ]

@@ -5,6 +5,7 @@ import numpy as np
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.supervision import SupervisionParameters
+from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.faults import FaultParameters
 from pfsc_drake.robot.robot_model import RobotModel
@@ -28,21 +29,18 @@ def safe_state(
     return SafeState(damping, faults.hold_bandwidth, faults.effort_share)
 
 
-def supervision(
-    law: str, faults: FaultParameters, resolution: np.ndarray, filter_time: float = 0.0
-) -> SupervisionParameters:
+def supervision(law: str, faults: FaultParameters, believed: Believed) -> SupervisionParameters:
     """Return what is watched of a robot's joints.
 
     Args:
         law: Name of the law.
         faults: What is a fault.
-        resolution: Of the measured positions, shape (N,) [rad or m].
-        filter_time: By how much measured velocities are late [s].
+        believed: The robot.
     """
     return SupervisionParameters(
         tolerance=faults.plausibility,
-        resolution=resolution,
-        filter_time=filter_time,
+        resolution=np.broadcast_to(believed.resolution, believed.robot.dimension),
+        filter_time=believed.filter_time,
         joint_limits=faults.joint_limits,
         saturation_time=_saturation_time(law, faults.saturation_time),
         chatter_turns=faults.chatter_turns,

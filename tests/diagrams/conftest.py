@@ -61,10 +61,12 @@ def load_arm():
 
 @pytest.fixture
 def load_scenario():
-    """Return a fresh copy of a shipped scenario, to be changed."""
+    """Return a fresh copy of a shipped scenario, to be changed; its systems can be looked at."""
 
     def load(name: str) -> Scenario:
-        return load_file(Scenario, find_scenario(name))
+        settings = load_file(Scenario, find_scenario(name))
+        settings.simulation.fused = False
+        return settings
 
     return load
 

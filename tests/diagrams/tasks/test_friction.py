@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
+from diagrams.believed import believed_robot
 from diagrams.builder import build_station
 from diagrams.scenario import JointFrictionParameters
-from diagrams.tasks.friction import velocity_delay
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import FrictionDrift
@@ -171,11 +171,12 @@ def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
         assert said == (source != "none" or watched)
 
 
-def test_a_difference_quotient_is_the_velocity_half_an_interval_ago(load_scenario):
-    settings = load_scenario("pfc_elastic_3r")
-    assert velocity_delay(settings) == 0.0
+def test_a_difference_quotient_is_the_velocity_half_an_interval_ago(load_scenario, load_arm):
+    settings, robot = load_scenario("pfc_elastic_3r"), load_arm("comau_racer_1_4_elastic_3r").chain
+    assert believed_robot(settings, robot).velocity_delay == 0.0
     settings.encoders.difference_quotient = True
-    T, t, delay = settings.controller.sampling_time, 0.7, velocity_delay(settings)
+    delay = believed_robot(settings, robot).velocity_delay
+    T, t = settings.controller.sampling_time, 0.7
     # exactly so of a motion with constant acceleration
     q = [3.0 * time**2 - time for time in (t, t - T)]
     assert (q[0] - q[1]) / T == pytest.approx(6.0 * (t - delay) - 1.0, rel=1e-9)

@@ -3,39 +3,35 @@
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
 from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
 from pfsc_drake.control.estimation.friction_model import FrictionModel
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.believed import Believed, Coefficients
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
-from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 
-# f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
-Coefficients = tuple[np.ndarray, np.ndarray]
 # by which part of itself a coefficient is thought to change from sample to sample
 _DRIFT = 1e-3
 
 
 def add_friction_compensation(
     builder: DiagramBuilder,
-    robot: RobotModel,
-    scenario: Scenario,
+    believed: Believed,
+    options: ControllerParameters,
     controller: FollowingController,
-    believed: Coefficients | None,
     ports: dict[str, OutputPort],
 ) -> tuple[OutputPort | None, dict[str, OutputPort]]:
     """Let the law overcome friction, if it is to.
 
     Args:
         builder: Builder of the diagram.
-        robot: The robot as it is believed.
-        scenario: The scenario.
+        believed: The robot.
+        options: What is chosen of the controller.
         controller: The controller.
-        believed: Coefficients of friction, if any are believed.
         ports: ``joint_state`` as measured, and ``tau_ext`` if the law is told of it.
 
     Returns:
@@ -46,7 +42,7 @@ def add_friction_compensation(
     Raises:
         InputError: If the compensation does not suit the robot, or lacks coefficients.
     """
-    parameters = scenario.controller.friction
+    parameters = options.friction
     # servos overcome friction themselves, and do not tell their torques; law_warnings says so
     if not parameters.is_given or controller.relative_degree == 1:
         return None, {}
@@ -56,11 +52,11 @@ def add_friction_compensation(
     logged, compensated = {}, None
     if parameters.source == "model":
         compensated = _add_model(
-            builder, parameters, believed, signals, scenario.controller.sampling_time
+            builder, parameters, believed.friction, signals, options.sampling_time
         )
         logged = {"friction_estimate": compensated}
     if parameters.source == "observer" or parameters.watched:
-        torque, estimate = _add_observer(builder, scenario, robot, believed, signals)
+        torque, estimate = _add_observer(builder, believed, options, signals)
         logged = {"friction_estimate": estimate}
         if parameters.source == "observer":
             compensated = torque
@@ -87,17 +83,16 @@ def _add_model(
 
 def _add_observer(
     builder: DiagramBuilder,
-    scenario: Scenario,
-    robot: RobotModel,
-    believed: Coefficients | None,
+    believed: Believed,
+    options: ControllerParameters,
     ports: dict[str, OutputPort],
 ) -> tuple[OutputPort, OutputPort]:
     """Add an observer of friction, and return the torque and all that it tells."""
-    parameters, period = scenario.controller.friction, scenario.controller.sampling_time
-    momentum = drive_momentum(robot).with_delay(velocity_delay(scenario))
+    parameters, period = options.friction, options.sampling_time
+    momentum = drive_momentum(believed.robot).with_delay(believed.velocity_delay)
     block: FrictionKalmanFilter | MomentumObserver
     if parameters.observer == "kalman":
-        coefficients = _required(believed, "observer = kalman")
+        coefficients = _required(believed.friction, "observer = kalman")
         block, torque = _kalman(parameters, momentum, coefficients, period), "friction_torque"
     else:
         block, torque = MomentumObserver(momentum, parameters.rate, period), "estimate"
@@ -109,11 +104,6 @@ def _add_observer(
         # laws for rigid joints are told torques without derivatives
         builder.Connect(ports["tau_ext"], observer.GetInputPort("known_torque"))
     return observer.GetOutputPort(torque), observer.GetOutputPort("estimate")
-
-
-def velocity_delay(scenario: Scenario) -> float:
-    """Return how old measured velocities are [s]; a difference quotient is that of mid-interval."""
-    return scenario.controller.sampling_time / 2.0 if scenario.encoders.difference_quotient else 0.0
 
 
 def _required(believed: Coefficients | None, choice: str) -> Coefficients:

@@ -4,12 +4,13 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer
 
-from diagrams.scenario import Scenario
-from diagrams.tasks.friction import velocity_delay
 from pfsc_drake.control.estimation.generalized_momentum import link_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.control.estimation.tool_wrench import ToolWrench
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.believed import Believed
+from pfsc_drake.following.options.compliance import ObservedForceParameters
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
@@ -17,8 +18,9 @@ from pfsc_drake.systems.control.following_controller import FollowingController
 
 def add_observed_forces(
     builder: DiagramBuilder,
-    robot: RobotModel,
-    scenario: Scenario,
+    believed: Believed,
+    options: ControllerParameters,
+    tool: ObservedForceParameters | None,
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
@@ -26,8 +28,9 @@ def add_observed_forces(
 
     Args:
         builder: Builder of the diagram.
-        robot: The robot as it is believed.
-        scenario: The scenario.
+        believed: The robot.
+        options: What is chosen of the controller.
+        tool: How forces on the tool are observed for compliance, if they are.
         controller: The controller.
         ports: ``joint_state`` as measured, and ``friction`` if friction is compensated.
 
@@ -39,40 +42,38 @@ def add_observed_forces(
     Raises:
         InputError: If the law, the robot or what is done about friction does not allow it.
     """
-    told = scenario.controller.external_torque
-    yields = scenario.compliance.is_given and scenario.compliance.source == "observed"
-    posture = scenario.controller.posture
+    told, robot = options.external_torque, believed.robot
+    posture = options.posture
     keys = {
         "controller.external_torque.source": told.source == "observed",
-        "compliance.source": yields,
+        "compliance.source": tool is not None,
         "controller.posture.yields": posture.yields == "observed",
     }
     needed = [key for key, is_needed in keys.items() if is_needed]
     if not needed:
         return {}
-    _check(scenario, robot, controller, needed[0])
+    _check(options, robot, controller, needed[0])
     inputs = ports | {"drive_torque": controller.GetOutputPort("drive_torque")}
     made: dict[str, OutputPort] = {}
     if told.source == "observed":
         order = controller.relative_degree - 2
         torque = _add_observer(
-            builder, "external_torque_observer", robot, scenario, inputs, told.bandwidth, order
+            builder, "external_torque_observer", believed, options, inputs, told.bandwidth, order
         )
         builder.Connect(torque, controller.GetInputPort("tau_ext"))
         made["tau_ext_observed"] = _first(builder, torque, robot.dimension)
     if posture.yields == "observed":
         made["posture_torque"] = _add_observer(
-            builder, "posture_torque_observer", robot, scenario, inputs, posture.observer_rate, 0
+            builder, "posture_torque_observer", believed, options, inputs, posture.observer_rate, 0
         )
         made.setdefault("tau_ext_observed", made["posture_torque"])
-    if yields:
-        parameters = scenario.compliance.observed
+    if tool is not None:
         torque = _add_observer(
-            builder, "tool_force_observer", robot, scenario, inputs, parameters.rate, 0
+            builder, "tool_force_observer", believed, options, inputs, tool.rate, 0
         )
-        bands = (parameters.force_dead_band, parameters.torque_dead_band)
-        fit = ToolWrench(robot, parameters.damping, bands)
-        period = scenario.controller.sampling_time
+        bands = (tool.force_dead_band, tool.torque_dead_band)
+        fit = ToolWrench(robot, tool.damping, bands)
+        period = options.sampling_time
         wrench = builder.AddNamedSystem("tool_wrench", BlockSystem(fit, period))
         builder.Connect(torque, wrench.GetInputPort("tau_ext"))
         builder.Connect(ports["joint_state"], wrench.GetInputPort("joint_state"))
@@ -84,14 +85,14 @@ def add_observed_forces(
 
 
 def _check(
-    scenario: Scenario, robot: RobotModel, controller: FollowingController, key: str
+    options: ControllerParameters, robot: RobotModel, controller: FollowingController, key: str
 ) -> None:
     if controller.relative_degree == 1:
         raise InputError(
-            f"{key} = observed with the law '{scenario.controller.law}'; its servos do not tell "
+            f"{key} = observed with the law '{options.law}'; its servos do not tell "
             "the torques that an observer needs"
         )
-    friction = scenario.controller.friction
+    friction = options.friction
     if friction.source == "observer" and not robot.is_elastic:
         raise InputError(
             f"{key} = observed with controller.friction.source = observer: in rigid joints forces "
@@ -102,15 +103,15 @@ def _check(
 def _add_observer(
     builder: DiagramBuilder,
     name: str,
-    robot: RobotModel,
-    scenario: Scenario,
+    believed: Believed,
+    options: ControllerParameters,
     ports: dict[str, OutputPort],
     rate: float,
     num_derivatives: int,
 ) -> OutputPort:
     """Add an observer of external torques, and return them with their derivatives by rows."""
-    period = scenario.controller.sampling_time
-    model = link_momentum(robot).with_delay(velocity_delay(scenario))
+    period = options.sampling_time
+    model = link_momentum(believed.robot).with_delay(believed.velocity_delay)
     observer = builder.AddNamedSystem(
         name, BlockSystem(MomentumObserver(model, rate, period, num_derivatives), period)
     )

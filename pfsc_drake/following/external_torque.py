@@ -2,9 +2,9 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
 from pfsc_drake.control.estimation.external_torque import ExternalTorque
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
@@ -20,7 +20,7 @@ _SYSTEMS = {"tau_ext": "external_torque", "posture_torque": "external_torque_of_
 def add_external_torque(
     builder: DiagramBuilder,
     robot: RobotModel,
-    scenario: Scenario,
+    options: ControllerParameters,
     controller: FollowingController,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
@@ -31,7 +31,7 @@ def add_external_torque(
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        scenario: The scenario.
+        options: What is chosen of the controller.
         controller: The controller.
         ports: ``joint_state``, and of ``wrench_ext``, ``wrench_measured`` and ``push_torque``
             what there is.
@@ -44,9 +44,9 @@ def add_external_torque(
     Raises:
         InputError: If the law knows no external torques.
     """
-    parameters, made = scenario.controller.external_torque, dict[str, OutputPort]()
-    period, degree = scenario.controller.sampling_time, controller.relative_degree
-    if scenario.controller.posture.yields == "known":
+    parameters, made = options.external_torque, dict[str, OutputPort]()
+    period, degree = options.sampling_time, controller.relative_degree
+    if options.posture.yields == "known":
         posture = ExternalTorque(robot, 0, period)
         made |= _add(builder, "posture_torque", posture, period, _SEEN["known"], ports)
     if parameters.source not in _SEEN:
@@ -54,7 +54,7 @@ def add_external_torque(
     if degree == 1:
         raise InputError(
             f"controller.external_torque.source = {parameters.source} with the law "
-            f"'{scenario.controller.law}'; allowed: none, its servos bear the forces"
+            f"'{options.law}'; allowed: none, its servos bear the forces"
         )
     torque = ExternalTorque(robot, degree - 2, period, parameters.bandwidth)
     made |= _add(builder, "tau_ext", torque, period, _SEEN[parameters.source], ports)
