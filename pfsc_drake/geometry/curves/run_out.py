@@ -2,6 +2,7 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
@@ -61,6 +62,15 @@ class RunOut(Curve):
         exponents = np.arange(self._degree + 1)
         theta_0, length = self._theta, self._length
         return lambda theta: matrix.dot(((theta - theta_0) / length) ** exponents)
+
+    def expression(self, theta: ca.SX, order: int) -> ca.SX:
+        """`derivatives` at a scalar as an expression, [order + 1, dimension]."""
+        x = (theta - self._theta) / self._length
+        powers = [ca.SX(1.0)]
+        for _ in range(self._degree):
+            powers.append(powers[-1] * x)
+        rows = [ca.sparsify(ca.DM(rows)) @ ca.vertcat(*powers) for rows in self._table(order)]
+        return ca.horzcat(*rows).T
 
     def _table(self, order: int) -> np.ndarray:
         """Map from powers of x to derivatives by theta, [order + 1, dimension, degree + 1]."""

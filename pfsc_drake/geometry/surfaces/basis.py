@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -51,6 +52,21 @@ class Basis(ABC):
         """Pieces [...] and functions [..., size] at wrapped parameters [...]."""
 
     @abstractmethod
+    def at(self, u: ca.SX) -> ca.SX:
+        """Functions as expressions, [size], of what :meth:`local` returns."""
+
+    @abstractmethod
+    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
+        """What the functions on a piece are functions of, from its begin and a wrapped theta."""
+
+    def function(self, order: int) -> ca.Function:
+        """Return ``u -> derivatives 0..order``, [order + 1, size], with u as `local` has it."""
+        u = ca.SX.sym("u")
+        values = self.at(u)
+        rows = [(ca.sparsify(ca.DM(D)) @ values).T for D in self.derivations(order)]
+        return ca.Function("functions", [u], [ca.densify(ca.vertcat(*rows))])
+
+    @abstractmethod
     def sampler(self) -> Values:
         """Fast scalar form of `values`; wraps where closed, goes on analytically where open."""
 
@@ -77,6 +93,15 @@ class TrigonometricBasis(Basis):
         values = np.ones((*theta.shape, self.size))
         values[..., 1::2], values[..., 2::2] = np.cos(angles), np.sin(angles)
         return np.zeros(theta.shape, dtype=int), values
+
+    def at(self, u: ca.SX) -> ca.SX:
+        """See the base class."""
+        waves = [(ca.cos(k * u), ca.sin(k * u)) for k in range(1, self._harmonics + 1)]
+        return ca.vertcat(1.0, *[value for wave in waves for value in wave])
+
+    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
+        """See the base class."""
+        return theta
 
     def sampler(self) -> Values:
         """See the base class."""
@@ -112,6 +137,17 @@ class PowerBasis(Basis):
         piece = np.searchsorted(self.breakpoints[1:-1], theta, side="right")
         u = theta - self.breakpoints[piece]
         return piece, u[..., None] ** np.arange(self.size)
+
+    def at(self, u: ca.SX) -> ca.SX:
+        """See the base class."""
+        powers = [ca.SX(1.0)]
+        for _ in range(1, self.size):
+            powers.append(powers[-1] * u)
+        return ca.vertcat(*powers)
+
+    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
+        """See the base class."""
+        return theta - breakpoint
 
     def sampler(self) -> Values:
         """See the base class."""

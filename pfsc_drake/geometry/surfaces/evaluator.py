@@ -2,53 +2,46 @@
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.foot import Foot, FootFinder
+from pfsc_drake.geometry.foot_step import first_and_bend, largest_eigenvalue
+from pfsc_drake.geometry.nearest_samples import nearest_samples
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
-from pfsc_drake.geometry.surfaces.length import TangentialLength, panel
+from pfsc_drake.geometry.surfaces.length import TangentialLength
+from pfsc_drake.geometry.surfaces.partials import partial_count
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.product import ProductSurface
-from pfsc_drake.geometry.surfaces.projection import (
-    SurfaceProjection,
-    SurfaceProjector,
-    largest_eigenvalue,
-)
+from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, SurfaceProjection
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
 
-_BEYOND_END = float(ProjectionStatus.BEYOND_END)
-_NOT_CONVERGED = float(ProjectionStatus.NOT_CONVERGED)
-
-# All relative to the lengths of the domain: the longest step from one tick to the next, ...
-_NEAR = 1.0 / 32.0
-# ... one whose square counts, ...
-_SETTLED = 1e-6
-# ... a step that is not worth another evaluation, ...
-_TOLERANCE = 1e-12
-# ... and a way after which it is asked whether another place has become nearer.
+# Of the lengths of the domain: a way after which it is asked whether another place is nearer.
 _FAR = 1.0 / 8.0
 # Relative difference of distances that is none.
 _NOT_NEARER = 1e-9
-_MAX_STEPS = 8
-# Squared ratio of successive steps that is quick.
-_QUICK = 1.0 / 16.0
-
-Pair = tuple[float, float]
+# Samples in each direction that are looked at then.
+_MOST_SAMPLES = 24
+# Of the domain: samples that are nearer to each other lead to one place.
+_VALLEY = 1.0 / 8.0
 
 
 class SurfaceEvaluator:
     """Projects a point on a surface and evaluates everything a law of one order needs there.
 
-    It has no memory: the same input gives the same output. From the last tick's parameters plain
-    Newton steps (4.48) find the foot in a few scalar operations; whatever is not quick and plain (a
-    far guess, a border, a point near the centre of curvature) is left to the
-    `SurfaceProjector`, and what that does not find to a search of the whole surface. Beyond an end
-    of an open direction a sum of products goes on as `ExtendedSurface`, and the status tells; where
-    that ends too, and with surfaces of other kinds, the border's closest point is the foot.
+    The foot is found by `FootFinder` from the last tick's parameters; what is far from there, or
+    not found, is looked for on the whole surface. Beyond an end of an open direction the surface
+    goes on as `ExtendedSurface`, and the status tells; where that ends too, the border's closest
+    point is the foot. There is no memory: the same input gives the same output.
+
+    Calling the object evaluates ``evaluate``.
 
     Args:
         surface: Surface of class C^(order + 1), at least C^2.
@@ -56,15 +49,22 @@ class SurfaceEvaluator:
         orientation: Constant quaternion (w, x, y, z) of the reference orientation, [4], or None.
 
     Attributes:
-        layout: Where the quantities lie in the arrays returned.
+        layout: Where the quantities lie in the surface point.
         surface: The surface.
+        evaluate: ``(y_t, memory) -> manifold_point``, the surface next to a point [m], shape (3,);
+            memory is theta (unwrapped) and eta [m] of the last tick. eta goes on by the integral of
+            Sigma (4.15) along the straight line of the parameters, of fourth order. All values but
+            ``status`` are NaN if point or memory is not finite.
+        at: ``memory -> manifold_point``, the surface at parameters, with alpha zero.
 
     Raises:
         InputError: A surface that is not smooth enough or not regular, or an orientation that is
             none.
     """
 
-    def __init__(self, surface: Surface, order: int, orientation: ArrayLike | None = None) -> None:
+    def __init__(
+        self, surface: ProductSurface, order: int, orientation: ArrayLike | None = None
+    ) -> None:
         self.layout = SurfacePointLayout(order, orientation is not None)
         if surface.smoothness < order + 1:
             raise InputError(
@@ -72,103 +72,63 @@ class SurfaceEvaluator:
                 f" for a law of order {order}"
             )
         self.surface = surface
-        self._global = GlobalProjector(surface)
-        whole = surface
-        if isinstance(surface, ProductSurface):
-            whole = ExtendedSurface(surface, order + 1)
-        self._project = SurfaceProjector(whole).project
-        self._sample = whole.flat_sampler(order + 1)
-        self._length = TangentialLength(whole)
-        self._blank = np.zeros(self.layout.size)
+        self._quaternion = np.zeros(self.layout.quaternion.stop - self.layout.quaternion.start)
         if orientation is not None:
-            begin = self.layout.quaternion.start
-            self._blank[begin : begin + 4] = _checked_quaternion(orientation)
-        self._head = self.layout.position.start
-        self._rest = self.layout.position.stop
-        first, second = surface.domain
-        self._lengths = (first.length, second.length)
-        self._bounds = tuple(
-            (-math.inf, math.inf) if closed else tuple(ends)
-            for ends, closed in zip(whole.domain, whole.closed, strict=True)
+            self._quaternion[:4] = _checked_quaternion(orientation)
+        self._global = GlobalProjector(surface)
+        whole = ExtendedSurface(surface, order + 1)
+        self._table = SurfaceTable(whole)
+        self._finder = FootFinder(self._terms, whole.domain, whole.closed, LONGEST_STEP)
+        self._lengths = np.array([ends.length for ends in surface.domain])
+        self._way = TangentialLength(self._terms, self._lengths)
+        y, memory = ca.MX.sym("y_t", 3), ca.MX.sym("memory", 4)
+        self.evaluate = ca.Function(
+            "surface_point",
+            [y, memory],
+            [self._at_foot(y, memory)],
+            ["y_t", "memory"],
+            ["manifold_point"],
         )
+        rows = ca.vec(self._table(memory[:2], order + 1))
+        point = ca.vertcat(memory, 0.0, float(ProjectionStatus.OK), rows, self._quaternion)
+        self.at = ca.Function("surface_at", [memory], [point], ["memory"], ["manifold_point"])
+
+    @cached_property
+    def find(self) -> ca.Function:
+        """``y_t -> memory``, the nearest place of the whole surface, with eta zero."""
+        y, grid = ca.MX.sym("y_t", 3), self._global.grid
+        starts = nearest_samples(
+            y, grid.theta.reshape(-1, 2), grid.position.reshape(-1, 3), _VALLEY * self._lengths
+        )
+        theta = self._finder.nearest(y, starts)
+        wrapped = []
+        for k, ((begin, _), length) in enumerate(
+            zip(self.surface.domain, self._lengths, strict=True)
+        ):
+            laps = ca.floor((theta[k] - begin) / length) if self.surface.closed[k] else 0.0
+            wrapped.append(theta[k] - laps * length)
+        memory = ca.vertcat(*wrapped, 0.0, 0.0)
+        return ca.Function("surface_place", [y], [memory], ["y_t"], ["memory"])
 
     def __call__(
         self, point: Sequence[float], theta_guess: Sequence[float], eta_last: Sequence[float]
     ) -> np.ndarray:
-        """Surface quantities at the projection of a point.
+        """Return the surface point next to a point, new array [layout.size].
 
         Args:
-            point: y_t, [3], m. A list or tuple of floats is faster than an array.
+            point: y_t, [3], m.
             theta_guess: Unwrapped parameters of the last tick, [2].
-            eta_last: Tangential coordinates there, [2], m; they go on by the integral of Sigma
-                (4.15) along the straight line of the parameters, of fourth order.
-
-        Returns:
-            New array [layout.size], see `SurfacePointLayout`. All its values but `status` are
-            NaN if the point, the guess or eta is not finite.
+            eta_last: Tangential coordinates there, [2], m.
         """
-        x, y, z = point
-        g1, g2 = t1, t2 = theta_guess
-        len_1, len_2 = self._lengths
-        (begin_1, end_1), (begin_2, end_2) = self._bounds
-        sample, before, start = self._sample, _NEAR * _NEAR, None
-        for _ in range(_MAX_STEPS):
-            if not (begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2 and abs(t1 + t2) < math.inf):
-                break
-            rows = sample(t1, t2)
-            terms = rows[:18].tolist()
-            px, py, pz, ux, uy, uz, vx, vy, vz, ax, ay, az, bx, by, bz, cx, cy, cz = terms
-            if start is None:
-                start = terms
-            px, py, pz = x - px, y - py, z - pz
-            E = ux * ux + uy * uy + uz * uz
-            F = ux * vx + uy * vy + uz * vz
-            G = vx * vx + vy * vy + vz * vz
-            L = px * ax + py * ay + pz * az
-            M = px * bx + py * by + pz * bz
-            N = px * cx + py * cy + pz * cz
-            f1 = px * ux + py * uy + pz * uz
-            f2 = px * vx + py * vy + pz * vz
-            h11, h12, h22 = E - L, F - M, G - N
-            det = h11 * h22 - h12 * h12
-            if not (det > 0.0 and h11 > 0.0):
-                break
-            s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
-            r1, r2 = s1 / len_1, s2 / len_2
-            size = r1 * r1 + r2 * r2
-            if size > _SETTLED * _SETTLED:
-                # How the residual bends on the way, without the part that d . sigma_ijk has in it.
-                wx, wy, wz = ux * s1 + vx * s2, uy * s1 + vy * s2, uz * s1 + vz * s2
-                ax, ay, az = ax * s1 + bx * s2, ay * s1 + by * s2, az * s1 + bz * s2
-                bx, by, bz = bx * s1 + cx * s2, by * s1 + cy * s2, bz * s1 + cz * s2
-                qx = 0.5 * (ax * s1 + bx * s2)
-                qy = 0.5 * (ay * s1 + by * s2)
-                qz = 0.5 * (az * s1 + bz * s2)
-                f1 -= wx * ax + wy * ay + wz * az + qx * ux + qy * uy + qz * uz
-                f2 -= wx * bx + wy * by + wz * bz + qx * vx + qy * vy + qz * vz
-                s1, s2 = (h22 * f1 - h12 * f2) / det, (h11 * f2 - h12 * f1) / det
-            t1 += s1
-            t2 += s2
-            if size < _TOLERANCE * _TOLERANCE:
-                e1, e2 = eta_last
-                more_1, more_2 = panel(start, terms, t1 - g1, t2 - g2)
-                e1 += more_1
-                e2 += more_2
-                inside = begin_1 <= t1 <= end_1 and begin_2 <= t2 <= end_2
-                alpha = largest_eigenvalue(E, F, G, L, M, N)
-                if not (inside and abs(e1 + e2 + alpha) < math.inf):
-                    break
-                out = self._blank.copy()
-                out[:6] = (t1, t2, e1, e2, alpha, self._status(t1, t2))
-                out[6 : self._rest] = rows
-                return out
-            if not size < before:
-                break
-            before = _QUICK * size
-        return self._at_projection(point, (g1, g2), eta_last)
+        function = self._bound_evaluate
+        function.arguments["y_t"][:] = point
+        function.arguments["memory"][:2] = theta_guess
+        function.arguments["memory"][2:] = eta_last
+        function.evaluate()
+        return function.results["manifold_point"].copy()
 
     def evaluate_at(self, theta: Sequence[float], eta: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
-        """Surface quantities at a point on the surface, for set-up.
+        """Return the surface point at a point on the surface, for set-up.
 
         Args:
             theta: Unwrapped parameters, [2].
@@ -181,59 +141,77 @@ class SurfaceEvaluator:
             InputError: theta is not finite or lies outside the domain of an open direction.
         """
         self.surface.checked(np.asarray(theta, dtype=float))
-        return self._at(theta, eta, 0.0, 0.0)
+        return np.array(self.at(ca.DM([*theta, *eta]))).ravel()
 
     def project_globally(self, point: ArrayLike) -> SurfaceProjection:
         """The closest point of the whole surface, see `GlobalProjector.project`."""
         return self._global.project(point)
 
-    def _at(
-        self, theta: Sequence[float], eta: Sequence[float], alpha: float, status: float
-    ) -> np.ndarray:
-        out = self._blank.copy()
-        out[: self._head] = (*theta, *eta, alpha, status)
-        out[self._head : self._rest] = self._sample(float(theta[0]), float(theta[1]))
-        return out
+    @cached_property
+    def _bound_evaluate(self) -> BoundFunction:
+        return BoundFunction(self.evaluate)
 
-    def _at_projection(
-        self, point: Sequence[float], theta_guess: Pair, eta_last: Sequence[float]
-    ) -> np.ndarray:
-        """The same as a call, by the projector or a search of the whole surface."""
-        foot = self._project(point, theta_guess)
-        if not math.isfinite(foot.distance + foot.alpha + eta_last[0] + eta_last[1]):
-            out = np.full(self.layout.size, math.nan)
-            out[self.layout.status] = _NOT_CONVERGED
-            return out
-        way = max(
-            abs(foot.theta[k] - theta_guess[k]) / length for k, length in enumerate(self._lengths)
-        )
-        if way > _FAR or not foot.converged:
-            best = self._global.feet(point)[0]
-            nearer = best.distance < foot.distance * (1.0 - _NOT_NEARER)
-            if best.converged and (nearer or not foot.converged):
-                foot = best._replace(theta=self._nearest_lap(best.theta, theta_guess))
-        status = _BEYOND_END if foot.at_border else self._status(*foot.theta)
-        eta = self._length.advance(eta_last, theta_guess, foot.theta)
-        return self._at(foot.theta, eta, foot.alpha, status if foot.converged else _NOT_CONVERGED)
+    def _terms(self, theta: ca.MX) -> ca.MX:
+        return self._table(theta, 2)
 
-    def _status(self, theta_1: float, theta_2: float) -> float:
-        """Whether a place is beyond the end of an open direction."""
-        (begin_1, end_1), (begin_2, end_2) = self.surface.domain
-        closed_1, closed_2 = self.surface.closed
-        inside = (closed_1 or begin_1 <= theta_1 <= end_1) and (
-            closed_2 or begin_2 <= theta_2 <= end_2
+    def _at_foot(self, y: ca.MX, memory: ca.MX) -> ca.MX:
+        """Surface point at the foot of a point."""
+        guess, eta = ca.vertsplit(memory, 2)
+        near = self._finder.find(y, guess)
+        is_far = ca.norm_inf((near.theta - guess) / self._lengths) > _FAR
+        is_lost = ca.logic_and(near.known, ca.logic_or(is_far, ca.logic_not(near.converged)))
+        foot = Foot(self._search()(is_lost, near.state, y, guess), self._finder.lengths)
+        rows = self._table(foot.theta, self.layout.order + 1)
+        terms = rows[:, : partial_count(2)]
+        begin = self._finder.clamped(guess)
+        eta = eta + self._way(begin, foot.theta, self._terms(begin), terms)
+        beyond = foot.beyond_end
+        for k, (first, last) in enumerate(self.surface.domain):
+            if not self.surface.closed[k]:
+                outside = ca.logic_or(foot.theta[k] < first, foot.theta[k] > last)
+                beyond = ca.logic_or(beyond, outside)
+        place = ca.vertcat(foot.theta, eta, _alpha_function()(y, terms))
+        known = ca.logic_and(foot.known, ca.fabs(ca.sum1(memory)) < math.inf)
+        status = ca.if_else(
+            ca.logic_and(known, foot.converged),
+            ca.if_else(beyond, float(ProjectionStatus.BEYOND_END), float(ProjectionStatus.OK)),
+            float(ProjectionStatus.NOT_CONVERGED),
         )
-        return 0.0 if inside else _BEYOND_END
+        point = ca.vertcat(place, ca.vec(rows), self._quaternion)
+        point = ca.if_else(known, point, math.nan)
+        return ca.vertcat(point[:5], status, point[5:])
 
-    def _nearest_lap(self, theta: Pair, guess: Pair) -> Pair:
-        """Parameters moved by whole periods next to a guess."""
-        first, second = (
-            value + length * round((near - value) / length) if closed else value
-            for value, near, length, closed in zip(
-                theta, guess, self._lengths, self.surface.closed, strict=True
-            )
+    def _search(self) -> ca.Function:
+        """``(is_lost, state, y, guess) -> state`` of the foot that is nearest on all the surface.
+
+        It is the one that was found near the guess, unless another is nearer.
+        """
+        state, y = ca.MX.sym("state", self._finder.size), ca.MX.sym("y", 3)
+        guess, grid = ca.MX.sym("guess", 2), self._global.grid
+        strides = [-(-n // _MOST_SAMPLES) for n in grid.position.shape[:2]]
+        part = (slice(None, None, strides[0]), slice(None, None, strides[1]))
+        starts = nearest_samples(
+            y, grid.theta[part].reshape(-1, 2), grid.position[part].reshape(-1, 3), self._lengths
         )
-        return first, second
+        best, found = self._finder.find(y, starts[0]), Foot(state, self._finder.lengths)
+        nearer = best.rank < found.rank * (1.0 - _NOT_NEARER)
+        laps = ca.floor((guess - best.theta) / self._lengths + 0.5) * self._lengths
+        theta = best.theta + laps * np.array(self.surface.closed, dtype=float)
+        other = ca.vertcat(theta, best.state[2:])
+        arguments = [state, y, guess]
+        return ca.Function.if_else(
+            "nearest_of_all",
+            ca.Function("search", arguments, [ca.if_else(nearer, other, state)]),
+            ca.Function("stay", arguments, [state]),
+        )
+
+
+def _alpha_function() -> ca.Function:
+    """``(y, terms) -> alpha``, see `SurfacePointLayout`."""
+    y, terms = ca.SX.sym("y", 3), ca.SX.sym("terms", 3, partial_count(2))
+    first, bend = first_and_bend(y, terms, 2)
+    alpha = largest_eigenvalue(first, bend)
+    return ca.Function("alpha", [y, terms], [alpha], {"cse": True})
 
 
 def _checked_quaternion(values: ArrayLike) -> np.ndarray:

@@ -1,7 +1,9 @@
 """A surface that goes on beyond the ends of its open directions, so that a tool may leave it."""
 
 import math
+from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -21,6 +23,10 @@ _AREA = 0.3
 _SAMPLES, _STEPS = 9, 24
 
 
+# theta, order -> derivatives 0..order, [order + 1, size]
+Beyond = Callable[[ca.SX, int], ca.SX]
+
+
 class ExtendedSurface(Surface):
     """A surface of class C^k on a larger domain.
 
@@ -32,10 +38,13 @@ class ExtendedSurface(Surface):
     Args:
         surface: The surface.
         smoothness: k.
+
+    Attributes:
+        inner: The surface.
     """
 
     def __init__(self, surface: ProductSurface, smoothness: int) -> None:
-        self._inner = surface
+        self.inner = surface
         self._directions = [
             _Direction(surface, axis, basis, smoothness) for axis, basis in enumerate(surface.bases)
         ]
@@ -57,10 +66,10 @@ class ExtendedSurface(Surface):
 
     def flat_sampler(self, order: int) -> Sampler:
         """See the base class; within the surface's own domain it is the surface's own."""
-        inside = self._inner.flat_sampler(check_partial_order(order))
+        inside = self.inner.flat_sampler(check_partial_order(order))
         rows = np.array(partial_orders(order))
         first, second = self._directions
-        table = self._inner.coefficients
+        table = self.inner.coefficients
 
         def sample(theta_1: float, theta_2: float) -> np.ndarray:
             if first.holds(theta_1) and second.holds(theta_2):
@@ -72,9 +81,15 @@ class ExtendedSurface(Surface):
 
         return sample
 
+    @property
+    def beyond(self) -> tuple[Beyond | None, Beyond | None]:
+        """Functions of either parameter beyond its ends; None where they go on as they are."""
+        first, second = (d.beyond if d.run_outs else None for d in self._directions)
+        return first, second
+
     def _regular_up_to(self, axis: int, limit: float) -> float:
         """How far the surface keeps its area beyond a border, where it should reach a limit."""
-        border = self._inner.domain[axis][limit > self._inner.domain[axis].begin]
+        border = self.inner.domain[axis][limit > self.inner.domain[axis].begin]
         areas = self.flat_sampler(1)
         first, last = self._directions[1 - axis].limits
         across = np.linspace(first, last, _SAMPLES).tolist()
@@ -95,6 +110,8 @@ class _Direction:
 
     Attributes:
         limits: First and last parameter of the larger domain.
+        run_outs: How the functions go on before the begin and after the end; empty if they go on as
+            they are.
     """
 
     def __init__(self, surface: ProductSurface, axis: int, basis: Basis, smoothness: int) -> None:
@@ -102,7 +119,7 @@ class _Direction:
         begin, end = map(float, surface.domain[axis])
         self._begin, self._end = begin, end
         self._powers = basis.derivations(6)
-        self._run_outs: list[RunOut] = []
+        self.run_outs: list[RunOut] = []
         reach = 0.0 if basis.closed else _REACH * (end - begin)
         if isinstance(basis, TrigonometricBasis):
             reach = min(reach, _OPEN_SHARE * max(2.0 * math.pi - (end - begin), 0.0))
@@ -110,7 +127,7 @@ class _Direction:
             for theta, sign in ((begin, -1.0), (end, 1.0)):
                 functions = self._own(theta, smoothness)[1]
                 length = _straightening(surface, axis, theta, smoothness, _LONGEST * (end - begin))
-                self._run_outs.append(RunOut(functions, functions[1], theta, sign * length))
+                self.run_outs.append(RunOut(functions, functions[1], theta, sign * length))
         self.limits = [begin - reach, end + reach]
 
     @property
@@ -126,10 +143,10 @@ class _Direction:
 
     def derivatives(self, theta: float, order: int) -> tuple[int, np.ndarray]:
         """Return the piece and the functions with derivatives 0..order, [order + 1, size]."""
-        if self.holds(theta) or not self._run_outs:
+        if self.holds(theta) or not self.run_outs:
             return self._own(theta, order)
         last = bool(theta > self._end)
-        run_out = self._run_outs[last]
+        run_out = self.run_outs[last]
         piece = self._basis.pieces - 1 if last else 0
         if not math.isfinite(theta):
             return piece, np.full((order + 1, run_out.dimension), math.nan)
@@ -140,9 +157,23 @@ class _Direction:
             functions[2:] = 0.0
         return piece, functions
 
+    def beyond(self, theta: ca.SX, order: int) -> ca.SX:
+        """The same as `derivatives` for a parameter beyond an end, as an expression."""
+        first, last = (_gone_out(run_out, theta, order) for run_out in self.run_outs)
+        return ca.if_else(theta > self._end, last, first)
+
     def _own(self, theta: float, order: int) -> tuple[int, np.ndarray]:
         piece, values = self._sample(theta)
         return piece, self._powers[: order + 1] @ np.array(values)
+
+
+def _gone_out(run_out: RunOut, theta: ca.SX, order: int) -> ca.SX:
+    """Derivatives 0..order along a run-out and, straight, beyond its end, [order + 1, size]."""
+    inside = ca.fmin(ca.fmax(theta, run_out.domain[0]), run_out.domain[1])
+    rows = run_out.expression(inside, order)
+    straight = [rows[0, :] + (theta - inside) * rows[1, :], rows[1, :]]
+    further = ca.vertcat(*straight[: order + 1], ca.SX(max(order - 1, 0), run_out.dimension))
+    return ca.densify(ca.if_else(theta == inside, rows, further))
 
 
 def _straightening(

@@ -1,96 +1,88 @@
 """The tangential coordinates (4.15): lengths in two orthogonal directions of the tangent plane."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 
-from pfsc_drake.geometry.surfaces.surface import Surface
+import casadi as ca
 
-# Longest panel of the integral, relative to the lengths of the domain.
-_PANEL = 1.0 / 64.0
-
-Pair = tuple[float, float]
-Rates = tuple[float, float, float, float]
+# Longest panel of the integral, relative to the lengths of the domain, and how many a long way has.
+_PANEL, _PANELS = 1.0 / 64.0, 64
 
 
 class TangentialLength:
     """Integrates eta' = Sigma theta' (4.15) along straight lines of the parameters.
 
     Each panel takes Sigma and its derivative at both ends, which is exact for cubics. How eta
-    depends on theta depends on the way, as the surface is curved.
+    depends on theta depends on the way, as the surface is curved. A way of a tick is one panel;
+    a longer one has always the same number, so that they are short over one length of the domain.
 
     Args:
-        surface: Surface of class C^2.
+        terms: theta -> partial derivatives up to order 2 as columns, shapes (2,) and (3, 6).
+        lengths: Of the domain in both parameters.
     """
 
-    def __init__(self, surface: Surface) -> None:
-        self._sample = surface.flat_sampler(2)
-        self._domain, self._closed = surface.domain, surface.closed
+    def __init__(self, terms: Callable[[ca.MX], ca.MX], lengths: Sequence[float]) -> None:
+        self._lengths = ca.DM(list(lengths))
+        panel = panel_function()
+        first, last = ca.MX.sym("first", 2), ca.MX.sym("last", 2)
+        between = [terms(first), terms(last)]
+        one = ca.Function("panel", [first, last], [panel(*between, last - first)])
+        shares = ca.DM([k / _PANELS for k in range(_PANELS + 1)]).T
+        places = first + (last - first) @ shares
+        many = ca.sum2(one.map(_PANELS)(places[:, :-1], places[:, 1:]))
+        terms_1, terms_2 = ca.MX.sym("terms_1", 3, 6), ca.MX.sym("terms_2", 3, 6)
+        arguments = [first, last, terms_1, terms_2]
+        self._advance = ca.Function.if_else(
+            "tangential_length",
+            ca.Function("one_panel", arguments, [panel(terms_1, terms_2, last - first)]),
+            ca.Function("many_panels", arguments, [many]),
+        )
 
-    def advance(self, eta: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> Pair:
-        """Tangential coordinates at the end of a straight line.
+    def __call__(
+        self, begin: ca.MX, end: ca.MX, terms_at_begin: ca.MX, terms_at_end: ca.MX
+    ) -> ca.MX:
+        """Return how far tangential coordinates change along a straight line [m], shape (2,).
 
         Args:
-            eta: Those at its begin, [2], m.
-            begin: Unwrapped parameters; clamped to the domain in open directions.
-            end: Unwrapped parameters in the domain.
-
-        Returns:
-            The coordinates, m.
+            begin: Unwrapped parameters, in the domain in open directions, shape (2,).
+            end: The same where the line ends.
+            terms_at_begin: Partial derivatives there, shape (3, 6).
+            terms_at_end: The same where the line ends.
         """
-        start = [
-            value if closed else min(max(value, ends.begin), ends.end)
-            for value, ends, closed in zip(begin, self._domain, self._closed, strict=True)
-        ]
-        way = [last - first for first, last in zip(start, end, strict=True)]
-        share = max(abs(way[k]) / ends.length for k, ends in enumerate(self._domain))
-        panels = max(1, math.ceil(share / _PANEL))
-        d1, d2 = way[0] / panels, way[1] / panels
-        e1, e2 = eta
-        here = self._sample(start[0], start[1]).tolist()
-        for k in range(1, panels + 1):
-            there = self._sample(start[0] + k * d1, start[1] + k * d2).tolist()
-            more_1, more_2 = panel(here, there, d1, d2)
-            e1, e2, here = e1 + more_1, e2 + more_2, there
-        return e1, e2
+        is_short = ca.norm_inf((end - begin) / self._lengths) <= _PANEL
+        return self._advance(is_short, begin, end, terms_at_begin, terms_at_end)
 
 
-def panel(begin: Sequence[float], end: Sequence[float], d1: float, d2: float) -> Pair:
-    """Return the integral of Sigma d theta (4.15) over one straight step, m.
+@cache
+def panel_function() -> ca.Function:
+    """``(terms at begin, terms at end, d theta) -> integral of Sigma d theta`` [m].
 
-    Args:
-        begin: Partial derivatives up to order 2 where it begins, flat, [18].
-        end: The same where it ends.
-        d1: Step of theta_1.
-        d2: Step of theta_2.
+    The line is straight; shapes (3, 6), (3, 6), (2,) and (2,).
     """
-    a1, a2, a1_rate, a2_rate = _rates(begin, d1, d2)
-    b1, b2, b1_rate, b2_rate = _rates(end, d1, d2)
-    return (
-        0.5 * (a1 + b1) + (a1_rate - b1_rate) / 12.0,
-        0.5 * (a2 + b2) + (a2_rate - b2_rate) / 12.0,
-    )
+    begin, end = ca.SX.sym("begin", 3, 6), ca.SX.sym("end", 3, 6)
+    way = ca.SX.sym("way", 2)
+    (a, a_rate), (b, b_rate) = _rates(begin, way), _rates(end, way)
+    length = 0.5 * (a + b) + (a_rate - b_rate) / 12.0
+    return ca.Function("panel_length", [begin, end, way], [length], {"cse": True})
 
 
-def _rates(terms: Sequence[float], d1: float, d2: float) -> Rates:
-    """Both components of Sigma d (4.15), m, and of its derivative by the share of the step, m."""
-    _, _, _, ux, uy, uz, vx, vy, vz, ax, ay, az, bx, by, bz, cx, cy, cz = terms
+def _rates(terms: ca.SX, way: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Sigma d (4.15), m, and its derivative by the share of the step, m, each (2,)."""
+    _, u, v, a, b, c = ca.horzsplit(terms)
+    d1, d2 = ca.vertsplit(way)
     # Derivatives of the tangents along d.
-    px, py, pz = ax * d1 + bx * d2, ay * d1 + by * d2, az * d1 + bz * d2
-    qx, qy, qz = bx * d1 + cx * d2, by * d1 + cy * d2, bz * d1 + cz * d2
-    E = ux * ux + uy * uy + uz * uz
-    F = ux * vx + uy * vy + uz * vz
-    G = vx * vx + vy * vy + vz * vz
-    half_E_rate = ux * px + uy * py + uz * pz
-    F_rate = px * vx + py * vy + pz * vz + ux * qx + uy * qy + uz * qz
-    half_G_rate = vx * qx + vy * qy + vz * qz
-    norm, skew = math.sqrt(E), F / E
-    across = math.sqrt(G - F * skew)
+    p, q = a * d1 + b * d2, b * d1 + c * d2
+    E, F, G = ca.dot(u, u), ca.dot(u, v), ca.dot(v, v)
+    half_E_rate, F_rate = ca.dot(u, p), ca.dot(p, v) + ca.dot(u, q)
+    half_G_rate = ca.dot(v, q)
+    norm, skew = ca.sqrt(E), F / E
+    across = ca.sqrt(G - F * skew)
     norm_rate = half_E_rate / norm
     across_rate = (half_G_rate - skew * (F_rate - skew * half_E_rate)) / across
-    mixed = skew * norm
     return (
-        norm * d1 + mixed * d2,
-        across * d2,
-        norm_rate * d1 + (F_rate / norm - skew * norm_rate) * d2,
-        across_rate * d2,
+        ca.vertcat(norm * d1 + skew * norm * d2, across * d2),
+        ca.vertcat(
+            norm_rate * d1 + (F_rate / norm - skew * norm_rate) * d2,
+            across_rate * d2,
+        ),
     )

@@ -29,7 +29,7 @@ class GlobalProjector:
     """
 
     def __init__(self, surface: Surface) -> None:
-        self._grid = sample_grid(surface)
+        self.grid = sample_grid(surface)
         self._project = SurfaceProjector(surface).project
         self._surface = surface
 
@@ -43,14 +43,14 @@ class GlobalProjector:
             One to eight projections, theta in the domain.
         """
         y = np.asarray(point, dtype=float)
-        cost = np.sum((y - self._grid.position) ** 2, axis=-1)
-        modes = ["wrap" if closed else "nearest" for closed in self._grid.closed]
+        cost = np.sum((y - self.grid.position) ** 2, axis=-1)
+        modes = ["wrap" if closed else "nearest" for closed in self.grid.closed]
         valleys = np.argwhere(cost <= minimum_filter(cost, size=3, mode=modes))
         order = np.argsort(cost[tuple(valleys.T)], kind="stable")[:_MAX_STARTS]
         values = y.tolist()
         found: list[SurfaceProjection] = []
         for start in valleys[order]:
-            theta_1, theta_2 = self._grid.theta_1[start[0]], self._grid.theta_2[start[1]]
+            theta_1, theta_2 = self.grid.theta_1[start[0]], self.grid.theta_2[start[1]]
             result = self._project(values, (float(theta_1), float(theta_2)))
             wrapped = self._surface.wrap(result.theta)
             result = result._replace(theta=(float(wrapped[0]), float(wrapped[1])))

@@ -13,7 +13,6 @@ from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, translated_surface
 from pfsc_drake.geometry.surfaces.partials import partial_orders
 from pfsc_drake.geometry.surfaces.shapes import Turned, cone, cylinder, paraboloid, plane, sphere
-from pfsc_drake.geometry.surfaces.surface import Surface
 
 ORDER = 5
 
@@ -118,23 +117,8 @@ def test_it_ends_before_poles_apices_and_its_own_begin():
     assert ExtendedSurface(nearly_closed, ORDER).domain[0].length < 2.0 * math.pi
 
 
-class _Sheet(Surface):
-    """A plane that is no sum of products to the library."""
-
-    def __init__(self):
-        self._plane = plane((1.0, 1.0))
-        super().__init__(((0.0, 1.0), (0.0, 1.0)), closed=(False, False), smoothness=math.inf)
-
-    def partials(self, theta, order):
-        return self._plane.partials(theta, order)
-
-    def flat_sampler(self, order):
-        return self._plane.flat_sampler(order)
-
-
-@pytest.mark.parametrize(("sheet", "ends_at"), [(plane((1.0, 1.0)), 1.25), (_Sheet(), 1.0)])
-def test_where_even_that_ends_the_border_is_the_foot(sheet, ends_at):
-    evaluator = SurfaceEvaluator(sheet, 2)
+def test_where_even_that_ends_the_border_is_the_foot():
+    evaluator, ends_at = SurfaceEvaluator(plane((1.0, 1.0)), 2), 1.25
     theta, eta = (0.98, 0.5), (0.0, 0.0)
     for x in np.linspace(0.98, 1.4, 43):
         row = evaluator((float(x), 0.5, 0.1), theta, eta)
