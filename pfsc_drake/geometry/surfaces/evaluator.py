@@ -18,9 +18,10 @@ from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
 from pfsc_drake.geometry.surfaces.length import TangentialLength
 from pfsc_drake.geometry.surfaces.partials import partial_count
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.product import checked_product
 from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, SurfaceProjection
 from pfsc_drake.geometry.surfaces.start import GlobalProjector
+from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
 
 # Of the lengths of the domain: a way after which it is asked whether another place is nearer.
@@ -62,9 +63,7 @@ class SurfaceEvaluator:
             none.
     """
 
-    def __init__(
-        self, surface: ProductSurface, order: int, orientation: ArrayLike | None = None
-    ) -> None:
+    def __init__(self, surface: Surface, order: int, orientation: ArrayLike | None = None) -> None:
         self.layout = SurfacePointLayout(order, orientation is not None)
         if surface.smoothness < order + 1:
             raise InputError(
@@ -76,7 +75,7 @@ class SurfaceEvaluator:
         if orientation is not None:
             self._quaternion[:4] = _checked_quaternion(orientation)
         self._global = GlobalProjector(surface)
-        whole = ExtendedSurface(surface, order + 1)
+        whole = ExtendedSurface(checked_product(surface), order + 1)
         self._table = SurfaceTable(whole)
         self._finder = FootFinder(self._terms, whole.domain, whole.closed, LONGEST_STEP)
         self._lengths = np.array([ends.length for ends in surface.domain])

@@ -1,9 +1,11 @@
 """The tangential coordinates (4.15): lengths in two orthogonal directions of the tangent plane."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 
 import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
 
 # Longest panel of the integral, relative to the lengths of the domain, and how many a long way has.
 _PANEL, _PANELS = 1.0 / 64.0, 64
@@ -21,8 +23,8 @@ class TangentialLength:
         lengths: Of the domain in both parameters.
     """
 
-    def __init__(self, terms: Callable[[ca.MX], ca.MX], lengths: Sequence[float]) -> None:
-        self._lengths = ca.DM(list(lengths))
+    def __init__(self, terms: Callable[[ca.MX], ca.MX], lengths: ArrayLike) -> None:
+        self._lengths = ca.DM(np.asarray(lengths, dtype=float))
         panel = panel_function()
         first, last = ca.MX.sym("first", 2), ca.MX.sym("last", 2)
         between = [terms(first), terms(last)]

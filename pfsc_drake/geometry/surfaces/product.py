@@ -114,3 +114,14 @@ class ProductSurface(Surface):
             return matrix.dot(b).reshape(-1, size_1).dot(a)
 
         return sample_at_once if few else sample_one_by_one
+
+
+def checked_product(surface: Surface) -> ProductSurface:
+    """Return a surface that is a sum of products.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not isinstance(surface, ProductSurface):
+        raise InputError(f"surface: {type(surface).__name__}; a ProductSurface is required")
+    return surface

@@ -8,8 +8,7 @@ import casadi as ca
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
 
 # Of the domain.
@@ -42,10 +41,10 @@ class SurfaceProjector:
     """Closest point of a surface near a guess, see `FootFinder`, for numbers.
 
     Args:
-        surface: Surface of class C^2.
+        surface: Surface of class C^2, see `SurfaceTable` for the kinds.
     """
 
-    def __init__(self, surface: ProductSurface | ExtendedSurface) -> None:
+    def __init__(self, surface: Surface) -> None:
         table = SurfaceTable(surface)
         finder = FootFinder(
             lambda theta: table(theta, 2), surface.domain, surface.closed, LONGEST_STEP

@@ -5,18 +5,23 @@ import casadi as ca
 from pfsc_drake.geometry.surfaces.basis import Basis
 from pfsc_drake.geometry.surfaces.extended import Beyond, ExtendedSurface
 from pfsc_drake.geometry.surfaces.partials import partial_orders
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.product import checked_product
+from pfsc_drake.geometry.surfaces.surface import Surface
 
 
 class SurfaceTable:
     """Looks up the cell of a sum of products, and multiplies its coefficients with the functions.
 
     Args:
-        surface: The surface; parameters beyond the ends of open directions go on as it does.
+        surface: A `ProductSurface`, or one that is extended; parameters beyond the ends of open
+            directions go on as it does.
+
+    Raises:
+        InputError: Another kind of surface.
     """
 
-    def __init__(self, surface: ProductSurface | ExtendedSurface) -> None:
-        inner = surface.inner if isinstance(surface, ExtendedSurface) else surface
+    def __init__(self, surface: Surface) -> None:
+        inner = surface.inner if isinstance(surface, ExtendedSurface) else checked_product(surface)
         pieces_1, self._pieces, self._size_1, self._size_2, _ = inner.coefficients.shape
         # of each cell by columns: theta_1's functions, components, theta_2's functions
         cells = inner.coefficients.transpose(0, 1, 3, 4, 2).reshape(pieces_1 * self._pieces, -1)

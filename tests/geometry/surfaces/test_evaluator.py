@@ -292,3 +292,22 @@ def test_eta_over_a_far_jump():
     lengths = [np.sqrt(E) * d1 + F / np.sqrt(E) * d2, np.sqrt(G - F**2 / E) * d2]
     expected = [0.1, 0.2] + np.array(lengths) @ weights / 2.0
     np.testing.assert_allclose(row[2:4], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_nearest_place_of_all_is_found(name):
+    surface = CASES[name][0]
+    evaluator, ends = SurfaceEvaluator(surface, 1), np.array(surface.domain)
+    along = [np.linspace(*own, 121) for own in ends]
+    grid = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 2)
+    samples = surface.partials(grid, 0)[:, 0]
+    rng = np.random.default_rng(7)
+    for _ in range(30):
+        point = rng.choice(samples) + rng.normal(size=3) * rng.choice([1e-3, 0.03])
+        memory = np.array(evaluator.find(point)).ravel()
+        row = evaluator(point.tolist(), memory[:2], memory[2:])
+        least = np.linalg.norm(samples - point, axis=1).min()
+        assert np.linalg.norm(row[6:9] - point) < least + 1e-9
+        assert memory[2:].tolist() == [0.0, 0.0]
+        if row[5] == ProjectionStatus.OK:
+            assert np.all((ends[:, 0] <= memory[:2]) & (memory[:2] <= ends[:, 1]))
