@@ -37,7 +37,10 @@ _UNIT_NAMES = {1e3: "kNm or kN", 1e-3: "mNm or mN"}
 _NEAR = 0.35
 _MOST_CAUSES = 3
 # a factor of a torque that ought to show
-_OUGHT_TO_SHOW = 2.0
+_OUGHT_TO_SHOW = 1.2
+# of what the model takes, from which on the torque of a joint whose factor does not show is
+# doubtful; in units of what those of all joints are
+_UNLIKE = 1.1
 # times the model's torques, in all joints, from which on another unit is thought of
 _OTHER_UNIT = 10.0
 
@@ -141,17 +144,26 @@ def unchecked(
     said = []
     if unseen:
         said.append(f"these torques would not show it if {_listed(unseen)}")
-    names = [name for name, fit in comparison.of_factor(_OUGHT_TO_SHOW) if fit.left <= most]
+    of_factor = list(comparison.of_factor(_OUGHT_TO_SHOW))
+    names = [name for name, fit in of_factor if fit.left <= most]
     if names:
         said.append(
             f"a factor of {_OUGHT_TO_SHOW:g} in tau of {', '.join(names)} (unit, gear ratio) would "
             "not show in the torques of the other joints"
         )
     ratio = comparison.ratio_to(np.nan_to_num(believed))
+    usual = float(np.median(ratio))
+    if np.isfinite(believed).all():
+        said.extend(
+            f"tau of {name} is {own:.2g} times what the model's masses and friction take, of all "
+            f"joints {usual:.2g} times: its unit, gear ratio or torque constant?"
+            for (name, _), own in zip(of_factor, ratio.tolist(), strict=True)
+            if name in names and not 1.0 / _UNLIKE < own / usual < _UNLIKE
+        )
     knows = np.nan_to_num(believed).any()
     if knows and (np.all(ratio > _OTHER_UNIT) or np.all(ratio < 1.0 / _OTHER_UNIT)):
         said.append(
-            f"all torques are about {np.median(ratio):.2g} times what the model's masses and "
+            f"all torques are about {usual:.2g} times what the model's masses and "
             "friction take: unit of tau?"
         )
     return said

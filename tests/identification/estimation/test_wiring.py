@@ -135,6 +135,23 @@ def test_a_unit_that_no_torque_tells_is_said(arm, sound, factor):
     assert any(f"all torques are about {factor:.2g} times" in note for note in said)
 
 
+@pytest.mark.parametrize("factor", [1.2, 1.0 / 1.2])
+def test_a_factor_that_no_other_torque_tells_is_told_by_the_model(arm, sound, factor):
+    """With so much noise that a factor in the last torque does not show in the others."""
+    regressor, base, truth = arm
+    noise = np.array([300.0, 300.0, 2.0])
+    loud = replace(sound, torque_variance=noise**2)
+    wrong = times(loud, "tau", only(2, factor))
+    assert find_mistake(regressor, base, wrong) is None
+    hidden, doubtful = unchecked(regressor, base, wrong, truth)[-2:]
+    assert hidden.startswith("a factor of 1.2 in tau of ") and "joint_3" in hidden
+    assert doubtful.startswith(f"tau of joint_3 is {factor:.2g} times what the model's masses")
+    # sound torques are none, and a model without friction does not know
+    unknown = np.where(np.arange(len(truth)) < len(truth) - 1, truth, np.nan)
+    for said in unchecked(regressor, base, loud, truth), unchecked(regressor, base, wrong, unknown):
+        assert not any(note.startswith("tau of ") for note in said)
+
+
 def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_path):
     """A wheel: any factor of its torque, and any unit of its angle, is another inertia."""
     file = tmp_path / "wheel.urdf"
@@ -154,7 +171,7 @@ def test_what_no_torque_tells_of_a_single_joint_is_said(measure_torques, tmp_pat
     measured = measure_torques(motion, tau, 0.01)
     said = " ".join(unchecked(regressor, base, measured, np.zeros(13)))
     assert "q of axle is in deg" in said
-    assert "factor of 2 in tau of axle" in said
+    assert "factor of 1.2 in tau of axle" in said
     # a sign makes friction negative even here
     found = find_mistake(regressor, base, times(measured, "tau", -1.0))
     assert "tau of all joints" in found.cause and "joint_1.f_" in found.negative
