@@ -44,6 +44,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.systems.control.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
@@ -115,6 +116,7 @@ def build_station(
     signals |= states_to_log(scenario, true_state, joint_state)
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
+    access = ControllerAccess(controller)
     if scenario.simulation.fused:
         fuse_blocks(builder)
     diagram = builder.Build()
@@ -125,7 +127,7 @@ def build_station(
         task,
         law,
         place.projector,
-        controller,
+        access,
         log,
         initial_state,
         start.place,

@@ -21,7 +21,7 @@ from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.can_fail import FailingSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.control.following_controller import ControllerAccess
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 _SERVO = "velocity_servo"
@@ -73,7 +73,7 @@ class Station:
     task: Task
     law: FollowingLaw
     projector: ManifoldProjector
-    controller: FollowingController
+    controller: ControllerAccess
     log: SignalLog
     initial_state: np.ndarray
     initial_place: np.ndarray
@@ -154,16 +154,20 @@ class Station:
         Args:
             root: Context of the diagram.
         """
+        fault = self.controller.fault(self.blocks, root)
+        if fault is not Fault.NONE:
+            suspects = self.controller.suspects(self.blocks, root)
+            return self._describe(fault, root, "law", self.law.layout.status.start, suspects)
         for name, system in self._can_fail.items():
-            fault = system.fault(system.GetMyContextFromRoot(root))
+            context = system.GetMyContextFromRoot(root)
+            fault = system.fault(context)
             if fault is Fault.NONE:
                 continue
-            if system is self.controller:
-                return self._describe(fault, root, "law", self.law.layout.status.start)
             signal = _FAULT_SIGNALS.get(name)
             if signal is None:
                 return FoundFault(f"{name}: {fault.explanation}", root.get_time())
-            found = self._describe(fault, root, signal, 0)
+            suspects = self.diagram.GetSubsystemByName(name).suspects(context)
+            found = self._describe(fault, root, signal, 0, suspects)
             return FoundFault(f"{name}: {found.sentence}", found.time)
         return None
 
@@ -171,16 +175,14 @@ class Station:
     def _can_fail(self) -> dict[str, FailingSystem]:
         """The systems with a safe state, by name; to look for them takes longer than to ask."""
         systems = {system.get_name(): system for system in self.diagram.GetSystems()}
-        found = {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
-        return dict(sorted(found.items(), key=lambda item: item[1] is not self.controller))
+        return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
 
-    def _describe(self, fault: Fault, root: Context, signal: str, column: int) -> FoundFault:
+    def _describe(
+        self, fault: Fault, root: Context, signal: str, column: int, suspects: np.ndarray
+    ) -> FoundFault:
         """Return what there is to say of a fault that is logged in a column of a signal."""
         now, before = first_instant(self.log, self.blocks, root, signal, column)
-        place = self.task.place
-        system = self.controller if signal == "law" else self.diagram.GetSubsystemByName(_SERVO)
-        suspects = system.suspects(system.GetMyContextFromRoot(root))
-        robot = self.part.belief.robot
+        place, robot = self.task.place, self.part.belief.robot
         scene = FaultScene(self.law, robot, place, self.on_motors, now, before, suspects)
         return FoundFault(describe(fault, scene), now.time)
 

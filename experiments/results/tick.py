@@ -24,9 +24,8 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     Returns:
         Wall clock time of each evaluation [s].
     """
-    drive = station.controller.GetOutputPort(station.controller.drive_port)
+    controller, blocks = station.controller, station.blocks
     sensor, rest = _sensor(station, root), _guidance(station, root)
-    controller = station.controller.GetMyMutableContextFromRoot(root)
     projector = station.projector.GetMyMutableContextFromRoot(root)
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
     states = np.hstack([log[name].values for name in names])
@@ -44,10 +43,10 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
         station.place_robot(root, x)
         rest(log["y_t"].values[k - 1])
         # the controller compares what it measures with what it measured before
-        station.controller.set_last_state(controller, states[k - 1])
+        controller.set_last_state(blocks, root, states[k - 1])
         sensor()  # what the plant needs to know its forces is not the controller's time
         begin = time.perf_counter()
-        drive.Eval(controller)
+        controller.drive(blocks, root)
         elapsed.append(time.perf_counter() - begin)
     return np.array(elapsed)
 

@@ -16,12 +16,17 @@ class BlockAccess:
     def __init__(self, diagram: Diagram) -> None:
         self._states: dict[str, tuple[BlockSystem, str]] = {}
         self._wires: dict[str, tuple[BlockSystem, str]] = {}
+        self._collect(diagram, "")
+
+    def _collect(self, diagram: Diagram, path: str) -> None:
         for system in diagram.GetSystems():
-            if not isinstance(system, BlockSystem):
-                continue
-            prefix = "" if system.block is None else f"{system.get_name()}."
-            self._states |= {f"{prefix}{name}": (system, name) for name in system.states}
-            self._wires |= {f"{prefix}{name}": (system, name) for name in system.network.wires}
+            inner = f"{path}{system.get_name()}."
+            if isinstance(system, BlockSystem):
+                prefix = path if system.block is None else inner
+                self._states |= {f"{prefix}{name}": (system, name) for name in system.states}
+                self._wires |= {f"{prefix}{name}": (system, name) for name in system.network.wires}
+            elif isinstance(system, Diagram):
+                self._collect(system, inner)
 
     def has_output(self, name: str) -> bool:
         """Return whether there is an output.

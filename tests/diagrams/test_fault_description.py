@@ -47,8 +47,7 @@ def run(settings, end):
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    controller = station.controller.GetMyContextFromRoot(root)
-    while root.get_time() < end and station.controller.fault(controller) is Fault.NONE:
+    while root.get_time() < end and station.controller.fault(station.blocks, root) is Fault.NONE:
         simulator.AdvanceTo(root.get_time() + 0.02)
     return station, root
 
@@ -107,7 +106,9 @@ def test_out_of_the_neighbourhood(load_scenario):
     settings.faults.overspeed = np.inf
     station, root = run(settings, 1.0)
     sentence = station.fault(root)
-    now, before = first_instant(station.log, root, "law", station.law.layout.status.start)
+    now, before = first_instant(
+        station.log, station.blocks, root, "law", station.law.layout.status.start
+    )
     y_t = now.signals["tool_pose"][:3]
     depth = 0.05 - np.linalg.norm((y_t - [0.8, 0.0, 1.0])[1:])
     assert sentence.startswith("the tool left the feasible neighbourhood of the path at eta = ")
@@ -145,7 +146,7 @@ def test_a_servo(six_axes):
     six_axes.simulation.sensor_failure.time = 0.0105
     six_axes.simulation.sensor_failure.component = 7
     station, root = run(six_axes, 0.1)
-    station.controller.fault = lambda _: Fault.NONE
+    station.controller.fault = lambda *_: Fault.NONE
     sentence = station.fault(root)
     assert sentence == (
         "velocity_servo: a measured value is not a finite number: v_J_2 at eta = 0.026 m, "
@@ -157,7 +158,9 @@ def test_what_is_known_without_a_run(six_axes):
     """Forces and references that are no numbers; a projection without a result."""
     station, root = run(six_axes, 0.04)
     assert station.fault(root) is None
-    now, _ = first_instant(station.log, root, "law", station.law.layout.status.start)
+    now, _ = first_instant(
+        station.log, station.blocks, root, "law", station.law.layout.status.start
+    )
 
     def sentence(fault, **changes):
         changed = Instant(0.5, {**now.signals, **changes})
@@ -185,7 +188,9 @@ def test_what_is_known_without_a_run(six_axes):
 @pytest.mark.parametrize("fast", [0, 3])
 def test_a_joint_that_runs_away_next_to_a_singular_posture(six_axes, fast):
     station, root = run(six_axes, 0.0)
-    now, _ = first_instant(station.log, root, "law", station.law.layout.status.start)
+    now, _ = first_instant(
+        station.log, station.blocks, root, "law", station.law.layout.status.start
+    )
     state = now.measured_state.copy()
     state[[4, 16]], state[[6 + fast, 18 + fast]] = np.deg2rad(2.0), np.deg2rad(600.0)
     near = Instant(0.5, {**now.signals, "joint_state_measured": state})
@@ -202,7 +207,9 @@ def test_a_robot_without_names(load_scenario):
     station = build_station(settings, FOLDER)
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
-    now, before = first_instant(station.log, root, "law", station.law.layout.status.start)
+    now, before = first_instant(
+        station.log, station.blocks, root, "law", station.law.layout.status.start
+    )
     assert before is None
     scene = FaultScene(station.law, station.robot, station.task.place, False, now, None)
     sentence = describe(Fault.SINGULAR, scene)

@@ -136,6 +136,4 @@ def test_between_two_ticks_a_controller_finds_nothing_new(settings, run, duratio
     assert np.abs(log["v_J"].values[-1]).max() > 0.5
     assert result.fault is None
     assert not log["fault"].values.any()
-    assert not station.controller.suspects(
-        station.controller.GetMyContextFromRoot(result.root)
-    ).any()
+    assert not station.controller.suspects(station.blocks, result.root).any()

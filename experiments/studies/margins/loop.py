@@ -73,10 +73,9 @@ class StationLoop:
         Args:
             root: Context of the diagram at a tick that is not made yet.
         """
-        return any(
-            system.fault(system.GetMyContextFromRoot(root)) is not Fault.NONE
-            for system in self._can_fail
-        )
+        faults = [self.station.controller.fault(self.station.blocks, root)]
+        faults += [s.fault(s.GetMyContextFromRoot(root)) for s in self._can_fail]
+        return any(fault is not Fault.NONE for fault in faults)
 
     def external_load(self, section: Context) -> np.ndarray | None:
         """Return what a force sensor feels beside the tool [N, Nm], shape (6,).

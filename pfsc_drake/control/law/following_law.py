@@ -232,15 +232,3 @@ class FollowingLaw:
             argument[:] = 0.0 if values is None else values
         self._bound.evaluate()
         return self._bound.results["result"].copy()
-
-    def error(self, result: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return the error of the virtual output, which is to vanish, shape (m,).
-
-        Args:
-            result: From :meth:`evaluate`.
-            reference: See there.
-        """
-        m = self.linearization.num_outputs
-        y = result[self.layout.manifold_state][:m]
-        # where the point moves with time, the virtual output is the error
-        return y if self.linearization.manifold.follows_time else y - reference[:m]

@@ -1,16 +1,19 @@
 """What drives do after a fault: stop, and hold the robot where it has come to rest."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import is_finite, where
 from pfsc_drake.control.law.stopping_step import (
     Joints,
     StopMemory,
+    inverse_dynamics,
     stopping_step,
-    torque_function,
 )
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -21,8 +24,6 @@ _SHORTEST = 0.05
 _PEAK = 1.5
 # share of the torque limit that braking is granted however much gravity takes
 _LEAST_SHARE = 0.1
-
-_Q_J, _V_J, _Q_M, _V_M = range(4)
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class SafeState:
             )
 
 
-class SafeStop:
+class SafeStop(Block):
     """Stops a robot along a trajectory of its joints, and holds it at the trajectory's end.
 
     From the state at the fault all joints slow down in proportion, ``q_J,r' = v_0 s'(t)`` with
@@ -86,7 +87,18 @@ class SafeStop:
     ``tau_J`` alone: its weight is borne, but only a brake holds it. A value that is not finite
     is used again when it is back; one that was found implausible is not.
 
-    The memory is a flat array of ``size`` that belongs to the caller.
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        fault (input): Nonzero from the fault on, shape (1,).
+        suspects (input): What of the state is found implausible now, nonzero if so, shape (4N,).
+        torque (output): Of the drives, within their limits, shape (N,) [Nm or N]; zero without a
+            fault.
+        ignored (output): What of the state is not used any more, nonzero if so, shape (4N,). It
+            depends on the state alone.
+
+    State:
+        Whether the robot is ``stopping``, and what :class:`StopMemory` names; without a fault
+        nothing but the last state.
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -94,131 +106,141 @@ class SafeStop:
         settings: How to stop and hold.
         period: Sampling time [s].
 
-    Attributes:
-        size: Length of the memory.
-
     Raises:
         InputError: If the settings are out of range.
     """
+
+    expands = False
 
     def __init__(
         self, robot: RobotModel, limits: np.ndarray, settings: SafeState, period: float
     ) -> None:
         settings.check(robot.dimension)
-        n = self._n = robot.dimension
-        self._limits, self._settings, self._period = np.asarray(limits), settings, period
-        self._D_M = robot.D_M
-        joints = Joints.of(robot, self._limits, settings.damping)
-        self._compliance = np.array(joints.compliance).ravel()
-        self._mass_matrix = BoundFunction(_mass_matrix_function(robot))
-        self._torque = BoundFunction(torque_function(robot))
-        self._at = StopMemory(n)
-        self.size = self._at.size
-        step = BoundFunction(stopping_step(robot, joints, settings.bandwidth, period))
-        self._evaluate, arguments, results = step.evaluate, step.arguments, step.results
-        self._memory, self._state = arguments["memory"], arguments["state"]
-        self._suspect, self._drive = arguments["suspect"], results["drive"]
-        self._next = results["next"]
+        n = robot.dimension
+        joints = Joints.of(robot, np.asarray(limits), settings.damping)
+        self._start = starting_function(robot, joints, settings.effort_share, period)
+        self._step = stopping_step(robot, joints, settings.bandwidth, period)
+        self._sizes = StopMemory.sizes(n)
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "fault": Port(1),
+            "suspects": Port(4 * n),
+        }
+        self.outputs = {
+            "torque": Port(n, "Nm or N"),
+            "ignored": Port(4 * n),
+        }
+        self.inner = {"later": sum(self._sizes.values())}
+        self.states = {"stopping": 1} | self._sizes
 
-    def start(self, last: np.ndarray, state: np.ndarray, suspect: np.ndarray) -> np.ndarray:
-        """Return the memory at the instant of a fault.
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
-        Args:
-            last: State one period before, ``[q_J, v_J, q_M, v_M]``, shape (4N,), as far as known.
-            state: Measured now, shape (4N,).
-            suspect: Which of it is implausible, nonzero if so, shape (4N,).
-        """
-        memory, at = np.zeros(self.size), self._at
-        q_J, v_J, q_M, v_M = self._state_at_fault(last, state, suspect != 0.0)
-        D = self._total_inertia(q_J)
-        momentum = D @ v_J
-        weight = self._weight(q_J)
-        memory[at.duration] = self._stopping_time(momentum, weight)
-        memory[at.q_0], memory[at.v_0], memory[at.inertia] = q_J, v_J, np.diag(D)
-        memory[at.position], memory[at.rate] = q_M, v_M
-        memory[at.suspect], memory[at.last] = suspect, state
-        borne = self._torque_for(q_J, v_J)
-        memory[at.offset] = q_M - (q_J + borne * self._compliance)
-        memory[at.offset_rate] = v_M - v_J
-        return memory
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        before = StopMemory(*[getattr(x, name) for name in self._sizes])
+        fresh = ca.vertcat(*self._start(x.last, u.joint_state, u.suspects))
+        begun = ca.if_else(x.stopping, ca.vertcat(*before), fresh, True)
+        parts = self._split(begun)
+        stop = ca.vertcat(*self._step(*parts.values(), u.joint_state, u.suspects))
+        n = self.outputs["torque"].size
+        idle = ca.vertcat(ca.DM(n, 1), *before._replace(last=u.joint_state))
+        torque, later = ca.vertsplit(ca.if_else(u.fault, stop, idle, True), [0, n, stop.numel()])
+        return {"torque": torque, "ignored": x.ignored, "later": later}
 
-    def drive(self, memory: np.ndarray, state: np.ndarray) -> np.ndarray:
-        """Return the drive torques within their limits, shape (N,) [Nm or N].
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"stopping": u.fault != 0.0} | self._split(y.later)
 
-        Args:
-            memory: See :meth:`start`.
-            state: Measured now, shape (4N,).
-        """
-        self._memory[:] = memory
-        self._state[:] = state
-        self._evaluate()
-        return self._drive.copy()
-
-    def advance(self, memory: np.ndarray, state: np.ndarray, suspect: np.ndarray) -> np.ndarray:
-        """Return the memory one period later.
-
-        Args:
-            memory: See :meth:`start`.
-            state: Measured now, shape (4N,).
-            suspect: What of it is implausible, nonzero if so, shape (4N,).
-        """
-        self._suspect[:] = suspect
-        self.drive(memory, state)
-        return self._next.copy()
-
-    def suspects(self, memory: np.ndarray) -> np.ndarray:
-        """Return which components of the state are not used any more, nonzero if so, (4N,)."""
-        return memory[self._at.suspect]
-
-    def _state_at_fault(
-        self, last: np.ndarray, state: np.ndarray, suspect: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return ``q_J, v_J, q_M, v_M``, each (N,), from what is measured or was a moment ago."""
-        now, before = state.reshape(4, -1), np.where(np.isfinite(last), last, 0.0).reshape(4, -1)
-        suspect = suspect.reshape(4, -1)
-        good = np.isfinite(now) & ~suspect
-        step = self._period * before[[_V_J, _V_M]]
-        expected = before.copy()
-        expected[[_Q_J, _Q_M]] += step
-        found = np.where(good, now, expected)
-        # what was implausible may have been so for a while: then the other side knows better
-        nearest = np.where(suspect[_Q_J] & ~suspect[_Q_M], found[_Q_M], found[_Q_J])
-        deflection = self._weight(nearest) * self._compliance
-        for own, other, shift in ((_Q_J, _Q_M, -deflection), (_Q_M, _Q_J, deflection)):
-            rely = suspect[own] & ~suspect[other]
-            found[own] = np.where(rely, found[other] + shift, found[own])
-        for own, position, other in ((_V_J, _Q_J, _V_M), (_V_M, _Q_M, _V_J)):
-            rely = suspect[own] & ~suspect[other]
-            quotient = (now[position] - before[position]) / self._period
-            known = np.where(good[position], quotient, 0.0)
-            found[own] = np.where(suspect[own], np.where(rely, found[other], known), found[own])
-        return found[_Q_J], found[_V_J], found[_Q_M], found[_V_M]
-
-    def _stopping_time(self, momentum: np.ndarray, weight: np.ndarray) -> float:
-        """Return T [s], in which the drives can take the momentum off beside the weight."""
-        granted = self._settings.effort_share * self._limits
-        # the weight helps to brake what moves up
-        available = np.maximum(granted + np.sign(momentum) * weight, _LEAST_SHARE * self._limits)
-        return max(_SHORTEST, float(np.max(_PEAK * np.abs(momentum) / available)))
-
-    def _total_inertia(self, q_J: np.ndarray) -> np.ndarray:
-        """Return ``D_E + D_M``, shape (N, N)."""
-        self._mass_matrix.arguments["q"][:] = q_J
-        self._mass_matrix.evaluate()
-        return self._mass_matrix.results["D"].reshape(self._n, -1) + np.diag(self._D_M)
-
-    def _weight(self, q: np.ndarray) -> np.ndarray:
-        return self._torque_for(q, np.zeros(self._n))
-
-    def _torque_for(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return ``tau_J`` of a steady motion, shape (N,)."""
-        arguments = self._torque.arguments
-        arguments["q"][:], arguments["v"][:], arguments["a"][:] = q, v, 0.0
-        self._torque.evaluate()
-        return self._torque.results["tau"].copy()
+    def _split(self, memory: Any) -> dict[str, Any]:
+        """Return the parts of a memory by name."""
+        ends = np.cumsum([0, *self._sizes.values()]).tolist()
+        return dict(zip(self._sizes, ca.vertsplit(memory, ends), strict=True))
 
 
-def _mass_matrix_function(robot: RobotModel) -> ca.Function:
-    """Return ``q -> D_E``, shape (N, N)."""
-    q = ca.SX.sym("q", robot.dimension)
-    return ca.Function("mass_matrix", [q], [ca.densify(robot.mass_matrix(q))], ["q"], ["D"])
+def starting_function(
+    robot: RobotModel, joints: Joints, effort_share: float, period: float
+) -> ca.Function:
+    """Return ``(last, state, suspects) -> (elapsed, .., last)`` at the instant of a fault.
+
+    The results are the fields of :class:`StopMemory`; ``last`` is the state one period before, as
+    far as known, ``state`` is measured now, and ``suspects`` tells what of it is implausible,
+    nonzero if so, each (4N,).
+
+    Args:
+        robot: The robot as it is believed, N joints.
+        joints: Constants of its joints.
+        effort_share: Part of the drives' limits that braking is planned with, up to 1.
+        period: Sampling time [s].
+    """
+    n = robot.dimension
+    zero = ca.SX.zeros(n)
+    last, state, suspects = (ca.SX.sym(name, 4 * n) for name in ("last", "state", "suspects"))
+
+    def deflection(q: ca.SX) -> ca.SX:
+        return inverse_dynamics(robot, q, zero, zero) * joints.compliance
+
+    q_J, v_J, q_M, v_M = _state_at_fault(last, state, suspects != 0.0, deflection, period)
+    D = robot.mass_matrix(q_J) + ca.diag(joints.D_M)
+    weight = inverse_dynamics(robot, q_J, zero, zero)
+    memory = StopMemory(
+        elapsed=ca.SX(1, 1),
+        duration=_stopping_time(D @ v_J, weight, joints.limits, effort_share),
+        q_0=q_J,
+        v_0=v_J,
+        offset=q_M - (q_J + inverse_dynamics(robot, q_J, v_J, zero) * joints.compliance),
+        offset_rate=v_M - v_J,
+        inertia=ca.diag(D),
+        position=q_M,
+        rate=v_M,
+        ignored=suspects,
+        last=state,
+    )
+    return ca.Function(
+        "starting_stop",
+        [last, state, suspects],
+        ca.cse([ca.densify(x) for x in memory]),
+        ["last", "state", "suspects"],
+        [f"next_{name}" for name in memory._fields],
+    )
+
+
+def _state_at_fault(
+    last: ca.SX,
+    state: ca.SX,
+    suspects: ca.SX,
+    deflection: Callable[[ca.SX], ca.SX],
+    period: float,
+) -> list[ca.SX]:
+    """Return ``q_J, v_J, q_M, v_M``, each (N,), from what is measured or was a moment ago."""
+    n = state.shape[0] // 4
+    now, suspect = ca.vertsplit(state, n), ca.vertsplit(suspects, n)
+    before = ca.vertsplit(where(is_finite(last), last, 0.0), n)
+    good = [ca.logic_and(is_finite(x), ca.logic_not(s)) for x, s in zip(now, suspect, strict=True)]
+    expected = [
+        before[0] + period * before[1],
+        before[1],
+        before[2] + period * before[3],
+        before[3],
+    ]
+    found = [where(ok, x, e) for ok, x, e in zip(good, now, expected, strict=True)]
+    only = [ca.logic_and(suspect[k], ca.logic_not(suspect[(k + 2) % 4])) for k in range(4)]
+    # what was implausible may have been so for a while: then the other side knows better
+    bend = deflection(where(only[0], found[2], found[0]))
+    found[0] = where(only[0], found[2] - bend, found[0])
+    found[2] = where(only[2], found[0] + bend, found[2])
+    for own in (1, 3):
+        position, other = own - 1, (own + 2) % 4
+        quotient = (now[position] - before[position]) / period
+        known = where(good[position], quotient, 0.0)
+        found[own] = where(suspect[own], where(only[own], found[other], known), found[own])
+    return found
+
+
+def _stopping_time(momentum: ca.SX, weight: ca.SX, limits: ca.DM, effort_share: float) -> ca.SX:
+    """Return T [s], in which the drives can take the momentum off beside the weight."""
+    # the weight helps to brake what moves up
+    granted = effort_share * limits + ca.sign(momentum) * weight
+    available = ca.fmax(granted, _LEAST_SHARE * limits)
+    return ca.fmax(_SHORTEST, ca.mmax(_PEAK * ca.fabs(momentum) / available))

@@ -1,10 +1,11 @@
-"""One tick of a robot that is being stopped and held, as a compiled function."""
+"""One tick of a robot that is being stopped and held, as a function."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.control.cases import is_finite
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -22,8 +23,8 @@ _FAR_SIDE = 0.5
 _FOLLOWING = 0.3
 
 
-class StopMemory:
-    """Where in a flat array lies what is remembered of a stop of N joints.
+class StopMemory(NamedTuple):
+    """What is remembered of a stop of N joints.
 
     Attributes:
         elapsed: Since the fault [s], shape (1,).
@@ -35,18 +36,31 @@ class StopMemory:
         inertia: Diagonal of ``D_E + D_M`` at the fault, shape (N,).
         position: Of the motors, as far as it is integrated, shape (N,).
         rate: Of their position, differentiated, shape (N,).
-        suspect: What of the state is not to be believed, nonzero if so, shape (4N,).
+        ignored: What of the state is not to be believed, nonzero if so, shape (4N,).
         last: State of the last tick, shape (4N,).
-        size: Length of the array.
     """
 
-    def __init__(self, num_joints: int) -> None:
-        widths = [1, 1, *[num_joints] * 7, 4 * num_joints, 4 * num_joints]
-        ends = np.cumsum(widths).tolist()
-        parts = [slice(end - width, end) for width, end in zip(widths, ends, strict=True)]
-        self.elapsed, self.duration, self.q_0, self.v_0, self.offset, *parts = parts
-        self.offset_rate, self.inertia, self.position, self.rate, self.suspect, self.last = parts
-        self.size: int = ends[-1]
+    elapsed: Any
+    duration: Any
+    q_0: Any
+    v_0: Any
+    offset: Any
+    offset_rate: Any
+    inertia: Any
+    position: Any
+    rate: Any
+    ignored: Any
+    last: Any
+
+    @classmethod
+    def sizes(cls, num_joints: int) -> dict[str, int]:
+        """Return how many elements each has.
+
+        Args:
+            num_joints: N.
+        """
+        sizes = [1, 1, *[num_joints] * 7, 4 * num_joints, 4 * num_joints]
+        return dict(zip(cls._fields, sizes, strict=True))
 
 
 class Joints(NamedTuple):
@@ -89,10 +103,11 @@ class Joints(NamedTuple):
 def stopping_step(
     robot: RobotModel, joints: Joints, bandwidth: float, period: float
 ) -> ca.Function:
-    """Return ``(memory, state, suspect) -> (drive, next)``, see :class:`SafeStop`.
+    """Return ``(elapsed, .., last, state, suspects) -> (drive, elapsed, .., last)``.
 
-    ``drive`` are the drives' torques within their limits, shape (N,), ``next`` is the memory one
-    period later; of a state that is not finite only ``next`` tells, where it is remembered.
+    See :class:`SafeStop`; ``elapsed, .., last`` are the fields of :class:`StopMemory`, now and one
+    period later. ``drive`` are the drives' torques within their limits, shape (N,); of a state
+    that is not finite only the memory tells.
 
     Args:
         robot: The robot as it is believed, N joints.
@@ -100,24 +115,24 @@ def stopping_step(
         bandwidth: ``omega`` of the position hold [rad/s].
         period: Sampling time [s].
     """
-    n, at = robot.dimension, StopMemory(robot.dimension)
-    memory, state = ca.SX.sym("memory", at.size), ca.SX.sym("state", 4 * n)
-    suspect = ca.SX.sym("suspect", 4 * n)
-    now, last = ca.vertsplit(state, n), ca.vertsplit(memory[at.last], n)
-    good = ca.vertsplit(ca.logic_and(_is_finite(state), memory[at.suspect] == 0.0), n)
+    n, sizes = robot.dimension, StopMemory.sizes(robot.dimension)
+    memory = StopMemory(*[ca.SX.sym(name, size) for name, size in sizes.items()])
+    state, suspects = ca.SX.sym("state", 4 * n), ca.SX.sym("suspects", 4 * n)
+    now, last = ca.vertsplit(state, n), ca.vertsplit(memory.last, n)
+    good = ca.vertsplit(ca.logic_and(is_finite(state), memory.ignored == 0.0), n)
     far = joints.elastic * good[0] * (1.0 - good[2]) * (1.0 - good[3])
 
-    T = memory[at.duration]
-    way, fading, slope = _stop(ca.fmin(memory[at.elapsed] / T, 1.0))
-    v_0 = memory[at.v_0]
-    q_r, v_r, a_r = memory[at.q_0] + v_0 * (T * way), v_0 * fading, v_0 * (slope / T)
-    tau_J = _inverse_dynamics(robot, q_r, v_r, a_r)
-    reference = q_r + tau_J * joints.compliance + fading * memory[at.offset]
-    rate_r = v_r + fading * memory[at.offset_rate]
+    T = memory.duration
+    way, fading, slope = _stop(ca.fmin(memory.elapsed / T, 1.0))
+    v_0 = memory.v_0
+    q_r, v_r, a_r = memory.q_0 + v_0 * (T * way), v_0 * fading, v_0 * (slope / T)
+    tau_J = inverse_dynamics(robot, q_r, v_r, a_r)
+    reference = q_r + tau_J * joints.compliance + fading * memory.offset
+    rate_r = v_r + fading * memory.offset_rate
     forward = tau_J + joints.D_M * a_r + joints.viscous * v_r
 
-    q_M, v_M, share, braking = _motors(memory, at, now, good, far, joints)
-    K_p, K_v = _gains(memory[at.inertia], joints, bandwidth, period)
+    q_M, v_M, share, braking = _motors(memory, now, good, far, joints)
+    K_p, K_v = _gains(memory.inertia, joints, bandwidth, period)
     wanted = forward + share * K_p * (reference - q_M) + braking * K_v * (rate_r - v_M)
     drive = ca.fmin(ca.fmax(wanted, -joints.limits), joints.limits)
 
@@ -129,36 +144,36 @@ def stopping_step(
     # rigid joints have their motors' positions on either side
     own = ca.logic_or(good[2], joints.elastic)
     newest = ca.if_else(own, now[2] - last[2], now[0] - last[0]) / period
-    rate = memory[at.rate] + _NEWEST * (newest - memory[at.rate])
-    rate = ca.if_else(far, simulated, ca.if_else(_is_finite(rate), rate, 0.0))
+    rate = memory.rate + _NEWEST * (newest - memory.rate)
+    rate = ca.if_else(far, simulated, ca.if_else(is_finite(rate), rate, 0.0))
 
-    after = ca.SX(memory)
-    after[at.elapsed] += period
-    after[at.position], after[at.rate] = position, rate
-    after[at.suspect], after[at.last] = ca.fmax(memory[at.suspect], suspect), state
+    after = memory._replace(
+        elapsed=memory.elapsed + period,
+        position=position,
+        rate=rate,
+        ignored=ca.fmax(memory.ignored, suspects),
+        last=state,
+    )
     return ca.Function(
         "stopping_step",
-        [memory, state, suspect],
-        ca.cse([ca.densify(drive), ca.densify(after)]),
-        ["memory", "state", "suspect"],
-        ["drive", "next"],
+        [*memory, state, suspects],
+        ca.cse([ca.densify(x) for x in (drive, *after)]),
+        [*sizes, "state", "suspects"],
+        ["drive", *(f"next_{name}" for name in sizes)],
     )
 
 
-def torque_function(robot: RobotModel) -> ca.Function:
-    """Return ``(q, v, a) -> tau_J``, each (N,)."""
-    q, v, a = (ca.SX.sym(name, robot.dimension) for name in "qva")
-    tau = ca.densify(_inverse_dynamics(robot, q, v, a))
-    return ca.Function("stopping_torque", [q, v, a], [tau], ["q", "v", "a"], ["tau"])
+def inverse_dynamics(robot: RobotModel, q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
+    """Return ``tau_J``, shape (N,).
 
-
-def _inverse_dynamics(robot: RobotModel, q: ca.SX, v: ca.SX, a: ca.SX) -> ca.SX:
+    Args:
+        robot: The robot as it is believed, N joints.
+        q: Joint coordinates, shape (N,).
+        v: Their velocities, shape (N,).
+        a: Their accelerations, shape (N,).
+    """
     motion = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(robot.dimension)]
     return ca.vertcat(*[jet.coefficients[0] for jet in robot.inverse_dynamics(motion)])
-
-
-def _is_finite(x: ca.SX) -> ca.SX:
-    return ca.fabs(x) < ca.inf
 
 
 def _stop(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -184,13 +199,12 @@ def _motor_acceleration(
     """Return the acceleration of motors that are not seen, shape (N,)."""
     D_M = ca.if_else(joints.D_M > 0.0, joints.D_M, ca.inf)
     damping = 2.0 * _FOLLOWING * ca.sqrt(joints.stiffness * joints.D_M)
-    following = damping * (v_M - ca.if_else(_is_finite(now[1]), now[1], 0.0))
+    following = damping * (v_M - ca.if_else(is_finite(now[1]), now[1], 0.0))
     return (torque - joints.viscous * v_M - joints.stiffness * (q_M - now[0]) - following) / D_M
 
 
 def _motors(
-    memory: ca.SX,
-    at: StopMemory,
+    memory: StopMemory,
     now: list[ca.SX],
     good: list[ca.SX],
     far: ca.SX,
@@ -200,11 +214,11 @@ def _motors(
     q_J, v_J, q_M, v_M = now
     has_q_J, has_v_J, has_q_M, has_v_M = good
     rigid = 1.0 - joints.elastic
-    position = ca.if_else(rigid * has_q_J, q_J, memory[at.position])
+    position = ca.if_else(rigid * has_q_J, q_J, memory.position)
     position = ca.if_else(has_q_M, q_M, position)
     near, by_link = ca.logic_or(has_q_M, rigid * has_q_J), rigid * has_v_J
     told = ca.logic_or(has_v_M, by_link)
-    velocity = ca.if_else(has_v_M, v_M, ca.if_else(by_link, v_J, memory[at.rate]))
+    velocity = ca.if_else(has_v_M, v_M, ca.if_else(by_link, v_J, memory.rate))
     known = ca.logic_or(told, near)
     velocity = ca.if_else(ca.logic_or(known, far), velocity, 0.0)
     share = ca.if_else(known, 1.0, _FAR_SIDE * far)

@@ -1,11 +1,13 @@
 """What contradicts itself in a measurement of joints, and joints at or beyond their limits."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import any_of, first_of, is_finite, where
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
@@ -33,7 +35,7 @@ class SupervisionParameters:
         saturation_time: How long a drive may be at its limit [s], half of the time that it is not
             being taken off; 0 for ever.
         chatter_turns: How many turns from one limit to the other are chatter, see
-            :class:`~pfsc_drake.control.law.chatter.Chatter`; 0 for none.
+            :class:`~pfsc_drake.control.law.drive_watch.DriveWatch`; 0 for none.
         overspeed: Share of its largest speed by which a joint may be faster; infinite if no speed
             is a fault.
     """
@@ -55,7 +57,7 @@ class SupervisionParameters:
             raise InputError(f"overspeed = {self.overspeed}; must be zero or a positive number")
 
 
-class Supervision:
+class Supervision(Block):
     """Finds measured values of joints that contradict each other, and joints beyond their limits.
 
     Of every joint four signals tell the same motion: positions and integrated velocities of
@@ -77,15 +79,21 @@ class Supervision:
     A joint is too fast if link or motor is, by its velocity as by the way since the last tick: one
     of the two alone may be a sensor's error, which the comparison above finds.
 
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        ignored (input): What is not compared any more, nonzero if so, shape (4N,).
+        fault (output): MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT, JOINT_SPEED or NONE, shape (1,).
+        suspects (output): 1 where a component of the state is not to be believed, shape (4N,).
+
+    State:
+        joint_state of the ``last`` tick, and whether there was one (``known``); the leaky ``sums``
+        of the four ways, shape (4N,); for how many ticks each value was ``unchanged``, shape (4N,).
+
     Args:
         robot: The robot as it is believed, N joints.
         limits: Of the drives' torques [Nm or N], shape (N,).
         parameters: What is watched.
         period: Sampling time [s].
-
-    Attributes:
-        size: Length of the memory, which belongs to the caller; zeros at the start.
-        saturated_ticks: How many ticks a drive may be at its limit, infinite for ever.
 
     Raises:
         InputError: If the resolution fits another number of joints.
@@ -99,63 +107,33 @@ class Supervision:
         period: float,
     ) -> None:
         n = robot.dimension
-        self.size = 8 * n
         resolution = np.asarray(parameters.resolution, dtype=float)
         if resolution.shape not in ((1,), (n,)):
             raise InputError(
                 f"resolution: {resolution.tolist()}; must be one number or one of each of {n} "
                 "joints"
             )
-        time = parameters.saturation_time
-        self.saturated_ticks = round(time / period) if time else np.inf
-        self._n = n
-        function = _supervision_function(robot, limits, resolution, parameters, period)
-        bound = BoundFunction(function)
-        self._arguments, self._result = bound.arguments, bound.results["result"]
-        self._evaluate = bound.evaluate
-        # whether the argument is other than zero
-        self._ignores = False
+        self._function = _supervision_function(robot, limits, resolution, parameters, period)
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "ignored": Port(4 * n),
+        }
+        self.outputs = {"fault": Port(1), "suspects": Port(4 * n)}
+        self.inner = {"sums": 4 * n, "unchanged": 4 * n}
+        self.states = {"last": 4 * n, "known": 1, "sums": 4 * n, "unchanged": 4 * n}
 
-    def evaluate(
-        self,
-        state: np.ndarray,
-        last: np.ndarray,
-        memory: np.ndarray,
-        known: float,
-        ignored: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Return ``[fault, suspects, next memory]``, shape (1 + 12N,), an array that is reused.
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
-        The fault is MEASUREMENT_IMPLAUSIBLE, JOINT_LIMIT, JOINT_SPEED or NONE; suspects, shape
-        (4N,), are 1 where a component of the state is not to be believed.
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        results = self._function(u.joint_state, x.last, x.sums, x.unchanged, x.known, u.ignored)
+        return dict(zip(("fault", "suspects", "sums", "unchanged"), results, strict=True))
 
-        Args:
-            state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
-            last: The same one period before.
-            memory: Of this object, shape (size,).
-            known: Whether ``last`` is known, 1 or 0.
-            ignored: What is not compared any more, nonzero if so, shape (4N,).
-        """
-        arguments = self._arguments
-        arguments["state"][:] = state
-        arguments["last"][:] = last
-        arguments["memory"][:] = memory
-        arguments["known"][0] = known
-        if ignored is not None:
-            arguments["ignored"][:] = ignored
-        elif self._ignores:
-            arguments["ignored"].fill(0.0)
-        self._ignores = ignored is not None
-        self._evaluate()
-        return self._result
-
-    def suspects(self, result: np.ndarray) -> np.ndarray:
-        """Return the part of a result that tells what is not to be believed, shape (4N,)."""
-        return result[1 : 1 + 4 * self._n]
-
-    def next_memory(self, result: np.ndarray) -> np.ndarray:
-        """Return the part of a result that is the next memory, shape (size,)."""
-        return result[1 + 4 * self._n :]
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"last": u.joint_state, "known": 1.0, "sums": y.sums, "unchanged": y.unchanged}
 
 
 def _supervision_function(
@@ -165,26 +143,30 @@ def _supervision_function(
     parameters: SupervisionParameters,
     period: float,
 ) -> ca.Function:
+    """Return ``(state, last, sums, unchanged, known, ignored) -> (fault, suspects, ..)``.
+
+    The last two results are the next sums and unchanged.
+    """
     n, k_s = robot.dimension, robot.K_s
-    state, last = ca.SX.sym("state", 4 * n), ca.SX.sym("last", 4 * n)
-    memory, known = ca.SX.sym("memory", 8 * n), ca.SX.sym("known")
-    ignored = ca.SX.sym("ignored", 4 * n)
+    names = ("state", "last", "sums", "unchanged")
+    state, last, total, steady = (ca.SX.sym(name, 4 * n) for name in names)
+    known, ignored = ca.SX.sym("known"), ca.SX.sym("ignored", 4 * n)
     speed = robot.gather("velocity_limit")
     speed = np.where(np.isfinite(speed), speed, 0.0)
     tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
     bending = np.where(np.isfinite(k_s), _BENDING * np.minimum(limits, 1e300) / k_s, 0.0)
-    now, before, sums = (ca.vertsplit(x, n) for x in (state, last, memory[: 4 * n]))
-    unchanged = ca.if_else(state == last, memory[4 * n :] + known, 0.0)
+    now, before, sums = (ca.vertsplit(x, n) for x in (state, last, total))
+    unchanged = where(state == last, steady + known, 0.0)
     rests = ca.vertsplit(unchanged, n)
     ways, steps = [], []
-    for k, (x, x_0, total) in enumerate(zip(now, before, sums, strict=True)):
+    for k, (x, x_0, way) in enumerate(zip(now, before, sums, strict=True)):
         step = x - x_0 if k % 2 == 0 else period / 2.0 * (x + x_0)
-        steps.append(ca.if_else(known, step, 0.0))
-        moved = total + steps[-1]
+        steps.append(where(known, step, 0.0))
+        moved = way + steps[-1]
         # what is no number contradicts nothing
-        ways.append(ca.if_else(ca.fabs(moved) < ca.inf, moved, 0.0))
+        ways.append(where(is_finite(moved), moved, 0.0))
     used = [
-        ca.logic_and(ca.fabs(x) < ca.inf, skip == 0.0)
+        ca.logic_and(is_finite(x), skip == 0.0)
         for x, skip in zip(now, ca.vertsplit(ignored, n), strict=True)
     ]
     q_J, v_J, q_M, v_M = _substituted(ways, used)
@@ -219,18 +201,20 @@ def _supervision_function(
     fastest = largest_speeds(robot) * (1.0 + parameters.overspeed) + 2.0 * resolution / period
     speeds = [ca.fmin(ca.fabs(steps[side]) / period, ca.fabs(now[side + 1])) for side in (0, 2)]
     too_fast = ca.sum1((speeds[0] > fastest) + (speeds[1] > fastest))
-    beyond = ca.if_else(
-        at_limit > 0, Fault.JOINT_LIMIT, ca.if_else(too_fast > 0, Fault.JOINT_SPEED, Fault.NONE)
+    fault = first_of(
+        (any_of(suspect), Fault.MEASUREMENT_IMPLAUSIBLE),
+        (at_limit > 0, Fault.JOINT_LIMIT),
+        (too_fast > 0, Fault.JOINT_SPEED),
+        otherwise=Fault.NONE,
     )
-    fault = ca.if_else(ca.sum1(suspect) > 0, Fault.MEASUREMENT_IMPLAUSIBLE, beyond)
     decay = np.exp(-_FORGETTING * period)
-    result = ca.vertcat(fault, suspect, *[decay * way for way in ways], unchanged)
+    results = [fault, suspect, ca.vertcat(*[decay * way for way in ways]), unchanged]
     return ca.Function(
         "supervision",
-        [state, last, memory, known, ignored],
-        ca.cse([ca.densify(result)]),
-        ["state", "last", "memory", "known", "ignored"],
-        ["result"],
+        [state, last, total, steady, known, ignored],
+        ca.cse([ca.densify(ca.SX(result)) for result in results]),
+        [*names, "known", "ignored"],
+        ["fault", "suspects", "next_sums", "next_unchanged"],
     )
 
 
@@ -242,5 +226,5 @@ def _substituted(ways: list[ca.SX], used: list[ca.SX]) -> list[ca.SX]:
         total = ways[side] * used[side] + ways[side + 1] * used[side + 1]
         means.append((count, total / ca.fmax(count, 1.0)))
     (has_link, link), (has_motor, motor) = means
-    link, motor = ca.if_else(has_link, link, motor), ca.if_else(has_motor, motor, link)
-    return [ca.if_else(used[k], ways[k], link if k < 2 else motor) for k in range(4)]
+    link, motor = where(has_link, link, motor), where(has_motor, motor, link)
+    return [where(used[k], ways[k], link if k < 2 else motor) for k in range(4)]

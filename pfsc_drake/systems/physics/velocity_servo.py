@@ -2,10 +2,14 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from pfsc_drake.blocks.block import Block
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.blocks.program import Program
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
@@ -42,8 +46,7 @@ class VelocityServo(LeafSystem):
 
     State:
         Discrete: integral part [Nm or N], shape (N,), 0 at the start; latched fault, shape
-        (1,); whether the next is known, shape (1,); ``joint_state`` of the last tick, shape
-        (4N,); memory of the safe stop, and of the supervision.
+        (1,); memory of the safe stop, and of the supervision.
 
     Args:
         robot: The robot as it is believed, N joints; its gravity torque and the viscous damping
@@ -74,14 +77,13 @@ class VelocityServo(LeafSystem):
         self._law, self._size = law, n
         period, self._longest_silence = law.gains.period, longest_silence
         settings = safe_state or SafeState(np.zeros(n))
-        self._safe_stop = SafeStop(robot, law.limits, settings, period)
+        self._safe_stop = _Part(SafeStop(robot, law.limits, settings, period))
         self._supervision = None
         if supervision is not None:
-            self._supervision = Supervision(robot, law.limits, supervision, period)
+            self._supervision = _Part(Supervision(robot, law.limits, supervision, period))
         watched = self._supervision.size if self._supervision else 0
-        widths = np.cumsum([n, 1, 1, 4 * n, self._safe_stop.size, watched]).tolist()
-        parts = [slice(*ends) for ends in itertools.pairwise(widths)]
-        self._fault, self._known, self._last, self._stop, self._watch = parts
+        widths = np.cumsum([n, 1, self._safe_stop.size, watched]).tolist()
+        self._fault, self._stop, self._watch = (slice(*ends) for ends in itertools.pairwise(widths))
         memory = self.DeclareDiscreteState(widths[-1])
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
         self._reference = self.DeclareVectorInputPort("velocity_reference", n)
@@ -118,7 +120,7 @@ class VelocityServo(LeafSystem):
 
     def suspects(self, context: Context) -> np.ndarray:
         """Return which measured values are not believed, nonzero if so, shape (4N,)."""
-        return self._safe_stop.suspects(self._latched(context)[self._stop])
+        return self._safe_stop.state(self._latched(context)[self._stop], "ignored")
 
     def _latched(self, context: Context) -> np.ndarray:
         """Return the memory with what is found at the present instant, if it is a tick."""
@@ -130,25 +132,20 @@ class VelocityServo(LeafSystem):
         n = self._size
         state, reference = self._joint_state.Eval(context), self._reference.Eval(context)
         before = context.get_discrete_state_vector().value()
-        after, fault, seen = before.copy(), before[self._fault][0], None
+        after, fault = before.copy(), before[self._fault][0]
+        seen, suspects = 0.0, np.zeros(4 * n)
         if self._supervision is not None:
-            known = before[self._known][0]
-            ignored = self._safe_stop.suspects(before[self._stop])
-            seen = self._supervision.evaluate(
-                state, before[self._last], before[self._watch], known, ignored
-            )
-            after[self._watch] = self._supervision.next_memory(seen)
-        after[self._last], after[self._known] = state, 1.0
+            ignored = self._safe_stop.state(before[self._stop], "ignored")
+            found = self._supervision.step(before[self._watch], joint_state=state, ignored=ignored)
+            after[self._watch], suspects = found["x_next"], found["suspects"]
+            seen = float(found["fault"][0])
         fault = fault or self._found_fault(context, state, reference, seen)
+        stop = self._safe_stop.step(
+            before[self._stop], joint_state=state, fault=fault, suspects=suspects
+        )
+        after[self._stop] = stop["x_next"]
         if fault:
-            suspects = np.zeros(4 * n)
-            if self._supervision is not None and seen is not None:
-                suspects = self._supervision.suspects(seen)
-            stop = before[self._stop]
-            if not before[self._fault][0]:
-                stop = self._safe_stop.start(before[self._last], state, suspects)
-            torque = self._safe_stop.drive(stop, state)
-            after[self._stop] = self._safe_stop.advance(stop, state, suspects)
+            torque = stop["torque"]
             after[self._fault] = fault
         else:
             self._q[:] = state[:n]
@@ -162,14 +159,14 @@ class VelocityServo(LeafSystem):
         context: Context,
         state: np.ndarray,
         reference: np.ndarray,
-        seen: np.ndarray | None,
+        seen: float,
     ) -> float:
         """Return a fault of this instant, the root cause first."""
         # a sum is finite only if all its terms are
         if not math.isfinite(state.sum() + reference.sum()):
             return Fault.INPUT_NOT_FINITE
-        if seen is not None and seen[0]:
-            return float(seen[0])
+        if seen:
+            return seen
         if self._silence.HasValue(context):
             silence = self._silence.Eval(context)[0]
             return Fault.BUS_LOST if silence > self._longest_silence else Fault.NONE
@@ -185,8 +182,31 @@ class VelocityServo(LeafSystem):
         joint_state = self._joint_state.Eval(context)
         memory = state.get_mutable_value()
         memory[:] = 0.0
-        memory[self._last] = np.where(np.isfinite(joint_state), joint_state, 0.0)
+        last = np.where(np.isfinite(joint_state), joint_state, 0.0)
+        self._safe_stop.state(memory[self._stop], "last")[:] = last
+        if self._supervision is not None:
+            self._supervision.state(memory[self._watch], "last")[:] = last
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(self._step.Eval(context)[self._size :])
+
+
+class _Part:
+    """A block within the servo, whose state is a part of the servo's."""
+
+    def __init__(self, block: Block) -> None:
+        program = Program(Network.of(block))
+        self.size = program.size
+        self._states, self._bound = program.states, BoundFunction(program.step())
+
+    def state(self, x: np.ndarray, name: str) -> np.ndarray:
+        """Return a view of one of the states."""
+        return x[self._states[name]]
+
+    def step(self, x: np.ndarray, **inputs: Any) -> dict[str, np.ndarray]:
+        """Return outputs and ``x_next``; arrays that are reused."""
+        for name, value in ({"x": x} | inputs).items():
+            self._bound.arguments[name][:] = value
+        self._bound.evaluate()
+        return self._bound.results

@@ -9,8 +9,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
-from pfsc_drake.control.law.stopping_step import StopMemory
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
@@ -40,9 +40,14 @@ class Robot:
         self.context = self.plant.CreateDefaultContext()
         port = self.plant.get_actuation_input_port()
         self.actuation = port.FixValue(self.context, np.zeros(N)).GetMutableData
-        # what is remembered of a stop belongs to the caller
-        self.safe = SafeStop(self.chain, self.limits, SafeState(np.zeros(N)), PERIOD)
+        self.block = SafeStop(self.chain, self.limits, SafeState(np.zeros(N)), PERIOD)
         self.gravity = gravity_function(self.chain)
+
+    def stop(self, last):
+        """Return the safe stop of joints that were in a state at the last tick."""
+        stepper = Stepper(self.block)
+        tell(stepper, last, fault=0.0)
+        return stepper
 
     def state(self, q, v):
         """Return the plant's state with springs that bear the weight."""
@@ -69,6 +74,11 @@ class Robot:
         return x + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
 
 
+def tell(stepper, measured, suspects=NOTHING, fault=1.0):
+    """Return the drive torques of a tick, after a fault."""
+    return stepper.step(joint_state=measured, fault=fault, suspects=suspects)["torque"]
+
+
 @pytest.fixture(scope="module", params=["comau_racer_1_4_3r", "comau_racer_1_4_elastic_3r"])
 def robot(request):
     return Robot(request.param)
@@ -76,18 +86,15 @@ def robot(request):
 
 def stop(robot, lost=(), suspect=(), ticks=700, spoil=np.nan, speed=SPEED, bias=0.0):
     """Stop a moving robot of which components are lost, and return states and torques."""
-    safe = robot.safe
     x, suspects = robot.state(POSTURE, speed), NOTHING.copy()
     suspects[list(suspect)] = 1.0
-    last = robot.rows @ robot.step(x, robot.weight(POSTURE))
-    memory, states, torques = None, [], []
+    safe = robot.stop(robot.rows @ robot.step(x, robot.weight(POSTURE)))
+    states, torques = [], []
     for _ in range(ticks):
         true = robot.rows @ x
         measured = true + bias
         measured[list(lost)] = spoil
-        memory = safe.start(last, measured, suspects) if memory is None else memory
-        tau = safe.drive(memory, measured)
-        memory = safe.advance(memory, measured, suspects)
+        tau = tell(safe, measured, suspects)
         states.append(true)
         torques.append(tau)
         x = robot.step(x, tau)
@@ -136,19 +143,15 @@ def test_of_the_motor_side_nothing_may_be_left(robot):
 
 def test_a_joint_that_is_not_seen_gets_the_planned_torque(robot):
     """From rest: its weight, whatever the others do."""
-    safe = robot.safe
     x = robot.rows @ robot.state(POSTURE, np.zeros(N))
-    unseen = x.copy()
+    unseen, safe = x.copy(), robot.stop(x)
     unseen[1::N] = np.nan
-    memory = safe.start(x, unseen, NOTHING)
     for _ in range(50):
-        tau = safe.drive(memory, unseen)
-        memory = safe.advance(memory, unseen, NOTHING)
+        tau = tell(safe, unseen)
     assert tau[1] == pytest.approx(robot.weight(POSTURE)[1], abs=1e-9)
 
 
 def test_a_value_that_comes_back_is_used_unless_it_was_implausible(robot):
-    safe = robot.safe
     x = robot.rows @ robot.state(POSTURE, np.zeros(N))
     away = x.copy()
     away[2 * N :] += np.repeat([0.01, 0.0], N)
@@ -156,9 +159,10 @@ def test_a_value_that_comes_back_is_used_unless_it_was_implausible(robot):
     lost[2 * N + 1] = np.nan
     pulls = []
     for suspects in (NOTHING, np.eye(4 * N)[2 * N + 1]):
-        memory = safe.advance(safe.start(x, lost, suspects), lost, suspects)
-        pulls.append(safe.drive(memory, away)[1] - robot.weight(POSTURE)[1])
-        np.testing.assert_array_equal(safe.suspects(memory), suspects)
+        safe = robot.stop(x)
+        tell(safe, lost, suspects)
+        pulls.append(tell(safe, away)[1] - robot.weight(POSTURE)[1])
+        np.testing.assert_array_equal(safe.states["ignored"], suspects)
     assert pulls[0] < -10.0
     assert pulls[0] < 0.1 * pulls[1] if pulls[1] < 0.0 else pulls[1] < 10.0
 
@@ -178,8 +182,9 @@ def test_what_moves_up_stops_sooner_than_what_moves_down(robot):
     durations = []
     for speed in (up, -up):
         x[N : 2 * N] = x[3 * N :] = speed
-        memory = robot.safe.start(x, x, NOTHING)
-        durations.append(memory[StopMemory(N).duration].item())
+        safe = robot.stop(x)
+        tell(safe, x)
+        durations.append(safe.states["duration"].item())
     sooner, later = durations
     weight, limit = abs(robot.weight(POSTURE)[1]), 0.7 * robot.limits[1]
     assert later / sooner == pytest.approx((limit + weight) / (limit - weight))
@@ -207,7 +212,7 @@ def test_nothing_jumps_where_motors_and_links_part(robot):
     forces = MultibodyForces(rigid.plant)
     rigid.plant.CalcForceElementsContribution(rigid.context, forces)
     borne = rigid.plant.CalcInverseDynamics(rigid.context, np.zeros(N), forces)
-    torque = robot.safe.drive(robot.safe.start(x, x, NOTHING), x)
+    torque = tell(robot.stop(x), x)
     np.testing.assert_allclose(torque, borne, rtol=1e-9, atol=1e-6)
 
 
@@ -215,11 +220,12 @@ def test_nothing_jumps_where_motors_and_links_part(robot):
 def test_an_implausible_side_is_taken_from_the_other_and_the_weight_between(robot, lost):
     """A position of link or motor 2, long wrong: the spring tells where it is."""
     true = robot.rows @ robot.state(POSTURE, np.zeros(N))
-    wrong, suspects, at = true.copy(), NOTHING.copy(), StopMemory(N)
+    wrong, suspects = true.copy(), NOTHING.copy()
     wrong[lost] += 0.5
     suspects[lost] = 1.0
-    memory = robot.safe.start(wrong, wrong, suspects)
-    found = memory[at.q_0 if lost < N else at.position][1]
+    safe = robot.stop(wrong)
+    tell(safe, wrong, suspects)
+    found = safe.states["q_0" if lost < N else "position"][1]
     bend = abs(robot.weight(POSTURE)[1] / robot.chain.K_s[1])
     assert found == pytest.approx(true[lost], abs=1e-9 + 0.1 * bend)
 

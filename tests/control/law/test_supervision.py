@@ -5,6 +5,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 from pfsc_drake.errors import InputError
@@ -39,14 +40,17 @@ def motion(chain):
 def watch(chain, states, ignored=None, **options):
     """Return the first tick with a fault, the fault, and the suspects by name."""
     limits = chain.gather("effort_limit")
-    supervision = Supervision(chain, limits, SupervisionParameters(**options), PERIOD)
-    memory, last = np.zeros(supervision.size), states[0]
+    watching = Stepper(Supervision(chain, limits, SupervisionParameters(**options), PERIOD))
+    ignored = np.zeros(4 * N) if ignored is None else ignored
     for k, state in enumerate(states):
-        result = supervision.evaluate(state, last, memory, float(k > 0), ignored)
-        if result[0]:
-            found = np.flatnonzero(supervision.suspects(result))
-            return k, Fault(int(result[0])), [f"{NAMES[i // N]}_{i % N + 1}" for i in found]
-        memory, last = supervision.next_memory(result).copy(), state
+        result = watching.step(joint_state=state, ignored=ignored)
+        if result["fault"]:
+            found = np.flatnonzero(result["suspects"])
+            return (
+                k,
+                Fault(int(result["fault"][0])),
+                [f"{NAMES[i // N]}_{i % N + 1}" for i in found],
+            )
     return None
 
 

@@ -17,8 +17,11 @@ from pydrake.systems.primitives import (
 from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions
 from experiments.catalog.scenario_catalog import find_scenario
+from pfsc_drake.blocks import wiring_blocks
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.errors import InputError
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 WIRES = (Adder, ConstantVectorSource, Demultiplexer, MatrixGain, Multiplexer, ZeroOrderHold)
@@ -37,17 +40,22 @@ SCENARIOS = (
 def _build(settings, **robot):
     for key, value in robot.items():
         setattr(settings.robot, key, value)
+    settings.simulation.fused = False
     return build_station(settings, find_scenario("pfc_delta").parent)
 
 
 def _is_control(system):
     module = type(system).__module__
+    if isinstance(system, BlockSystem):
+        return type(system.block).__module__.startswith("pfsc_drake.control")
     servo = module == "pfsc_drake.systems.physics.velocity_servo"
     # the surroundings look at the tool, too
     return servo or module.startswith("pfsc_drake.systems.control")
 
 
 def _is_wire(system):
+    if isinstance(system, BlockSystem):
+        return type(system.block).__module__ == wiring_blocks.__name__
     return isinstance(system, WIRES) and system.get_name() not in MEASUREMENTS
 
 
@@ -186,9 +194,10 @@ def test_the_safe_state_holds_what_is_believed(load_scenario):
     def weight(station):
         """Return the torque of a robot at rest that does not see its joints."""
         law, q = station.law, station.start_posture
-        stop = SafeStop(law.robot, law.limits, law.safe_state, 1e-3)
+        stop = Stepper(SafeStop(law.robot, law.limits, law.safe_state, 1e-3))
         state = np.concatenate([q, rest, q, rest])
-        return stop.drive(stop.start(state, nothing, np.zeros(24)), nothing)
+        stop.step(joint_state=state, fault=0.0, suspects=np.zeros(24))
+        return stop.step(joint_state=nothing, fault=1.0, suspects=np.zeros(24))["torque"]
 
     np.testing.assert_allclose(weight(light), 0.5 * weight(true), rtol=1e-9)
     # where the robot stands, and what is logged of it, is the plant's

@@ -46,8 +46,8 @@ def sources(diagram):
 
 
 def test_friction_is_beside_the_drives():
-    behind = sources(build_analytic().diagram)
-    assert behind["plant", "actuation"] == ("hold", "y")
+    behind = sources(build_analytic("simulation.fused=false").diagram)
+    assert behind["plant", "actuation"] == ("hold", "held")
     assert behind["plant", "resistance"] == ("joint_friction", "resistance")
     assert behind["joint_friction", "velocity"] == ("motor_velocity", "y0")
     # the true velocity, whatever the encoders say
@@ -55,8 +55,8 @@ def test_friction_is_beside_the_drives():
 
 
 def test_without_friction_the_held_force_drives_the_plant():
-    station = build_analytic("drive_friction=false")
-    assert sources(station.diagram)["plant", "actuation"] == ("hold", "y")
+    station = build_analytic("drive_friction=false", "simulation.fused=false")
+    assert sources(station.diagram)["plant", "actuation"] == ("hold", "held")
     assert "friction_torque" not in station.log.rows
 
 
@@ -127,8 +127,7 @@ def test_the_first_force_is_weight_and_proportional_part():
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    controller = station.controller
-    tau = controller.GetOutputPort("drive_torque").Eval(controller.GetMyContextFromRoot(root))
+    tau = station.controller.drive(station.blocks, root)
     q = station.initial_state[:3]
     y_t = station.robot.tool_position(q)
     theta = np.array([station.initial_place[0]])

@@ -77,7 +77,7 @@ def test_the_run_ends_and_keeps_its_log(tmp_path, capsys):
 def test_a_servo_alone_stops_the_run(settings, monkeypatch):
     settings.simulation.sensor_failure.time = 0.06
     station = build_station(settings, SCENARIO.parent)
-    monkeypatch.setattr(station.controller, "fault", lambda _: Fault.NONE)
+    monkeypatch.setattr(station.controller, "fault", lambda *_: Fault.NONE)
     result = simulate(station, settings.simulation, 2.0, lambda *_: None)
     assert result.fault.startswith("velocity_servo: a measured value is not a finite number: v_M_2")
     assert result.root.get_time() == pytest.approx(0.1, abs=1e-9)

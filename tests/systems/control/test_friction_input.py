@@ -65,7 +65,7 @@ def test_it_is_not_added_in_the_safe_state(bench):
 
 def test_friction_that_is_not_finite_is_a_fault(bench):
     bench.fix("friction_torque", np.array([0.0, np.nan, 0.0]))
-    assert bench.system.fault(bench.context) == Fault.INPUT_NOT_FINITE
+    assert bench.output("fault") == Fault.INPUT_NOT_FINITE
 
 
 def test_servos_overcome_friction_themselves(make_law):

@@ -6,6 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
 from pfsc_drake.control.law.supervision import SupervisionParameters
@@ -85,9 +86,9 @@ def test_without_a_reference_it_stops(bench, by):
     bench.set(reference=spoiled(VELOCITY, 2, by))
     assert bench.fault is Fault.INPUT_NOT_FINITE
     settings = SafeState(np.zeros(6))
-    stop = SafeStop(bench.chain, bench.limits, settings, PERIOD)
+    stop = Stepper(SafeStop(bench.chain, bench.limits, settings, PERIOD))
     state = np.concatenate([POSTURE, VELOCITY, POSTURE, VELOCITY])
-    expected = stop.drive(stop.start(state, state, np.zeros(24)), state)
+    expected = stop.step(joint_state=state, fault=1.0, suspects=np.zeros(24))["torque"]
     np.testing.assert_allclose(bench.torque, expected, atol=1e-9)
 
 

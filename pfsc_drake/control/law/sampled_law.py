@@ -1,0 +1,159 @@
+"""The following law from tick to tick."""
+
+from typing import Any
+
+import casadi as ca
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import where
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.following_law import FollowingLaw, LawLayout
+
+
+class SampledLaw(Block):
+    """A :class:`FollowingLaw` with what it remembers.
+
+    With the virtual output ``yhat`` and relative degree r the closed loop is
+    ``e^(r) + a_r e^(r-1) + ... + a_1 e + a_0 int e = 0``, ``e = yhat - yhat_p``.
+
+    The integral is held while a drive is at its limit. After a fault nothing is remembered any
+    more.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        manifold_point (input): Where on the manifold the tool is.
+        reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
+        tau_ext (input, optional): External joint torques and their derivatives up to order
+            r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
+            Only for r > 1.
+        friction_torque (input, optional): ``tau_f`` that the drives are to overcome besides
+            [Nm or N], shape (N,); zero if not connected. Only for r > 1.
+        posture_reference (input): Derivatives 0..r of the posture reference by rows, shape
+            ((r + 1) N,); only of a law for more joints than outputs.
+        stopping (input): Nonzero from a fault on, shape (1,); acts on what is remembered.
+        evaluation (output): Laid out by the law's ``layout``.
+        drive (output): Drive input within its limits, shape (N,).
+        manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
+        virtual_input (output): ``v``, shape (m,).
+        fault (output): The law's own, shape (1,).
+        input_fault (output): The same if an input is not finite, else 0, shape (1,).
+        reference_velocity (output): Joint velocities that the reference asked for at the last
+            tick, shape (N,) [rad/s or m/s], zero before; only of a law that tells them. It
+            depends on the state alone: what is told the law may depend on it.
+
+    State:
+        ``integral`` of the error, shape (m,); ``held``, the part of the drive input that is
+        extrapolated over the hold, shape (N,), and whether it is ``known``; virtual ``output`` of
+        the last tick, shape (m,); ``reference_velocity``, if the law tells it.
+
+    Args:
+        law: The law.
+        period: Sampling time [s].
+    """
+
+    def __init__(self, law: FollowingLaw, period: float) -> None:
+        self._law, self._period = law, period
+        linearization, layout = law.linearization, law.layout
+        n, m = linearization.num_joints, linearization.num_outputs
+        r = linearization.relative_degree
+        unit = "Nm or N" if r > 1 else "rad/s or m/s"
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "manifold_point": Port(linearization.manifold.layout.size),
+            "reference": Port((r + 1) * m, "m or rad, per s, .."),
+            "stopping": Port(1),
+        }
+        if r > 1:
+            self.inputs["tau_ext"] = Port((r - 1) * n, "Nm or N, per s, ..", optional=True)
+            self.inputs["friction_torque"] = Port(n, "Nm or N", optional=True)
+        if law.posture is not None:
+            self.inputs["posture_reference"] = Port((r + 1) * n, "rad or m, per s, ..")
+        self.outputs = {
+            "evaluation": Port(layout.size),
+            "drive": Port(n, unit),
+            "manifold_state": Port(r * m, "m or rad, per s, .."),
+            "virtual_input": Port(m),
+            "fault": Port(1),
+            "input_fault": Port(1),
+        }
+        self.states = {"integral": m, "held": n, "known": 1, "output": m}
+        self._tells_velocity = layout.reference_velocity.stop > layout.reference_velocity.start
+        if self._tells_velocity:
+            self.outputs["reference_velocity"] = Port(n, "rad/s or m/s")
+            self.states["reference_velocity"] = n
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        law, layout = self._law, self._law.layout
+        told = {
+            "state": u.joint_state,
+            "manifold_point": u.manifold_point,
+            "reference": u.reference,
+            "integral": x.integral,
+            "last_held": x.held,
+            "known": x.known,
+            "last_output": x.output,
+            "tau_ext": getattr(u, "tau_ext", None),
+            "friction": getattr(u, "friction_torque", None),
+            "posture": getattr(u, "posture_reference", None),
+        }
+        connected = {name: value for name, value in told.items() if value is not None}
+        result = law.function(**connected)["result"]
+        fault = result[layout.status.start]
+        outputs = {
+            "evaluation": result,
+            "drive": result[layout.drive],
+            "manifold_state": result[layout.manifold_state],
+            "virtual_input": result[layout.virtual_input],
+            "fault": fault,
+            "input_fault": where(fault == Fault.INPUT_NOT_FINITE, fault, Fault.NONE),
+        }
+        if self._tells_velocity:
+            outputs["reference_velocity"] = x.reference_velocity
+        return outputs
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        law, layout = self._law, self._law.layout
+        m = x.output.shape[0]
+        output, saturated = y.manifold_state[:m], y.evaluation[layout.status.stop - 1]
+        # where the point moves with time, the virtual output is the error
+        follows_time = law.linearization.manifold.follows_time
+        error = output if follows_time else output - u.reference[:m]
+        later = {
+            "held": y.evaluation[layout.held],
+            "known": ca.DM(1),
+            "output": output,
+        }
+        if law.stabilization.has_integral_part:
+            later["integral"] = x.integral + where(saturated, 0.0, self._period * error)
+        if self._tells_velocity:
+            later["reference_velocity"] = y.evaluation[layout.reference_velocity]
+        return {name: where(u.stopping, getattr(x, name), new) for name, new in later.items()}
+
+
+class LawReport(Block):
+    """What a tick came to, for logs: a law's result with the fault and what drives were told.
+
+    Ports:
+        evaluation (input): Laid out by the law's ``layout``.
+        fault (input): What stops the robot, if anything, shape (1,).
+        told (input): What the drives are told, shape (N,).
+        law (output): The evaluation with both of them in their places.
+        status (output): ``[fault, rcond, saturated drives]``, shape (3,).
+
+    Args:
+        layout: Of the result.
+    """
+
+    def __init__(self, layout: LawLayout) -> None:
+        self._layout, drives = layout, layout.drive.stop - layout.drive.start
+        self.inputs = {"evaluation": Port(layout.size), "fault": Port(1), "told": Port(drives)}
+        self.outputs, self.states = {"law": Port(layout.size), "status": Port(3)}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        status = self._layout.status
+        between = u.evaluation[self._layout.drive.stop : status.start]
+        law = ca.vertcat(u.told, between, u.fault, u.evaluation[status.start + 1 :])
+        return {"law": law, "status": law[status]}
