@@ -14,7 +14,7 @@ from diagrams.tasks.guidance import add_guidance
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.swing import SwingingReference
+from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.errors import InputError
@@ -26,7 +26,6 @@ from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 from pfsc_drake.systems.control.smooth_start import SmoothStart
-from pfsc_drake.systems.control.swinging_manifold import SwingingManifold
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 # what guidance tells, for the log
@@ -115,6 +114,7 @@ def _swung(
     if not swings:
         return desired
     manifold, m = linearization.manifold, linearization.num_outputs
+    period = following.scenario.controller.sampling_time
     allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
     require(not manifold.follows_time, "reference.swings", f"{len(swings)} given", allowed)
     across = indices(manifold.coordinates, Kind.TRANSVERSAL)
@@ -123,9 +123,10 @@ def _swung(
     except InputError as error:
         raise InputError(f"reference.{error}") from None
     system = builder.AddNamedSystem(
-        "swinging_manifold", SwingingManifold(swinging, (order + 1) * m)
+        "swinging_manifold",
+        BlockSystem(SwingingManifold(swinging, (order + 1) * m, period), period),
     )
-    builder.Connect(desired, system.GetInputPort("reference"))
+    builder.Connect(desired, system.GetInputPort("desired_reference"))
     return system.GetOutputPort("reference")
 
 

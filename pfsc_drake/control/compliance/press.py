@@ -4,6 +4,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import casadi as ca
+
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.control.law.transition import Transition
 from pfsc_drake.errors import InputError
 
@@ -97,11 +100,12 @@ class PressParameters:
             Function of the time, of the time of touch-down, infinite before it, and of how far the
             tool is from where it was when it began to be taken off, [s], [s], [m] -> [N].
         """
-        rest, off = Transition(self.ramp, 0), self.taken_off(end)
+        since, off = ca.SX.sym("since"), self.taken_off(end)
+        rest = PlainFunction(ca.Function("rest", [since], [Transition(self.ramp, 0).at(since)]))
         stiffness = min(2.0 * self.retreat / self.clearance, stiffest)
 
         def change(time: float, begin: float) -> float:
-            return float(1.0 - rest.at(time - begin)[0])
+            return 1.0 - rest(time - begin)[0]
 
         def force(time: float, touch_down: float, lifted: float) -> float:
             pressed = self.approach * change(time, self.begin)

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
+import casadi as ca
 
+from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.law.transition import Transition
 from pfsc_drake.errors import InputError
 
@@ -68,29 +70,51 @@ class SwingingReference:
                 )
         self._swings, self._first = tuple(swings), first
         self._rises = [Transition(swing.ramp, order) for swing in swings]
-        self._shape, self._order = (order + 1, outputs), order
+        self._outputs, self._order = outputs, order
 
-    def at(self, time: float) -> np.ndarray:
+    def at(self, time: Any) -> Any:
         """Return derivatives 0..r by rows, shape (r + 1, m) [m, m/s, ..].
 
         Args:
-            time: [s].
+            time: [s], number or expression.
         """
-        values = np.zeros(self._shape)
+        columns = [ca.DM.zeros(self._order + 1)] * self._outputs
         for swing, rise in zip(self._swings, self._rises, strict=True):
-            since = time - swing.begin
-            if since <= 0.0:
-                continue
+            since = ca.fmax(time - swing.begin, 0.0)
             omega = 2.0 * math.pi * swing.frequency
-            s = -rise.at(since)
-            s[0] += 1.0
+            left = ca.vertsplit(rise.at(since))
+            s = [1.0 - left[0], *(-rate for rate in left[1:])]
+            sine = [
+                omega**k * ca.sin(omega * since + k * math.pi / 2.0) for k in range(self._order + 1)
+            ]
+            product = [  # Leibniz
+                sum(math.comb(k, i) * s[i] * sine[k - i] for i in range(k + 1))
+                for k in range(self._order + 1)
+            ]
             column = self._first + swing.coordinate - 1
-            for k in range(self._order + 1):  # Leibniz
-                values[k, column] += swing.amplitude * sum(
-                    math.comb(k, i)
-                    * s[i]
-                    * omega ** (k - i)
-                    * math.sin(omega * since + (k - i) * math.pi / 2.0)
-                    for i in range(k + 1)
-                )
-        return values
+            columns[column] = columns[column] + swing.amplitude * ca.vertcat(*product)
+        return ca.horzcat(*columns)
+
+
+class SwingingManifold(Block):
+    """Adds swings to a reference.
+
+    Ports:
+        desired_reference (input): Derivatives 0..r of m outputs by rows, shape ((r + 1) m,).
+        reference (output): The same with the swings, shape ((r + 1) m,).
+
+    Args:
+        swings: What is added.
+        size: (r + 1) m.
+        period: Sampling time [s].
+    """
+
+    def __init__(self, swings: SwingingReference, size: int, period: float) -> None:
+        self._swings, self._period = swings, period
+        self.inputs, self.states = {"desired_reference": Port(size)}, {}
+        self.outputs = {"reference": Port(size)}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        swings = self._swings.at(t * self._period)
+        return {"reference": u.desired_reference + ca.vec(swings.T)}

@@ -1,12 +1,15 @@
 """A start without a jump: the reference starts where the tool is and goes over to its own."""
 
+from typing import Any
+
+import casadi as ca
 import numpy as np
 
 from pfsc_drake.errors import InputError
 
 # from 0 to 1 on a unit interval with four derivatives that vanish at both ends, so that the
 # reference of the elastic law, which needs four (3.67), is steady
-RISE = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
+_STEP = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
 _HIGHEST_ORDER = 4
 
 
@@ -34,20 +37,22 @@ class Transition:
         if not 0 <= order <= _HIGHEST_ORDER:
             raise InputError(f"transition: order {order}; must be 0 to {_HIGHEST_ORDER}")
         self.duration, self.order = duration, order
-        rest = 1.0 - RISE
-        derivatives = [rest.deriv(k).coef if k else rest.coef for k in range(order + 1)]
-        # column k holds the k-th derivative's coefficients, in real time
-        self._coefficients = np.zeros((rest.coef.size, order + 1))
-        for k, coefficients in enumerate(derivatives):
-            self._coefficients[: coefficients.size, k] = coefficients
-        self._coefficients /= duration ** np.arange(order + 1)
-        self._powers = np.arange(rest.coef.size)
+        rest = 1.0 - _STEP
+        # row k holds the coefficients of the k-th derivative, in real time
+        self._coefficients = np.zeros((order + 1, rest.coef.size))
+        for k in range(order + 1):
+            derivative = rest.deriv(k).coef if k else rest.coef
+            self._coefficients[k, : derivative.size] = derivative / duration**k
 
-    def at(self, time: float) -> np.ndarray:
+    def at(self, time: Any) -> Any:
         """Return ``s`` and its derivatives, shape (order + 1,) [1, 1/s, ..].
 
         Args:
-            time: Since the start [s]; earlier is the start, later than the duration its end.
+            time: Since the start [s], number or expression; earlier is the start, later than the
+                duration its end.
         """
-        x = min(max(time / self.duration, 0.0), 1.0)
-        return x**self._powers @ self._coefficients
+        x = ca.fmin(ca.fmax(time / self.duration, 0.0), 1.0)
+        s = ca.DM.zeros(self.order + 1)
+        for coefficients in reversed(self._coefficients.T):
+            s = s * x + ca.DM(coefficients)
+        return s

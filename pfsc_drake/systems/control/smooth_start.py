@@ -1,5 +1,6 @@
 """A reference that starts where the tool is."""
 
+import casadi as ca
 import numpy as np
 from pydrake.systems.framework import (
     Context,
@@ -11,6 +12,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import Adder
 
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.control.law.transition import Transition
 
 
@@ -74,7 +76,9 @@ class _Distance(LeafSystem):
         self, transition: Transition, num_outputs: int, state_size: int, period: float
     ) -> None:
         super().__init__()
-        self._transition, self._m, self._period = transition, num_outputs, period
+        self._m, self._period, self._duration = num_outputs, period, transition.duration
+        elapsed = ca.SX.sym("elapsed")
+        self._rest = PlainFunction(ca.Function("rest", [elapsed], [transition.at(elapsed)]))
         size = (transition.order + 1) * num_outputs
         self._left = self.DeclareDiscreteState(size)
         self._start = self.DeclareDiscreteState(num_outputs + 1)
@@ -97,10 +101,10 @@ class _Distance(LeafSystem):
         # a product as in Drake's own schedule, so that it is the time of the tick to the last bit
         tick = (round(context.get_time() / self._period) + 1) * self._period
         elapsed = tick - start.item(self._m)
-        if elapsed < self._transition.duration:
+        if elapsed < self._duration:
             state.set_value(self._left, self._left_at(elapsed, start[:-1]))
         else:
             state.get_mutable_value(self._left).fill(0.0)
 
     def _left_at(self, elapsed: float, distance: np.ndarray) -> np.ndarray:
-        return np.outer(self._transition.at(elapsed), distance).ravel()
+        return np.outer(self._rest(elapsed), distance).ravel()
