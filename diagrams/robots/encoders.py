@@ -4,9 +4,10 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.physics.sensor_failure import SensorFailure
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.physics.joint_encoders import EncoderOptions, JointEncoders
-from pfsc_drake.systems.physics.sensor_failure import SensorFailure
+from pfsc_drake.systems.block_system import BlockSystem
 
 
 def add_joint_state(
@@ -39,9 +40,10 @@ def add_joint_state(
     indices, period = [failure.component], scenario.controller.sampling_time
     if failure.whole_joint:
         indices = list(range(failure.component % robot.dimension, size, robot.dimension))
+    failing = SensorFailure(size, indices, failure.time, period, failure.kind, failure.size)
     broken = builder.AddNamedSystem(
         "sensor_failure",
-        SensorFailure(size, indices, failure.time, period, failure.kind, failure.size),
+        BlockSystem(failing, period),
     )
     builder.Connect(measured, broken.GetInputPort("measured"))
     return broken.GetOutputPort("delivered")
@@ -77,6 +79,7 @@ def _add_imperfection(
     period = scenario.controller.sampling_time
     if scenario.controller.law == "velocity_servo":
         period = scenario.servo.period or period
-    real = builder.AddNamedSystem("encoder_increments", JointEncoders(robot, options, period))
+    encoders = JointEncoders(robot, options, period)
+    real = builder.AddNamedSystem("encoder_increments", BlockSystem(encoders, period))
     builder.Connect(joint_state, real.GetInputPort("joint_state"))
     return real.GetOutputPort("joint_state")

@@ -7,9 +7,10 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.sensor_failure import SensorFailure
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
-from pfsc_drake.systems.physics.sensor_failure import SensorFailure
 
 # of a sampling interval
 _ROUNDING = 1e-6
@@ -73,9 +74,10 @@ def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> O
             f"{size - 1}"
         )
     indices = list(range(size)) if failure.whole_joint else [failure.component]
+    failing = SensorFailure(size, indices, failure.time, period, failure.kind, failure.size)
     broken = builder.AddNamedSystem(
         "force_sensor_failure",
-        SensorFailure(size, indices, failure.time, period, failure.kind, failure.size),
+        BlockSystem(failing, period),
     )
     builder.Connect(reading, broken.GetInputPort("measured"))
     return broken.GetOutputPort("delivered")

@@ -30,8 +30,8 @@ from pfsc_drake.following.options.faults import FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.physics.link_hand import LinkHandParameters
-from pfsc_drake.systems.physics.joint_encoders import EncoderOptions
 
 
 @dc.dataclass

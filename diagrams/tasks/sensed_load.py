@@ -13,8 +13,8 @@ from pfsc_drake.control.compliance.tool_load import TARING_BLOCK, ToolLoad
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.physics.joint_encoders import encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.physics.joint_encoders import encoder_resolution
 
 # of the inertia below the sensor at which the loop becomes unstable, up to which it is robust
 _ROBUST = 0.5

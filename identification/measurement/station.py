@@ -19,8 +19,9 @@ from identification.measurement.servo import Servo, drive_inertia
 from identification.measurement.sources import add_curves, add_samples, add_signs, add_sum
 from identification.model.subject import Subject
 from pfsc_drake.physics.friction import bristles_for_step
+from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
-from pfsc_drake.systems.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 from pfsc_drake.systems.plants.rigid_plant import RigidPlant
@@ -155,9 +156,8 @@ def _add_encoders(
     same = PlantCoordinates(size, np.eye(size), np.eye(size), np.arange(n))
     increments = faults.encoder_increments.tolist()
     options = EncoderOptions(increments, increments, difference_quotient=True)
-    encoders = builder.AddNamedSystem(
-        "encoders", JointEncoders(subject.robot, options, servo.period)
-    )
+    block = JointEncoders(subject.robot, options, servo.period)
+    encoders = builder.AddNamedSystem("encoders", BlockSystem(block, servo.period))
     builder.Connect(joint_state_of(builder, state, same), encoders.GetInputPort("joint_state"))
     half = builder.AddNamedSystem("measured_state", MatrixGain(np.eye(size, 2 * size)))
     builder.Connect(encoders.GetOutputPort("joint_state"), half.get_input_port())

@@ -114,6 +114,8 @@ class Program:
             [_call(self.update, named), *outputs.values()],
             list(given),
             ["x_next", *outputs],
+            # an input and an output may be called the same
+            {"allow_duplicate_io_names": True},
         )
 
     def _grouped(self, order: list[Node], like: "Program | None") -> list[list[Node]]:

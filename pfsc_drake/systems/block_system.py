@@ -18,8 +18,8 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.blocks.block import Block
-from pfsc_drake.blocks.network import TICK, Network
-from pfsc_drake.blocks.program import Program, Stage
+from pfsc_drake.blocks.network import TICK, Network, Source
+from pfsc_drake.blocks.program import Needs, Program, Stage
 from pfsc_drake.compiled.bound_function import BoundFunction
 
 _ROUNDING = 1e-6  # of a period
@@ -130,7 +130,7 @@ class BlockSystem(LeafSystem):
             functions = self._program(context)
             stage = functions.program.stages[k]
             made = [(j, self._stages[j].Eval(context)) for j in stage.stages]
-            self._given(context, functions, stage.inputs)
+            self._given(context, functions, stage.inputs, stage.needs_at_start)
             for j, values in made:
                 functions.made[j][:] = values
             functions.stages[k].evaluate()
@@ -166,18 +166,37 @@ class BlockSystem(LeafSystem):
             self._programs[left] = _Functions(program)
         return self._programs[left]
 
-    def _given(self, context: Context, functions: "_Functions", inputs: Iterable[str]) -> None:
+    def _given(
+        self,
+        context: Context,
+        functions: "_Functions",
+        inputs: Iterable[str],
+        needs_at_start: Needs | None = None,
+    ) -> None:
         """Write states, tick and inputs into the functions' arguments."""
         memory = context.get_discrete_state_vector().value()
-        functions.x[:] = (memory if memory[_STARTED] else self._begun(context))[self._x]
+        if not memory[_STARTED]:
+            memory = self._begun(context, needs_at_start)
+        functions.x[:] = memory[self._x]
         functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
         for name in inputs:
             functions.u[name][:] = self._inputs[name].Eval(context)
 
-    def _begun(self, context: Context) -> np.ndarray:
-        """Return the discrete state as it is at the start."""
+    def _begun(self, context: Context, needs: Needs | None = None) -> np.ndarray:
+        """Return the discrete state as it is at the start.
+
+        Args:
+            context: The system's own.
+            needs: Inputs to look at, where only states that depend on these are asked for: others
+                may come from what this system itself puts out.
+        """
         functions = self._program(context)
-        given = [self._inputs[name].Eval(context) for name in functions.program.initial_inputs]
+        names = functions.program.initial_inputs
+        wanted = [needs is None or Source("input", name) in needs for name in names]
+        given = [
+            self._inputs[name].Eval(context) if is_wanted else np.nan
+            for name, is_wanted in zip(names, wanted, strict=True)
+        ]
         for name, value in zip(functions.program.initial_inputs, given, strict=True):
             functions.u[name][:] = value
         before = context.get_discrete_state_vector().value()

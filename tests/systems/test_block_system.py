@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
+from pydrake.systems.primitives import ConstantVectorSource, Gain, LogVectorOutput
 
 from pfsc_drake.blocks.block import Block, Port
+from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -97,6 +98,38 @@ def test_a_state_that_was_set_is_kept_at_the_start_and_forgotten_at_the_next():
     context.SetTime(0.0)
     simulator.Initialize()
     assert system.state(context, "value")[0] == 2.0
+
+
+class Sum(Block):
+    """``y = x + u``, ``x`` being the first input."""
+
+    def __init__(self):
+        self.inputs, self.outputs, self.states = {"u": Port(1)}, {"y": Port(1)}, {"x": 1}
+
+    def initial(self, u, t):
+        return {"x": u.u}
+
+    def output(self, x, u, t):
+        return {"y": x.x + u.u}
+
+
+def test_a_start_may_follow_from_what_the_system_itself_puts_out():
+    """By way of another system, as where blocks are one system and another is none."""
+    builder = DiagramBuilder()
+    wiring = Wiring(
+        {name: Network.of(Sum()) for name in ("one", "two")},
+        {("one", "u"): "a", ("two", "u"): "b"},
+        {"x": ("one", "y"), "y": ("two", "y")},
+    )
+    sums = builder.AddSystem(BlockSystem(wiring.network(), PERIOD))
+    source, gain = builder.AddSystem(ConstantVectorSource([7.0])), builder.AddSystem(Gain(2.0, 1))
+    builder.Connect(source.get_output_port(), sums.GetInputPort("a"))
+    builder.Connect(sums.GetOutputPort("x"), gain.get_input_port())
+    builder.Connect(gain.get_output_port(), sums.GetInputPort("b"))
+    simulator = Simulator(builder.Build())
+    simulator.Initialize()
+    context = sums.GetMyContextFromRoot(simulator.get_context())
+    assert (sums.state(context, "one.x")[0], sums.state(context, "two.x")[0]) == (7.0, 28.0)
 
 
 def test_a_context_can_be_started_without_a_simulation():

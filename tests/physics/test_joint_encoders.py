@@ -6,10 +6,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
-from pfsc_drake.systems.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.systems.block_system import BlockSystem
 
 T = 1e-3
 EYE, ZERO, Z = np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -39,7 +41,7 @@ def measure(options, duration=0.2, start=0.0):
     """Return times and measured joint states of the motion."""
     builder = DiagramBuilder()
     motion = builder.AddSystem(Motion())
-    encoders = builder.AddSystem(JointEncoders(CHAIN, options, T))
+    encoders = builder.AddSystem(BlockSystem(JointEncoders(CHAIN, options, T), T))
     builder.Connect(motion.get_output_port(), encoders.GetInputPort("joint_state"))
     sink = LogVectorOutput(encoders.GetOutputPort("joint_state"), builder, T)
     simulator = Simulator(builder.Build())
@@ -51,11 +53,9 @@ def measure(options, duration=0.2, start=0.0):
 
 def test_exact_without_options():
     encoders = JointEncoders(CHAIN, EncoderOptions(), T)
-    context = encoders.CreateDefaultContext()
-    assert context.num_total_states() == 0
+    assert not encoders.states
     state = np.random.default_rng(1).normal(size=8)
-    encoders.GetInputPort("joint_state").FixValue(context, state)
-    assert np.array_equal(encoders.GetOutputPort("joint_state").Eval(context), state)
+    assert np.array_equal(Stepper(encoders).step(joint_state=state)["joint_state"], state)
 
 
 def test_resolution():
@@ -70,6 +70,17 @@ def test_resolution():
     assert 0.0 < np.max(error[:, 4]) <= np.pi / 1e5 + 1e-12
     # velocities and the motor encoder without resolution are exact
     assert np.array_equal(measured[:, [2, 3, 5, 6, 7]], true[:, [2, 3, 5, 6, 7]])
+
+
+def test_halves_are_rounded_to_even():
+    """As numpy does."""
+    encoders = Stepper(JointEncoders(CHAIN, EncoderOptions([0.0, 1.0], [1.0]), T))
+    random = np.random.default_rng(0)
+    for x in [*np.arange(-3.5, 4.0, 0.5), 0.49999999999999994, 1e17 + 2.0, *random.normal(size=9)]:
+        state = np.array([0.3, x, 0.0, 0.0, x * 2.0 * np.pi, -x, 0.0, 0.0])
+        q_J, q_M = encoders.step(joint_state=state)["joint_state"].reshape(4, 2)[[0, 2]]
+        assert q_J.tolist() == [0.3, np.rint(x)]
+        assert q_M[1] == np.rint(-x)
 
 
 @pytest.mark.parametrize("increments", [[], [5000.0]])

@@ -6,7 +6,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.systems.physics.sensor_failure import SensorFailure
+from pfsc_drake.physics.sensor_failure import SensorFailure
+from pfsc_drake.systems.block_system import BlockSystem
 
 T = 1e-3
 
@@ -29,7 +30,7 @@ class Clock(LeafSystem):
 def test_kinds(kind, wrong):
     builder = DiagramBuilder()
     clock = builder.AddSystem(Clock())
-    failure = builder.AddSystem(SensorFailure(3, [1], 2.5 * T, T, kind, 0.5))
+    failure = builder.AddSystem(BlockSystem(SensorFailure(3, [1], 2.5 * T, T, kind, 0.5), T))
     builder.Connect(clock.get_output_port(), failure.get_input_port())
     simulator = Simulator(builder.Build())
     simulator.Initialize()

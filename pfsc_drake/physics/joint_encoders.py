@@ -1,15 +1,15 @@
 """Position encoders of the joints and of the motors."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import casadi as ca
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import where
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-
-# part of a period by which a tick may come early
-_ROUNDING = 1e-6
 
 
 @dataclass
@@ -35,7 +35,7 @@ class EncoderOptions:
     filter_time: float = 0.0
 
 
-class JointEncoders(LeafSystem):
+class JointEncoders(Block):
     """Measures the joint state by encoders, without delay.
 
     A position is ``r round(q / r)`` with the resolution ``r = 2 pi / increments`` [rad] or
@@ -52,8 +52,8 @@ class JointEncoders(LeafSystem):
         joint_state (output): The same as measured, shape (4N,).
 
     State:
-        With difference quotients only, discrete: ``[q_J, v_J, q_M, v_M]`` as measured at
-        the last tick and its time [s], shape (4N + 1,).
+        With difference quotients only: ``measured`` at the last ``tick``, and which that was;
+        before the first, which may come less than a period after the start, that at the start.
 
     Args:
         robot: The robot, N joints.
@@ -65,57 +65,58 @@ class JointEncoders(LeafSystem):
     """
 
     def __init__(self, robot: RobotModel, options: EncoderOptions, period: float) -> None:
-        super().__init__()
-        self._period, n = period, robot.dimension
+        n = robot.dimension
         if not 0.0 < period < np.inf:
             raise InputError(f"encoders: period = {period!r} s; must be positive and finite")
         if not 0.0 <= options.filter_time < np.inf:
             raise InputError(
                 f"encoders: filter_time = {options.filter_time!r} s; must be finite, not negative"
             )
-        resolution = np.zeros((2, 2, n))
-        resolution[:, 0] = encoder_resolution(robot, options)
-        self._counted = np.flatnonzero(resolution)
-        self._resolution, self._shape = resolution.ravel()[self._counted], resolution.shape
+        self._size, self._period, self._differs = n, period, options.difference_quotient
+        self._resolution = encoder_resolution(robot, options)
         time_constant = options.filter_time
         self._weight = 1.0 - np.exp(-period / time_constant) if time_constant else 1.0
-        self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
-        sources = {self._joint_state.ticket()}
-        if options.difference_quotient:
-            memory = self.DeclareDiscreteState(4 * n + 1)
-            sources |= {self.discrete_state_ticket(memory), self.time_ticket()}
-            self.DeclareInitializationDiscreteUpdateEvent(self._start)
-            self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
-        self._has_memory = options.difference_quotient
-        self._measured = self.DeclareVectorOutputPort(
-            "joint_state", 4 * n, self._calc_measured, prerequisites_of_calc=sources
-        )
+        self.inputs = {"joint_state": Port(4 * n, "rad, rad/s or m, m/s")}
+        self.outputs = {"joint_state": Port(4 * n, "rad, rad/s or m, m/s")}
+        self.states = {"measured": 4 * n, "tick": 1} if self._differs else {}
 
-    def _quantize(self, state: np.ndarray) -> np.ndarray:
-        measured = state.copy()
-        r = self._resolution
-        measured[self._counted] = r * np.rint(state[self._counted] / r)
-        return measured
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        if not self._differs:
+            return {}
+        return {"measured": ca.vertcat(*self._quantized(u)), "tick": np.inf}
 
-    def _calc_measured(self, context: Context, output: BasicVector) -> None:
-        measured = self._quantize(self._joint_state.Eval(context))
-        if self._has_memory:
-            memory = context.get_discrete_state_vector().value()
-            now, last = measured.reshape(self._shape), memory[:-1].reshape(self._shape)
-            velocity = last[:, 1]
-            if context.get_time() - memory.item(-1) > self._period * (1.0 - _ROUNDING):
-                quotient = (now[:, 0] - last[:, 0]) / self._period
-                velocity = velocity + self._weight * (quotient - velocity)
-            now[:, 1] = velocity
-        output.SetFromVector(measured)
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        q_J, v_J, q_M, v_M = self._quantized(u)
+        if self._differs:
+            before = ca.vertsplit(x.measured, self._size)
+            v_J, v_M = (
+                self._velocity(x, t, q_J, *before[:2]),
+                self._velocity(x, t, q_M, *before[2:]),
+            )
+        return {"joint_state": ca.vertcat(q_J, v_J, q_M, v_M)}
 
-    def _start(self, context: Context, state: DiscreteValues) -> EventStatus:
-        measured = self._quantize(self._joint_state.Eval(context))
-        state.set_value(np.append(measured, context.get_time()))
-        return EventStatus.Succeeded()
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"measured": y.joint_state, "tick": t} if self._differs else {}
 
-    def _remember(self, context: Context, state: DiscreteValues) -> None:
-        state.set_value(np.append(self._measured.Eval(context), context.get_time()))
+    def _velocity(self, x: Values, t: Any, q: Any, q_before: Any, v_before: Any) -> Any:
+        quotient = (q - q_before) / self._period
+        return where(t > x.tick, v_before + self._weight * (quotient - v_before), v_before)
+
+    def _quantized(self, u: Values) -> tuple[Any, Any, Any, Any]:
+        """Return ``q_J`` and ``q_M`` in whole steps, with their velocities."""
+        q_J, v_J, q_M, v_M = ca.vertsplit(u.joint_state, self._size)
+        return _in_steps(q_J, self._resolution[0]), v_J, _in_steps(q_M, self._resolution[1]), v_M
+
+
+def _in_steps(q: Any, resolution: np.ndarray) -> Any:
+    """Return the nearest multiples of steps, where these are not zero."""
+    counted, steps = ca.DM(resolution > 0.0), ca.DM(np.where(resolution > 0.0, resolution, 1.0))
+    number = q / steps
+    # rounded to the nearest, of two to the even one
+    return where(counted, steps * (number - ca.remainder(number, 1.0)), q)
 
 
 def encoder_resolution(robot: RobotModel, options: EncoderOptions) -> np.ndarray:
