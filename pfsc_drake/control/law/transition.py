@@ -41,7 +41,7 @@ class Transition:
         # row k holds the coefficients of the k-th derivative, in real time
         self._coefficients = np.zeros((order + 1, rest.coef.size))
         for k in range(order + 1):
-            derivative = rest.deriv(k).coef if k else rest.coef
+            derivative = np.asarray((rest.deriv(k) if k else rest).coef, dtype=float)
             self._coefficients[k, : derivative.size] = derivative / duration**k
 
     def at(self, time: Any) -> Any:
