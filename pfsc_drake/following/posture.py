@@ -26,6 +26,8 @@ from pfsc_drake.systems.control.posture_reference import PostureReference
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs
 _SPEED_SHARE = 0.8
+# what it leaves to the ends of joints [rad or m]
+_END_MARGIN = 0.02
 
 
 def make_posture(
@@ -53,7 +55,9 @@ def make_posture(
             raise InputError(f"{_KEY}.task = elbow needs a start of the robot")
         coordinate = _swivel(parameters, robot, rest().q_J)
     speeds = _SPEED_SHARE * largest_speeds(robot)
-    return Posture(gains, _weight(parameters, robot), coordinate, speeds)
+    low, high = robot.gather("position_limits").T
+    ends = np.array([low + _END_MARGIN, high - _END_MARGIN])
+    return Posture(gains, _weight(parameters, robot), coordinate, speeds, ends)
 
 
 def _weight(parameters: PostureParameters, robot: RobotModel) -> np.ndarray | None:

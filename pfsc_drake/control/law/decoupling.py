@@ -22,12 +22,15 @@ class Restraint(NamedTuple):
         velocity: Of the joints, shape (N,); None where the highest derivative is one.
         settling: ``a_2``: in the end joints move with ``(x - rest) / a_2``.
         speeds: Largest of the joints, shape (N,), infinite for any.
+        to_ends: Largest upwards and downwards with which they come to rest before their ends,
+            shape (N, 2); None for any.
     """
 
     rest: ca.SX
     velocity: ca.SX | None
     settling: float
     speeds: np.ndarray
+    to_ends: ca.SX | None = None
 
 
 class Spare(NamedTuple):
@@ -86,8 +89,9 @@ class DecouplingInverse:
     Restraint: with ``x_0`` the solution by which joints come to rest as far as the outputs let
     them, everything else ends in joint velocities ``u = (x - x_0) / a_2`` beside those ``q_y'``
     that the outputs take. What is used is ``x_0 + s (x - x_0)`` with the largest ``s <= 1`` for
-    which ``|q_y'| + s |u|`` stays below every joint's largest speed. So a posture far away, or a
-    coordinate that hardly moves alone, asks for no more than joints can do.
+    which ``|q_y'| + s |u|`` stays below every joint's largest speed, and ``q_y' + s u`` below that
+    with which a joint comes to rest before its end, unless the outputs alone take more. So a
+    posture far away, or a coordinate that hardly moves alone, asks for no more than joints can do.
 
     Damping: where the reciprocal condition number c is below ``damped_below = c_0``, the system
     is solved with ``A W^-1 A' + lambda^2 I``, ``lambda^2 = (c_0^2 - c^2) |A S|^2`` (Frobenius),
@@ -229,9 +233,13 @@ def _restrained(Q: ca.SX, y: ca.SX, spare: Spare) -> tuple[ca.SX, ca.SX | None, 
         return x, None, ca.SX(1)
     others = y[:, 1:] if spare.scale is None else spare.scale @ y[:, 1:]
     rest = restraint.rest + others[:, 0]
-    taken = ca.fabs(rest if restraint.velocity is None else others[:, 1])
+    taken = rest if restraint.velocity is None else others[:, 1]
     beyond = ca.fabs(x - rest) / restraint.settling
-    left = ca.fmax(restraint.speeds - taken, 0.0)
+    left = restraint.speeds - ca.fabs(taken)
+    if restraint.to_ends is not None:
+        up, down = ca.horzsplit(restraint.to_ends)
+        left = ca.fmin(left, where(x > rest, up - taken, down + taken))
+    left = ca.fmax(left, 0.0)
     fast = beyond > left
     share = ca.mmin(where(fast, left / where(fast, beyond, 1.0), 1.0))
     return where(share < 1.0, rest + share * (x - rest), x), rest, share

@@ -163,7 +163,8 @@ def spare_of(posture: Posture, robot: RobotModel, aim: Aim, reference: ca.SX) ->
     )
     if posture.speeds is not None:
         velocity = aim.motion[:, 1] if aim.motion.shape[1] > 1 else None
-        restraint = Restraint(wishes.rest, velocity, posture.settling, posture.speeds)
+        to_ends = posture.to_ends(aim.motion[:, 0])
+        restraint = Restraint(wishes.rest, velocity, posture.settling, posture.speeds, to_ends)
     scale = posture.scale
     scale = scale_of(wishes.weight) if wishes.weight.numel() else scale
     if not wishes.slope.numel():

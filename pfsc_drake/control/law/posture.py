@@ -19,6 +19,8 @@ PostureCoordinate = Callable[[Sequence[Jet]], Jet]
 
 # rad, the range of a joint without limits
 _WHOLE_TURN = 2.0 * np.pi
+# s, with which joints come to rest at their ends
+_TO_END = 0.1
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Posture:
         coordinate: What else is to be kept; None for nothing.
         speeds: How fast joints may become by all of this together with what the outputs take of
             them, shape (N,), infinite for any; None to hold nothing back.
+        ends: Lowest and highest joint coordinates to which they may be led, shape (2, N); None for
+            any.
 
     Raises:
         InputError: If a weight is not positive, or is not one per joint.
@@ -49,6 +53,7 @@ class Posture:
     weight: np.ndarray | None
     coordinate: PostureCoordinate | None = None
     speeds: np.ndarray | None = None
+    ends: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         n, weight = self.stabilization.proportional.shape[1], self.weight
@@ -63,6 +68,20 @@ class Posture:
         """
         gains = self.stabilization.proportional
         return float(gains[1][0]) if len(gains) > 1 else 1.0
+
+    def to_ends(self, q: ca.SX) -> ca.SX | None:
+        """Return how fast joints may go upwards and downwards in view of their ends.
+
+        Args:
+            q: Joint coordinates, shape (N, 1).
+
+        Returns:
+            Shape (N, 2), or None for as fast as they like.
+        """
+        if self.ends is None:
+            return None
+        lowest, highest = self.ends
+        return ca.horzcat(highest - q, q - lowest) / _TO_END
 
     @property
     def scale(self) -> np.ndarray | None:

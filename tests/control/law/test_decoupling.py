@@ -34,7 +34,7 @@ def solve(inverse, A, rhs, spare=None):
             return inverse.solve(A, rhs)
         held = None
         if rest is not None:
-            held = Restraint(rest, velocity, spare.restraint.settling, spare.restraint.speeds)
+            held = Restraint(rest, velocity, *spare.restraint[2:])
         return inverse.solve(A, rhs, Spare(wish, scale, slope, rate, held))
 
     spare = spare or Spare(None, rate=None)
@@ -234,12 +234,21 @@ def test_damping_begins_above_the_limit(damped_below):
         DecouplingInverse(1e-3, damped_below)
 
 
-def held_back(settling, speeds, velocity=True, scale=None, slope=None, damped_below=0.0, seed=5):
+def held_back(
+    settling,
+    speeds,
+    velocity=True,
+    scale=None,
+    slope=None,
+    damped_below=0.0,
+    seed=5,
+    to_ends=None,
+):
     """Return matrix, right-hand side, velocity, spare motion, and the solution."""
     rng = np.random.default_rng(seed)
     A, rhs, wish = rng.normal(size=(4, 7)), rng.normal(size=4), 50.0 * rng.normal(size=7)
     v = rng.normal(size=7) if velocity else None
-    restraint = Restraint(-5.0 * v if velocity else np.zeros(7), v, settling, speeds)
+    restraint = Restraint(-5.0 * v if velocity else np.zeros(7), v, settling, speeds, to_ends)
     spare = Spare(wish, scale, slope, 30.0, restraint)
     return A, rhs, v, spare, solve(DecouplingInverse(damped_below=damped_below), A, rhs, spare)
 
@@ -274,6 +283,30 @@ def test_joints_become_as_fast_as_they_may_and_outputs_stay(velocity, scale):
 def test_outputs_that_need_all_the_speed_leave_none():
     _, _, _, _, solution = held_back(3.0, np.full(7, 1e-3))
     np.testing.assert_array_equal(solution.x, solution.rest)
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+def test_joints_come_to_rest_before_their_ends_and_outputs_stay(velocity):
+    settling, free = (3.0 if velocity else 1.0), np.full(7, np.inf)
+    A, rhs, v, _, far = held_back(settling, free, velocity)
+    asked = (far.x - far.rest) / settling
+    taken = np.linalg.pinv(A) @ (A @ v) if velocity else far.rest
+    for joint in range(7):
+        # 0.7 of what is asked, the way it goes, and at its end the other way
+        to_ends = np.full((7, 2), np.inf)
+        out, back = (0, 1) if asked[joint] > 0.0 else (1, 0)
+        to_ends[joint, out] = np.sign(asked[joint]) * taken[joint] + 0.7 * abs(asked[joint])
+        to_ends[joint, back] = -1.0
+        _, _, _, _, held = held_back(settling, free, velocity, to_ends=ca.SX(to_ends))
+        np.testing.assert_allclose(A @ held.x, rhs, atol=1e-12)
+        np.testing.assert_allclose(held.x - held.rest, 0.7 * (far.x - far.rest), atol=1e-10)
+        # past its end it is not led on, and not kept from going back
+        past = np.where(np.isfinite(to_ends), -100.0, np.inf)
+        _, _, _, _, held = held_back(settling, free, velocity, to_ends=ca.SX(past))
+        np.testing.assert_array_equal(held.x, held.rest)
+        past[joint, out] = np.inf
+        _, _, _, _, held = held_back(settling, free, velocity, to_ends=ca.SX(past))
+        np.testing.assert_allclose(held.x, far.x, rtol=1e-12)
 
 
 def test_what_damping_misses_is_told_of_joints_that_are_held_back():

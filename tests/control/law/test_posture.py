@@ -30,6 +30,17 @@ def test_a_coordinate_takes_the_shorter_way_round(chain, turns):
     assert float(asked.rate) == pytest.approx(-9.0 * 0.1 + 20.0 * 0.2, abs=1e-9)
 
 
+def test_how_fast_joints_may_go_to_their_ends():
+    own = Stabilization([gains_from_poles((-4.0, -5.0))] * N, 2, ["x"] * N)
+    ends = np.array([[-1.0, -2.0, -np.inf], [1.0, 0.5, np.inf]])
+    posture = Posture(own, np.ones(N), ends=ends)
+    q = ca.SX.sym("q", N)
+    found = np.array(ca.Function("f", [q], [posture.to_ends(q)])([0.5, 0.6, 7.0]))
+    # a tenth of a second from them, and back where they are passed
+    np.testing.assert_allclose(found, [[5.0, 15.0], [-1.0, 26.0], [np.inf, np.inf]], rtol=1e-12)
+    assert Posture(own, np.ones(N)).to_ends(q) is None
+
+
 def test_the_pull_from_the_limits_is_the_slope_of_the_potential(chain, position_path, make_law):
     """``V = sum h^2 (x^2 + x^4 / 2) / 2``, by differences; four times as stiff at a limit."""
     manifold = make_law(chain, "rigid", False).linearization.manifold
