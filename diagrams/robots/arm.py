@@ -38,9 +38,9 @@ from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
-from pfsc_drake.systems.physics.force_torque_sensor import reaction_index
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.joint_reaction import reaction_index
 from pfsc_drake.systems.plants.link_pushes import LinkPushes
 
 _ROUNDING = 1e-6  # m

@@ -3,14 +3,16 @@
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeDelay
 
-from diagrams.robots.part import RobotPart
+from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor
 from pfsc_drake.physics.sensor_failure import SensorFailure
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
-from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueSensor
+from pfsc_drake.systems.physics.sensor_noise import SensorNoise
+from pfsc_drake.systems.plants.joint_reaction import JointReaction
 
 # of a sampling interval
 _ROUNDING = 1e-6
@@ -39,10 +41,7 @@ def add_sensor(
     """
     parameters, period = scenario.sensor, scenario.controller.sampling_time
     mount = part.sensor_mount(builder, parameters.joint, ports)
-    sensor = builder.AddNamedSystem(
-        "force_torque_sensor", ForceTorqueSensor(parameters.transducer(), period, mount.index)
-    )
-    builder.Connect(mount.reaction, sensor.get_input_port())
+    sensor = _add_transducer(builder, mount, scenario)
     compensation = builder.AddNamedSystem(
         "tool_compensation",
         ToolCompensation(
@@ -53,13 +52,32 @@ def add_sensor(
             period,
         ),
     )
-    reading = _split(builder, "sensor_reading", sensor.GetOutputPort("measurement"), [6])[0]
-    reading = _delay(builder, _fail(builder, reading, scenario), scenario)
+    reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), scenario)
+    reading = _delay(builder, reading, scenario)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     whole = compensation.GetOutputPort("compensation")
     parts = _split(builder, "sensor_signals", whole, [6, 1, 1])
     return dict(zip(("wrench_measured", "tared", "sensor_fault"), parts, strict=True))
+
+
+def _add_transducer(builder: DiagramBuilder, mount: SensorMount, scenario: Scenario) -> BlockSystem:
+    """Add what the sensor itself makes of the load on it."""
+    parameters, period = scenario.sensor.transducer(), scenario.controller.sampling_time
+    block = ForceTorqueSensor(parameters, period)
+    sensor = builder.AddNamedSystem("force_torque_sensor", BlockSystem(block, period))
+    reaction = mount.reaction
+    if mount.index is not None:
+        joint = builder.AddNamedSystem("joint_reaction", JointReaction(mount.index))
+        builder.Connect(reaction, joint.get_input_port())
+        reaction = joint.get_output_port()
+    builder.Connect(reaction, sensor.GetInputPort("reaction"))
+    if parameters.noise.any():
+        noise = builder.AddNamedSystem(
+            "sensor_noise", SensorNoise(parameters.noise, parameters.seed, period)
+        )
+        builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
+    return sensor
 
 
 def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> OutputPort:

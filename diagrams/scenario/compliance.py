@@ -16,7 +16,7 @@ from pfsc_drake.control.compliance.still_components import STILL_TIME
 from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.following.options.compliance import ObservedForceParameters
-from pfsc_drake.systems.physics.force_torque_sensor import ForceTorqueParameters
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 
 SOURCES = ("sensor", "observed")
 # of what a hand feels: least and most mass, most damping, most stiffness, and their units

@@ -53,12 +53,12 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
 
 def _sensor(station: Station, root: Context) -> Callable[[], object]:
     """Return what makes the plant work out the forces in its joints, if they are measured."""
-    name = "force_torque_sensor"
+    name = "joint_reaction"
     if not station.diagram.HasSubsystemNamed(name):
         return lambda: None
-    sensor = station.diagram.GetSubsystemByName(name)
-    load, context = sensor.GetOutputPort("load"), sensor.GetMyContextFromRoot(root)
-    return lambda: load.Eval(context)
+    joint = station.diagram.GetSubsystemByName(name)
+    reaction, context = joint.get_output_port(), joint.GetMyContextFromRoot(root)
+    return lambda: reaction.Eval(context)
 
 
 def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:

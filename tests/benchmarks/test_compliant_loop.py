@@ -24,7 +24,7 @@ OUTPUTS = [
     ("path_projector", "manifold_point"),
     ("reference_generator", "reference"),
     ("following_controller", "law"),
-    ("force_torque_sensor", "measurement"),
+    ("force_torque_sensor", "measured_wrench"),
     ("tool_compensation", "compensation"),
     ("manifold_force_transform", "manifold_force"),
     ("impedance_filter", "reference"),

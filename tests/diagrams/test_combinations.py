@@ -94,8 +94,7 @@ def test_a_slide_that_is_not_measured_spoils_the_compensation_but_not_what_is_bo
     lost = times > 0.0505
     np.testing.assert_array_equal(log["sensor_fault"][:, 0] == SensorFault.LOST, lost)
     assert not log["wrench_measured"][lost].any()
-    sensor = station.diagram.GetSubsystemByName("force_torque_sensor")
-    load = sensor.GetOutputPort("load").Eval(sensor.GetMyContextFromRoot(root))
+    load = station.blocks.output(root, "force_torque_sensor.load")
     weight = station.robot.parameters.masses.load * 9.81
     assert np.linalg.norm(load[:3]) == pytest.approx(weight, rel=0.05)
 

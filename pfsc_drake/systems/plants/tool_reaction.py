@@ -4,7 +4,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.compliance.tool_load import ToolLoad
-from pfsc_drake.physics.transducer import tool_reaction_function
+from pfsc_drake.physics.tool_reaction import tool_reaction_function
 from pfsc_drake.robot.robot_model import RobotModel
 
 

@@ -7,65 +7,11 @@ import pytest
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.compliance.force_sensing import guarded_compensation
 from pfsc_drake.control.compliance.tool_load import SensorFault
-from pfsc_drake.control.estimation.low_pass import LowPass
-from pfsc_drake.physics.transducer import transducer_function
 
 RANGE = np.array([10.0, 20.0, 30.0, 1.0, 2.0, 3.0])
 BIAS = np.array([0.5, -0.5, 0.0, 0.1, 0.0, -0.1])
 STILL = 20  # samples
 NOISELESS = np.zeros(6)
-
-
-@pytest.fixture(name="transducer")
-def fixture_transducer():
-    low_pass = LowPass(150.0, 1e-3)
-    bound = BoundFunction(transducer_function(low_pass, BIAS, RANGE))
-
-    def step(load, state, noise=0.0):
-        # the tool pulls back, and Drake writes the torque first
-        bound.arguments["reaction"][:] = np.roll(np.multiply(load, -1.0), 3)
-        bound.arguments["state"][:], bound.arguments["noise"][:] = state, noise
-        bound.evaluate()
-        np.testing.assert_array_equal(bound.results["load"], load)
-        return bound.results["reading"].copy(), bound.results["next_state"].copy()
-
-    return low_pass, step
-
-
-def test_filter_bias_and_noise(transducer):
-    low_pass, step = transducer
-    rng = np.random.default_rng(0)
-    state = expected = low_pass.rest(rng.uniform(-0.3, 0.3, 6))
-    for _ in range(5):
-        load, noise = rng.uniform(-0.5, 0.5, (2, 6))
-        reading, state = step(load, state, noise)
-        filtered, expected = low_pass.output(expected, load), low_pass.update(expected, load)
-        np.testing.assert_allclose(reading, filtered + BIAS + noise, rtol=0, atol=1e-15)
-        np.testing.assert_allclose(state, expected, rtol=0, atol=1e-15)
-
-
-def test_it_starts_at_rest_component_by_component(transducer):
-    low_pass, step = transducer
-    load = np.arange(6.0) / 10.0
-    state = np.where(np.arange(6) < 3, np.nan, 0.0)
-    reading, after = step(load, state)
-    np.testing.assert_allclose(reading[:3], (load + BIAS)[:3], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(after[:3], low_pass.rest(load)[:3], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(after[3:], low_pass.update(np.zeros(3), load[3:]), atol=1e-15)
-
-
-def test_range_and_nan(transducer):
-    low_pass, step = transducer
-    for sign in (1.0, -1.0):
-        reading, _ = step(sign * 2.0 * RANGE, low_pass.rest(sign * 2.0 * RANGE))
-        np.testing.assert_array_equal(reading, sign * RANGE)
-    lost = np.where(np.arange(6) == 2, np.nan, 0.1)
-    reading, after = step(lost, np.zeros(6))
-    assert np.array_equal(np.isnan(reading), np.isnan(lost))
-    # and it goes on from the next load that is a number
-    reading, after = step(np.full(6, 0.2), after)
-    assert reading[2] == pytest.approx(0.2 + BIAS[2], abs=1e-15)
-    assert np.isfinite(after).all()
 
 
 def compensation():

@@ -130,8 +130,7 @@ def test_sensor_carries_the_load_of_the_robot():
     station.set_start(root)
     simulator.Initialize()
     simulator.AdvanceTo(0.018)
-    sensor = station.diagram.GetSubsystemByName("force_torque_sensor")
-    load_force = sensor.GetOutputPort("load").Eval(sensor.GetMyContextFromRoot(root))[:3]
+    load_force = station.blocks.output(root, "force_torque_sensor.load")[:3]
     # nearly at rest, before the taring ends: z_0 points down
     np.testing.assert_allclose(load_force, [0.0, 0.0, LOAD * GRAVITY], atol=0.1)
 

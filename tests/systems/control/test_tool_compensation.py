@@ -12,18 +12,16 @@ from pydrake.systems.primitives import LogVectorOutput, MatrixGain, ZeroOrderHol
 from pfsc_drake.control.compliance.tool_load import SensorFault, ToolCompensationParameters
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
 from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
-from pfsc_drake.systems.physics.force_torque_sensor import (
-    ForceTorqueParameters,
-    ForceTorqueSensor,
-    reaction_index,
-)
+from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.external_wrench import ExternalWrench
+from pfsc_drake.systems.plants.joint_reaction import JointReaction, reaction_index
 
 PERIOD = 1e-3
 MODELS = ["comau_racer_1_4", "comau_racer_1_4_elastic"]
@@ -94,7 +92,9 @@ def run(
     mover = builder.AddSystem(Mover(chain, np.full(6, amplitude), frequency))
     sensor = sensor or ForceTorqueParameters(noise=np.zeros(6))
     compensation = compensation or ToolCompensationParameters()
-    ft = builder.AddSystem(ForceTorqueSensor(sensor, PERIOD, reaction_index(plant, weld)))
+    ft = builder.AddSystem(BlockSystem(ForceTorqueSensor(sensor, PERIOD), PERIOD))
+    noise = builder.AddSystem(SensorNoise(sensor.noise, sensor.seed, PERIOD))
+    joint = builder.AddSystem(JointReaction(reaction_index(plant, weld)))
     tool_compensation = builder.AddSystem(
         ToolCompensation(
             chain,
@@ -114,7 +114,9 @@ def run(
     hold = builder.AddSystem(ZeroOrderHold(PERIOD, 6))
     connect(mover.get_output_port(), hold.get_input_port())
     connect(hold.get_output_port(), plant.get_actuation_input_port())
-    connect(plant.get_reaction_forces_output_port(), ft.GetInputPort("reaction_forces"))
+    connect(plant.get_reaction_forces_output_port(), joint.get_input_port())
+    connect(joint.get_output_port(), ft.GetInputPort("reaction"))
+    connect(noise.get_output_port(), ft.GetInputPort("noise"))
     connect(ft.GetOutputPort("measured_wrench"), tool_compensation.GetInputPort("measured_wrench"))
     connect(joint_state, tool_compensation.GetInputPort("joint_state"))
     connect(joint_state, external.GetInputPort("joint_state"))

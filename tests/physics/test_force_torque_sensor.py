@@ -12,15 +12,16 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
+from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.estimation.low_pass import LowPass
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.physics.force_torque_sensor import (
-    ForceTorqueParameters,
-    ForceTorqueSensor,
-    reaction_index,
-)
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.physics.sensor_noise import SensorNoise
+from pfsc_drake.systems.plants.joint_reaction import JointReaction, reaction_index
 
 PERIOD = 1e-3
 TOOL_MASS, TOOL_COM = 1.5, np.array([0.0, 0.0, 0.06])
@@ -65,12 +66,13 @@ def record(plant, parameters, load, duration):
     """Return the readings under a load given over time, shape (samples, 6)."""
     builder = DiagramBuilder()
     source = builder.AddSystem(Source(load))
-    sensor = builder.AddSystem(
-        ForceTorqueSensor(
-            parameters, PERIOD, reaction_index(plant, plant.GetJointByName("weld_tool"))
-        )
-    )
-    builder.Connect(source.get_output_port(), sensor.get_input_port())
+    index = reaction_index(plant, plant.GetJointByName("weld_tool"))
+    joint = builder.AddSystem(JointReaction(index))
+    sensor = builder.AddSystem(BlockSystem(ForceTorqueSensor(parameters, PERIOD), PERIOD))
+    noise = builder.AddSystem(SensorNoise(parameters.noise, parameters.seed, PERIOD))
+    builder.Connect(source.get_output_port(), joint.get_input_port())
+    builder.Connect(joint.get_output_port(), sensor.GetInputPort("reaction"))
+    builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
     log = LogVectorOutput(sensor.GetOutputPort("measured_wrench"), builder, PERIOD)
     diagram = builder.Build()
     simulator = Simulator(diagram)
@@ -113,13 +115,17 @@ def reading_at_rest(model, q, wrench=None):
     state = np.concatenate([q, np.zeros(6), q + weight / chain.K_s, np.zeros(6)])
     plant.SetPositionsAndVelocities(context, coordinates.plant_state(state))
     plant.get_actuation_input_port().FixValue(context, weight)
-    sensor = ForceTorqueSensor(
-        quiet(), PERIOD, reaction_index(plant, plant.GetJointByName("weld_tool"))
-    )
-    own = sensor.CreateDefaultContext()
-    sensor.get_input_port().FixValue(own, plant.get_reaction_forces_output_port().Eval(context))
     R_WS = tool.EvalPoseInWorld(context).rotation().matrix()
-    return sensor.GetOutputPort("measured_wrench").Eval(own), R_WS
+    return reading_of(plant, context, plant.GetJointByName("weld_tool")), R_WS
+
+
+def reading_of(plant, context, joint):
+    """Return the reading of a sensor in a joint, of a plant's context."""
+    reaction = JointReaction(reaction_index(plant, joint))
+    own = reaction.CreateDefaultContext()
+    reaction.get_input_port().FixValue(own, plant.get_reaction_forces_output_port().Eval(context))
+    sensor = Stepper(ForceTorqueSensor(quiet(), PERIOD))
+    return sensor.step(reaction=reaction.get_output_port().Eval(own))["measured_wrench"]
 
 
 @pytest.mark.parametrize("model", ["comau_racer_1_4", "comau_racer_1_4_elastic"])
@@ -164,19 +170,6 @@ def test_noise_is_the_seeds(rigid):
 
     assert np.array_equal(run(1), run(1))
     assert not np.any(np.isclose(run(1), run(2), rtol=0, atol=1e-9))
-
-
-def test_an_output_calculation_does_not_draw(rigid):
-    index = reaction_index(rigid, rigid.GetJointByName("weld_tool"))
-    sensor = ForceTorqueSensor(ForceTorqueParameters(), PERIOD, index)
-    context = sensor.CreateDefaultContext()
-    reactions = [SpatialForce.Zero()] * 8
-    values = []
-    for _ in range(3):
-        sensor.get_input_port().FixValue(context, reactions)
-        values.append(sensor.GetOutputPort("measured_wrench").Eval(context))
-    assert np.array_equal(values[0], values[1])
-    assert np.array_equal(values[0], values[2])
 
 
 @pytest.mark.parametrize("frequency", [5.0, 50.0, 100.0, 200.0])
@@ -224,18 +217,13 @@ def test_joints_removed_from_the_plant_do_not_shift_it():
     plant.Finalize()
     context = plant.CreateDefaultContext()
     for i, joint in enumerate(joints):
-        sensor = ForceTorqueSensor(quiet(), PERIOD, reaction_index(plant, joint))
-        own = sensor.CreateDefaultContext()
-        sensor.get_input_port().FixValue(own, plant.get_reaction_forces_output_port().Eval(context))
         weight = -9.81 * 2.0 * (3 - i)
-        assert sensor.GetOutputPort("measured_wrench").Eval(own)[2] == pytest.approx(
-            weight, abs=1e-10
-        )
+        assert reading_of(plant, context, joint)[2] == pytest.approx(weight, abs=1e-10)
 
 
 def test_a_moving_joint_is_refused(rigid):
     with pytest.raises(InputError, match=r"joint 'joint_6' .* 'revolute'; must be a fixed joint"):
-        ForceTorqueSensor(quiet(), PERIOD, reaction_index(rigid, rigid.GetJointByName("joint_6")))
+        reaction_index(rigid, rigid.GetJointByName("joint_6"))
 
 
 @pytest.mark.parametrize(
@@ -253,20 +241,58 @@ def test_parameters_out_of_range(key, value):
         ForceTorqueParameters(**{key: value})
 
 
-def test_the_measurement_holds_its_parts(rigid):
-    """Reading and load are the ports of that name; the filter takes over the rest."""
-    joint = rigid.GetJointByName("weld_tool")
-    sensor = ForceTorqueSensor(ForceTorqueParameters(seed=4), PERIOD, reaction_index(rigid, joint))
-    context, random = sensor.CreateDefaultContext(), np.random.default_rng(2)
-    for _ in range(3):
-        load = random.uniform(-5.0, 5.0, 6)
-        forces = [SpatialForce(tau=-load[3:], f=-load[:3])] * rigid.num_joints()
-        sensor.get_input_port().FixValue(context, forces)
-        whole = sensor.GetOutputPort("measurement").Eval(context)
-        np.testing.assert_array_equal(whole[6:12], load)
-        for name, part in (("measured_wrench", whole[:6]), ("load", whole[6:12])):
-            np.testing.assert_array_equal(sensor.GetOutputPort(name).Eval(context), part)
-        following = sensor.EvalUniquePeriodicDiscreteUpdate(context)
-        np.testing.assert_array_equal(following.value()[:6], whole[12:])
-        assert following.value()[6] == context.get_discrete_state_vector()[6] + 1.0
-        context.SetDiscreteState(following.value())
+RANGE = np.array([10.0, 20.0, 30.0, 1.0, 2.0, 3.0])
+BIAS = np.array([0.5, -0.5, 0.0, 0.1, 0.0, -0.1])
+
+
+class Sensor:
+    """A sensor under loads that are told, beside its filter in numpy."""
+
+    def __init__(self):
+        self.parameters = quiet(bandwidth=150.0, bias=BIAS, measurement_range=RANGE)
+        self.low_pass = LowPass(150.0, PERIOD)
+        self.stepper = Stepper(ForceTorqueSensor(self.parameters, PERIOD), ("noise",))
+
+    def step(self, load, noise=0.0):
+        # the tool pulls back, and Drake writes the torque first
+        reaction = np.roll(np.multiply(load, -1.0), 3)
+        result = self.stepper.step(reaction=reaction, noise=np.full(6 * 128, noise))
+        np.testing.assert_array_equal(result["load"], load)
+        return result["measured_wrench"], self.stepper.states["filter"]
+
+
+def test_filter_bias_and_noise():
+    sensor, rng = Sensor(), np.random.default_rng(0)
+    low_pass, expected = sensor.low_pass, None
+    for _ in range(5):
+        load, noise = rng.uniform(-0.3, 0.3, 6), rng.uniform(-0.3, 0.3)
+        expected = low_pass.rest(load) if expected is None else expected
+        reading, state = sensor.step(load, noise)
+        filtered, expected = low_pass.output(expected, load), low_pass.update(expected, load)
+        np.testing.assert_allclose(reading, filtered + BIAS + noise, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(state, expected, rtol=0, atol=1e-15)
+
+
+def test_range_and_nan_component_by_component():
+    for sign in (1.0, -1.0):
+        reading, _ = Sensor().step(sign * 2.0 * RANGE)
+        np.testing.assert_array_equal(reading, sign * RANGE)
+    sensor = Sensor()
+    sensor.step(np.zeros(6))
+    lost = np.where(np.arange(6) == 2, np.nan, 0.1)
+    reading, state = sensor.step(lost)
+    assert np.array_equal(np.isnan(reading), np.isnan(lost))
+    # and it goes on from the next load that is a number, at rest on it
+    reading, after = sensor.step(np.full(6, 0.2))
+    assert reading[2] == pytest.approx(0.2 + BIAS[2], abs=1e-15)
+    assert after[2] == pytest.approx(sensor.low_pass.rest(0.2), abs=1e-15)
+    expected = sensor.low_pass.update(state, 0.2)
+    np.testing.assert_allclose(np.delete(after, 2), np.delete(expected, 2), rtol=0, atol=1e-15)
+
+
+def test_noise_is_that_of_the_tick():
+    sensor = Stepper(ForceTorqueSensor(quiet(), PERIOD), ("noise",))
+    noise = np.random.default_rng(5).normal(size=(128, 6))
+    for tick in range(300):
+        reading = sensor.step(reaction=np.zeros(6), noise=noise)["measured_wrench"]
+        np.testing.assert_array_equal(reading, noise[tick % 128])
