@@ -14,6 +14,7 @@ from diagrams.tasks.guidance import add_guidance
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
@@ -25,7 +26,6 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
-from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 # what guidance tells, for the log
@@ -216,16 +216,14 @@ def _add_smooth_start(
         return desired
     allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
     require(not linearization.manifold.follows_time, "start.transition", duration, allowed)
-    start = builder.AddNamedSystem(
-        "smooth_start",
-        SmoothStart(
-            duration,
-            reference_order(following.scenario, linearization),
-            linearization.num_outputs,
-            controller.GetOutputPort("manifold_state").size(),
-            controller.period,
-        ),
+    smooth = SmoothStart(
+        duration,
+        reference_order(following.scenario, linearization),
+        linearization.num_outputs,
+        controller.GetOutputPort("manifold_state").size(),
+        controller.period,
     )
+    start = builder.AddNamedSystem("smooth_start", BlockSystem(smooth, controller.period))
     builder.Connect(desired, start.GetInputPort("desired_reference"))
     builder.Connect(
         controller.GetOutputPort("manifold_state"), start.GetInputPort("manifold_state")

@@ -21,6 +21,7 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.safe_stop import SafeState
+from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.law.timed_reference import TimedReference
@@ -37,7 +38,6 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.smooth_start import SmoothStart
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
@@ -113,7 +113,7 @@ class Chain:
         builder.Connect(projector.get_output_port(), controller.GetInputPort("manifold_point"))
         wanted = reference.get_output_port()
         if with_all:
-            start = builder.AddSystem(SmoothStart(0.03, r, m, r * m, PERIOD))
+            start = builder.AddSystem(BlockSystem(SmoothStart(0.03, r, m, r * m, PERIOD), PERIOD))
             actual = controller.GetOutputPort("manifold_state")
             builder.Connect(wanted, start.GetInputPort("desired_reference"))
             builder.Connect(actual, start.GetInputPort("manifold_state"))
