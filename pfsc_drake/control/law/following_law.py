@@ -3,9 +3,11 @@
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Values
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.control.cases import all_finite
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
+from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.law_functions import (
     Aim,
     LawInputs,
@@ -142,7 +144,7 @@ class FollowingLaw:
             linearization.num_outputs if inverse.damped_below else 0,
         )
         self.function = self._compose(max_alpha)
-        self._bound = BoundFunction(self.function)
+        self._bound = BoundFunction(self._whole())
 
     def _compose(self, max_alpha: float) -> ca.Function:
         """Return the law as one function: inputs by :class:`LawInputs`, results by the layout."""
@@ -176,6 +178,25 @@ class FollowingLaw:
             list(u._fields),
             ["result"],
         )
+
+    def _whole(self) -> ca.Function:
+        """Return the law with what it rests on, of the arguments of :meth:`evaluate`."""
+        has_posture = self.posture is not None
+        u = LawInputs.symbols(self.linearization, has_posture=has_posture)
+        told = u._asdict()
+        relation = ExactLinearization(self.linearization).output(
+            Values(),
+            Values(
+                joint_state=u.state,
+                manifold_point=u.manifold_point,
+                tau_ext=u.tau_ext,
+                reference=u.reference,
+            ),
+            0,
+        )
+        result = self.function(**told | relation)["result"]
+        del told["relation"]
+        return ca.Function("whole_law", list(told.values()), [result], list(told), ["result"])
 
     def _reference_velocity(self, u: LawInputs, aim: Aim, spare: Spare | None) -> ca.SX:
         """Return the joint velocities that the reference asks for, shape (N,)."""

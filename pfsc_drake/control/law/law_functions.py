@@ -9,6 +9,7 @@ import numpy as np
 
 from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.control.law.decoupling import DecouplingSolution, Restraint, Spare, scale_of
+from pfsc_drake.control.law.exact_linearization import Relation
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture, posture_expressions
@@ -27,6 +28,7 @@ class LawInputs(NamedTuple):
     Attributes:
         state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         manifold_point: Laid out by the manifold's layout.
+        relation: What drives do to the virtual output, see :class:`Relation`.
         reference: Derivatives 0..r of the virtual output's reference by rows, shape ((r + 1) m,).
         integral: Integral of the virtual output's error, shape (m,).
         last_held: Part of the last tick's drive input that is extrapolated, shape (N,).
@@ -41,6 +43,7 @@ class LawInputs(NamedTuple):
 
     state: ca.SX
     manifold_point: ca.SX
+    relation: ca.SX
     reference: ca.SX
     integral: ca.SX
     last_held: ca.SX
@@ -60,9 +63,9 @@ class LawInputs(NamedTuple):
         """
         n, m = linearization.num_joints, linearization.num_outputs
         r = linearization.relative_degree
-        point = linearization.manifold.layout.size
+        point, relation = linearization.manifold.layout.size, Relation.size(linearization)
         posture = (r + 1) * n if has_posture else 0
-        sizes = (4 * n, point, (r + 1) * m, m, n, 1, n * max(r - 1, 0), n, m, posture)
+        sizes = (4 * n, point, relation, (r + 1) * m, m, n, 1, n * max(r - 1, 0), n, m, posture)
         return cls(*[ca.SX.sym(name, k) for name, k in zip(cls._fields, sizes, strict=True)])
 
 
@@ -124,19 +127,15 @@ def aim_and_drives(
 
     Args:
         u: What the law is told.
-        linearization: The relation between drives and virtual output.
+        linearization: Whose relation is told.
         stabilization: Gains of the virtual output.
     """
     m, r = linearization.num_outputs, linearization.relative_degree
-    y_p, progress = ca.vertsplit(u.reference, m), []
+    Y, A, b, gain, drift, offset, motion = Relation.of(u.relation, linearization)
+    y_p = ca.vertsplit(u.reference, m)
     if linearization.manifold.follows_time:
         # the reference point moves with time, and the errors from it shall vanish
-        along = indices(linearization.manifold.coordinates, Kind.TANGENTIAL)
-        progress = [ca.vertcat(*[y[along] for y in y_p])]
         y_p = [ca.SX(m, 1)] * (r + 1)
-    Y, A, b, gain, drift, offset, motion = linearization.function(
-        u.state, u.tau_ext, u.manifold_point, *progress
-    )
     angle = ca.SX(0.0)
     turning = indices(linearization.manifold.coordinates, Kind.ROTATIONAL)
     if turning.stop:

@@ -6,6 +6,7 @@ import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.cases import where
+from pfsc_drake.control.law.exact_linearization import Relation
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw, LawLayout
 
@@ -22,6 +23,7 @@ class SampledLaw(Block):
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         manifold_point (input): Where on the manifold the tool is.
+        relation (input): What drives do to the virtual output, from :class:`ExactLinearization`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,).
         tau_ext (input, optional): External joint torques and their derivatives up to order
             r - 2 by rows [Nm or N, per s, ..], shape ((r - 1) N,); zero if not connected.
@@ -32,7 +34,6 @@ class SampledLaw(Block):
             ((r + 1) N,); only of a law for more joints than outputs.
         stopping (input): Nonzero from a fault on, shape (1,); acts on what is remembered.
         evaluation (output): Laid out by the law's ``layout``.
-        drive (output): Drive input within its limits, shape (N,).
         manifold_state (output): Derivatives 0..r-1 of ``yhat`` by rows, shape (r m,).
         virtual_input (output): ``v``, shape (m,).
         fault (output): The law's own, shape (1,).
@@ -56,10 +57,10 @@ class SampledLaw(Block):
         linearization, layout = law.linearization, law.layout
         n, m = linearization.num_joints, linearization.num_outputs
         r = linearization.relative_degree
-        unit = "Nm or N" if r > 1 else "rad/s or m/s"
         self.inputs = {
             "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
             "manifold_point": Port(linearization.manifold.layout.size),
+            "relation": Port(Relation.size(linearization)),
             "reference": Port((r + 1) * m, "m or rad, per s, .."),
             "stopping": Port(1),
         }
@@ -70,7 +71,6 @@ class SampledLaw(Block):
             self.inputs["posture_reference"] = Port((r + 1) * n, "rad or m, per s, ..")
         self.outputs = {
             "evaluation": Port(layout.size),
-            "drive": Port(n, unit),
             "manifold_state": Port(r * m, "m or rad, per s, .."),
             "virtual_input": Port(m),
             "fault": Port(1),
@@ -88,6 +88,7 @@ class SampledLaw(Block):
         told = {
             "state": u.joint_state,
             "manifold_point": u.manifold_point,
+            "relation": u.relation,
             "reference": u.reference,
             "integral": x.integral,
             "last_held": x.held,
@@ -102,7 +103,6 @@ class SampledLaw(Block):
         fault = result[layout.status.start]
         outputs = {
             "evaluation": result,
-            "drive": result[layout.drive],
             "manifold_state": result[layout.manifold_state],
             "virtual_input": result[layout.virtual_input],
             "fault": fault,

@@ -4,9 +4,10 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
 
 from pfsc_drake.blocks.block import Block
-from pfsc_drake.blocks.wiring_blocks import Constant
+from pfsc_drake.blocks.wiring_blocks import Constant, Rows
 from pfsc_drake.control.compliance.alarms import Alarms
 from pfsc_drake.control.law.drive_watch import DriveWatch
+from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.fault_latch import FaultLatch, FaultSwitch
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -21,11 +22,11 @@ from pfsc_drake.systems.can_fail import is_tick
 class FollowingController(Diagram):
     """A following law, what watches joints and drives, and what stops the robot after a fault.
 
-    A :class:`SampledLaw` tells the drives what to do until there is a fault: its own, one that
-    :class:`Supervision` or :class:`DriveWatch` find, or one of the :class:`Alarms` of others. The
-    first one holds (:class:`FaultLatch`): from then on the drives stop the robot and hold it where
-    it has come to rest (:class:`SafeStop`), velocity servos get the reference zero; only a new
-    initialization leaves that state.
+    With what :class:`ExactLinearization` finds, a :class:`SampledLaw` tells the drives what to do
+    until there is a fault: its own, one that :class:`Supervision` or :class:`DriveWatch` find, or
+    one of the :class:`Alarms` of others. The first one holds (:class:`FaultLatch`): from then on
+    the drives stop the robot and hold it where it has come to rest (:class:`SafeStop`), velocity
+    servos get the reference zero; only a new initialization leaves that state.
 
     Ports:
         joint_state, manifold_point, reference, tau_ext (optional), friction_torque (optional),
@@ -71,7 +72,11 @@ class FollowingController(Diagram):
             for port in inputs:
                 builder.Connect(source, port)
 
+        linear = add("linearization", ExactLinearization(law.linearization))
         sampled = add("law", SampledLaw(law, period))
+        connect(linear.GetOutputPort("relation"), sampled.GetInputPort("relation"))
+        drive = add("drive", Rows(law.layout.size, range(law.layout.drive.stop)))
+        connect(sampled.GetOutputPort("evaluation"), drive.GetInputPort("whole"))
         alarms = add("alarms", Alarms())
         causes = {"input": sampled.GetOutputPort("input_fault")}
         stop = add("safe_stop", SafeStop(law.robot, law.limits, law.safe_state, period))
@@ -85,7 +90,7 @@ class FollowingController(Diagram):
             drives = add("drive_watch", DriveWatch(law.limits, supervision, period))
             connect(stop.GetOutputPort("ignored"), watch.GetInputPort("ignored"))
             connect(watch.GetOutputPort("suspects"), stop.GetInputPort("suspects"))
-            connect(sampled.GetOutputPort("drive"), drives.GetInputPort("drive"))
+            connect(drive.GetOutputPort("part"), drives.GetInputPort("drive"))
             causes["measurement"] = watch.GetOutputPort("fault")
             causes["drives"] = drives.GetOutputPort("fault")
             measures.append(watch)
@@ -100,24 +105,23 @@ class FollowingController(Diagram):
         fault = latch.GetOutputPort("fault")
         connect(fault, *(system.GetInputPort("fault") for system in (stop, switch, report)))
         connect(fault, *(system.GetInputPort("stopping") for system in stopping))
-        connect(sampled.GetOutputPort("drive"), switch.GetInputPort("drive"))
+        connect(drive.GetOutputPort("part"), switch.GetInputPort("drive"))
         if commands_torque:
             connect(stop.GetOutputPort("torque"), switch.GetInputPort("stop"))
         connect(sampled.GetOutputPort("evaluation"), report.GetInputPort("evaluation"))
         connect(switch.GetOutputPort("told"), report.GetInputPort("told"))
 
-        builder.ExportInput(sampled.GetInputPort("joint_state"), "joint_state")
-        for system in measures:
-            builder.ConnectInput("joint_state", system.GetInputPort("joint_state"))
-        block = sampled.block
-        assert block is not None
-        for name in block.inputs:
-            if name not in ("joint_state", "stopping"):
-                builder.ExportInput(sampled.GetInputPort(name), name)
-        builder.ExportInput(alarms.GetInputPort("alarms"), "alarms")
+        told = [linear, sampled, *measures, alarms]
+        names = [name for system in told for name in system.network.inputs]
+        inside = {"relation", "fault", "stopping", "suspects", "ignored"}
+        for name in dict.fromkeys(name for name in names if name not in inside):
+            ports = [s.GetInputPort(name) for s in told if s.HasInputPort(name)]
+            builder.ExportInput(ports[0], name)
+            for port in ports[1:]:
+                builder.ConnectInput(name, port)
         builder.ExportOutput(switch.GetOutputPort("told"), self.drive_port)
         for name in ("manifold_state", "virtual_input", "reference_velocity"):
-            if name in block.outputs:
+            if sampled.HasOutputPort(name):
                 builder.ExportOutput(sampled.GetOutputPort(name), name)
         builder.ExportOutput(report.GetOutputPort("status"), "status")
         builder.ExportOutput(fault, "fault")
