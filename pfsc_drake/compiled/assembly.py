@@ -1,217 +1,300 @@
-"""Straight code of one function in LLVM assembly: values by name, memory only where it must be."""
+"""Functions in LLVM assembly."""
 
+import re
 from collections.abc import Sequence
 
-import casadi as ca
-import numpy as np
+from pfsc_drake.compiled.code import Code, Tables
+from pfsc_drake.compiled.operations import COMPARISONS, declarations, operation
 
-from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, literal, operation
-
-__all__ = ["Code", "Constants", "Value", "Values", "elements", "literals"]
-
-Value = str | tuple[str, int]
-"""A number: its name, its literal, or pointer and element where it still is in memory.
-
-Memory that is named so does not change any more. Names that begin with ``%c`` are of conditions,
-which stand for 1.0 and 0.0.
-"""
-
-Values = list[Value]
+__all__ = ["Assembly"]
 
 # A block's constants are kept for it as a whole: long ones are translated twice as slowly, into
 # code that takes half as long again.
 _BLOCK = 200
-_CONNECTIVES = {ca.OP_AND: "and", ca.OP_OR: "or"}
+
+_HELPERS = """\
+define internal i64 @index(double %x) nounwind alwaysinline {
+; what does not fit, and NaN, is the smallest number, as from the processor's conversion
+%a = fcmp oge double %x, 0xC3E0000000000000
+%b = fcmp olt double %x, 0x43E0000000000000
+%c = and i1 %a, %b
+%i = fptosi double %x to i64
+%r = select i1 %c, i64 %i, i64 -9223372036854775808
+ret i64 %r
+}
+define internal double @element(ptr %x, i64 %n, i64 %i) nounwind alwaysinline {
+%inside = icmp ult i64 %i, %n
+%j = select i1 %inside, i64 %i, i64 0
+%p = getelementptr double, ptr %x, i64 %j
+%e = load double, ptr %p
+%r = select i1 %inside, double %e, double 0x7FF8000000000000
+ret double %r
+}
+define internal void @put(ptr %x, i64 %n, i64 %i, double %value) nounwind {
+%inside = icmp ult i64 %i, %n
+br i1 %inside, label %yes, label %no
+yes:
+%p = getelementptr double, ptr %x, i64 %i
+store double %value, ptr %p
+br label %no
+no:
+ret void
+}
+define internal double @low_linear(double %x, ptr %grid, i64 %n) nounwind {
+start:
+%last = sub i64 %n, 2
+br label %next
+next:
+%i = phi i64 [0, %start], [%following, %compare]
+%more = icmp slt i64 %i, %last
+br i1 %more, label %compare, label %found
+compare:
+%following = add i64 %i, 1
+%p = getelementptr double, ptr %grid, i64 %following
+%g = load double, ptr %p
+%below = fcmp olt double %x, %g
+br i1 %below, label %found, label %next
+found:
+%r = sitofp i64 %i to double
+ret double %r
+}
+define internal double @low_binary(double %x, ptr %grid, i64 %n) nounwind {
+start:
+%short = icmp slt i64 %n, 2
+br i1 %short, label %first, label %below
+below:
+%p1 = getelementptr double, ptr %grid, i64 1
+%g1 = load double, ptr %p1
+%in_first = fcmp olt double %x, %g1
+br i1 %in_first, label %first, label %above
+first:
+ret double 0.0
+above:
+%end = sub i64 %n, 1
+%last = sub i64 %n, 2
+%pe = getelementptr double, ptr %grid, i64 %end
+%ge = load double, ptr %pe
+%beyond = fcmp ogt double %x, %ge
+br i1 %beyond, label %found, label %halve
+halve:
+%low = phi i64 [0, %above], [%low, %left], [%middle, %right]
+%high = phi i64 [%end, %above], [%middle, %left], [%high, %right]
+%sum = add i64 %low, %high
+%middle = sdiv i64 %sum, 2
+%p = getelementptr double, ptr %grid, i64 %middle
+%g = load double, ptr %p
+%is_left = fcmp olt double %x, %g
+br i1 %is_left, label %left, label %right
+left:
+%done_left = icmp eq i64 %middle, %high
+br i1 %done_left, label %found, label %halve
+right:
+%done_right = icmp eq i64 %middle, %low
+br i1 %done_right, label %found, label %halve
+found:
+%i = phi i64 [%last, %above], [%middle, %left], [%middle, %right]
+%r = sitofp i64 %i to double
+ret double %r
+}
+define internal double @low_exact(double %x, ptr %grid, i64 %n) nounwind {
+%end = sub i64 %n, 1
+%last = sub i64 %n, 2
+%pe = getelementptr double, ptr %grid, i64 %end
+%g0 = load double, ptr %grid
+%ge = load double, ptr %pe
+%width = fsub double %ge, %g0
+%from = fsub double %x, %g0
+%intervals = sitofp i64 %end to double
+%scaled = fmul double %from, %intervals
+%place = fdiv double %scaled, %width
+%i = call i64 @index(double %place)
+%low = icmp slt i64 %i, 0
+%i0 = select i1 %low, i64 0, i64 %i
+%high = icmp sgt i64 %i0, %last
+%i1 = select i1 %high, i64 %last, i64 %i0
+%r = sitofp i64 %i1 to double
+ret double %r
+}
+"""
 
 
-class Table(list[Value]):
-    """Literals, perhaps very many."""
-
-
-class Constants:
-    """Tables of numbers that functions share, each content once."""
-
-    def __init__(self) -> None:
-        self._names: dict[tuple[Value, ...], str] = {}
-        # to look at 100,000 numbers again takes long
-        self._seen: dict[int, tuple[Table, str]] = {}
-
-    def pointer(self, values: Sequence[Value]) -> str:
-        """Return the pointer to a table.
-
-        Args:
-            values: Literals.
-        """
-        if id(values) in self._seen:
-            return self._seen[id(values)][1]
-        key = tuple(values)
-        if key not in self._names:
-            self._names[key] = f"@table{len(self._names)}"
-        if isinstance(values, Table):
-            self._seen[id(values)] = values, self._names[key]
-        return self._names[key]
-
-    def text(self) -> str:
-        """Return the assembly that defines the tables."""
-        return "\n".join(
-            f"{name} = internal constant [{len(values)} x double] "
-            f"[{', '.join(f'double {value}' for value in values)}], align 8"
-            for values, name in self._names.items()
-        )
-
-
-class Code:
-    """Instructions of one function, one after another.
+class Assembly(Code):
+    """Instructions of one function in LLVM assembly.
 
     Args:
-        constants: Where constant tables go.
+        tables: Where constant tables go.
     """
 
-    def __init__(self, constants: Constants) -> None:
-        self._constants = constants
+    nowhere = "null"
+
+    def __init__(self, tables: Tables) -> None:
+        super().__init__(tables)
         self._buffers: list[str] = []
-        self._lines: list[str] = []
-        self._loaded: dict[Value, str] = {}
-        self._names = 0
         self._block_end = _BLOCK
 
-    def __len__(self) -> int:
-        return len(self._lines)
+    @staticmethod
+    def module(texts: Sequence[str], tables: Tables, name: str, n_parameters: int) -> str:
+        """Return the assembly of functions, with an entry that takes a table of pointers.
+
+        Args:
+            texts: The functions.
+            tables: Their tables.
+            name: The function that the entry calls.
+            n_parameters: Number of its parameters.
+        """
+        entry = []
+        for i in range(n_parameters):
+            entry += [
+                f"%t{i} = getelementptr ptr, ptr %table, i64 {i}",
+                f"%p{i} = load ptr, ptr %t{i}",
+            ]
+        parameters = ", ".join(f"ptr %p{i}" for i in range(n_parameters))
+        entry.append(f"call void @{name}({parameters})")
+        text = "\n".join(
+            [*texts, "define void @evaluate(ptr %table) nounwind {", *entry, "ret void", "}"]
+        )
+        constants = [
+            f"@{table} = internal constant [{len(values)} x double] "
+            f"[{', '.join(f'double {value}' for value in values)}], align 8"
+            for values, table in tables.names.items()
+        ]
+        return "\n".join([declarations(text), *constants, _helpers(text), text])
 
     def text(self, name: str, parameters: Sequence[str]) -> str:
-        """Return the function.
+        """Return the function."""
+        return _function(name, parameters, [*self._buffers, *self._lines])
 
-        Args:
-            name: Its name.
-            parameters: Names of its parameters, all of them pointers.
-        """
-        return "\n".join(
-            [
-                f"define internal void {name}({', '.join(f'ptr {p}' for p in parameters)}) "
-                "nounwind noinline {",
-                *self._buffers,
-                *self._lines,
-                "ret void",
-                "}",
-            ]
-        )
+    @staticmethod
+    def repeated(
+        name: str, parameters: Sequence[str], sizes: Sequence[int], called: str, repetitions: int
+    ) -> str:
+        """Return a function that calls another with one part of its arrays after the other."""
+        lines = ["br label %next", "next:", "%i = phi i64 [0, %0], [%following, %next]"]
+        for k, (parameter, size) in enumerate(zip(parameters, sizes, strict=True)):
+            lines.append(f"%o{k} = mul i64 %i, {size}")
+            lines.append(f"%p{k} = getelementptr double, ptr %{parameter}, i64 %o{k}")
+        given = ", ".join(f"ptr %p{k}" for k in range(len(parameters)))
+        lines += [
+            f"call void @{called}({given})",
+            "%following = add i64 %i, 1",
+            f"%done = icmp sge i64 %following, {repetitions}",
+            "br i1 %done, label %end, label %next",
+            "end:",
+        ]
+        return _function(name, parameters, lines)
 
-    def new(self, instruction: str) -> str:
-        """Add an instruction that has a result, and return the result's name."""
-        self._names += 1
-        self._lines.append(f"%v{self._names} = {instruction}")
-        return f"%v{self._names}"
-
-    def add(self, instruction: str) -> None:
-        """Add an instruction without result."""
-        self._lines.append(instruction)
-
-    def apply(self, code: int, x: Value, y: Value | None = None) -> str:
-        """Add an operation on numbers, and return its result.
-
-        Args:
-            code: The operation as CasADi counts them.
-            x: The first operand.
-            y: The second; nothing for operations of one.
-        """
-        self._begin_block()
-        if y is None:
-            y = x
-        if code in LOGIC:
-            return self._logic(code, x, y)
-        x, y = self.load(x), self.load(y)
-        if code in COMPARISONS:
-            return self._condition(f"fcmp {COMPARISONS[code]} double {x}, {y}")
-        self._names += 1
-        self._lines.append(operation(code).format(v=f"%v{self._names}", x=x, y=y))
-        return f"%v{self._names}"
-
-    def _logic(self, code: int, x: Value, y: Value) -> str:
-        is_true = self._truth(x)
-        if code == ca.OP_IF_ELSE_ZERO:
-            mask = self.new(f"sext i1 {is_true} to i64")
-            bits = self.new(f"bitcast double {self.load(y)} to i64")
-            return self.new(f"bitcast i64 {self.new(f'and i64 {mask}, {bits}')} to double")
-        if code == ca.OP_NOT:
-            return self._condition(f"xor i1 {is_true}, true")
-        return self._condition(f"{_CONNECTIVES[code]} i1 {is_true}, {self._truth(y)}")
-
-    def _truth(self, value: Value) -> str:
-        if isinstance(value, str) and value.startswith("%c"):
-            return value
-        return self._condition(f"fcmp une double {self.load(value)}, 0.0")
-
-    def _condition(self, instruction: str) -> str:
-        self._names += 1
-        self._lines.append(f"%c{self._names} = {instruction}")
-        return f"%c{self._names}"
-
-    def _begin_block(self) -> None:
-        if len(self._lines) > self._block_end:
-            self._block_end = len(self._lines) + _BLOCK
-            self._lines += [f"br label %b{self._names}", f"b{self._names}:"]
-
-    def load(self, value: Value) -> str:
-        """Return a number's name or literal, after loading it where it is in memory."""
-        if isinstance(value, str) and not value.startswith("%c"):
-            return value
-        if value not in self._loaded:
-            if isinstance(value, str):
-                self._loaded[value] = self.new(f"uitofp i1 {value} to double")
-            else:
-                self._loaded[value] = self.new(f"load double, ptr {self.element(*value)}")
-        return self._loaded[value]
-
-    def store(self, value: Value, pointer: str, index: int) -> None:
-        """Write a number into memory."""
-        self._begin_block()
-        value = self.load(value)
-        self._lines.append(f"store double {value}, ptr {self.element(pointer, index)}")
-
-    def element(self, pointer: str, index: int) -> str:
-        """Return the pointer to an element."""
-        return self.new(f"getelementptr double, ptr {pointer}, i64 {index}") if index else pointer
+    @staticmethod
+    def switched(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
+        """Return a function whose first argument says which of several others is called."""
+        index, *others = parameters
+        given, last = ", ".join(f"ptr %{p}" for p in others), len(cases) - 1
+        choices = " ".join(f"i64 {i}, label %case{i}" for i in range(last))
+        lines = [
+            f"%x = load double, ptr %{index}",
+            "%chosen = call i64 @index(double %x)",
+            f"switch i64 %chosen, label %case{last} [{choices}]",
+        ]
+        for i, case in enumerate(cases):
+            lines += [f"case{i}:", f"call void @{case}({given})", "br label %end"]
+        return _function(name, parameters, [*lines, "end:"])
 
     def buffer(self, size: int) -> str:
         """Return the pointer to memory that exists as long as the function runs."""
         self._names += 1
-        self._buffers.append(f"%v{self._names} = alloca [{max(size, 1)} x double], align 8")
-        return f"%v{self._names}"
+        self._buffers.append(f"%b{self._names} = alloca [{max(size, 1)} x double], align 8")
+        return f"b{self._names}"
 
-    def pointer(self, values: Sequence[Value]) -> str:
-        """Return a pointer to numbers one behind the other; they are not to be overwritten."""
-        if not values:
-            return "null"
-        if isinstance(values, Table) or all(_is_literal(value) for value in values):
-            return self._constants.pointer(values)
-        start = values[0]
-        if isinstance(start, tuple):
-            pointer, first = start
-            if all(value == (pointer, first + i) for i, value in enumerate(values)):
-                return self.element(pointer, first)
-        return self.copy(values)
+    def element(self, pointer: str, index: int) -> str:
+        """Return the pointer to an element."""
+        if not index:
+            return pointer
+        self._names += 1
+        self._emit(f"%p{self._names} = {_place(pointer, index)}")
+        return f"p{self._names}"
 
-    def copy(self, values: Sequence[Value]) -> str:
-        """Return a pointer to a copy of numbers, which may be overwritten."""
-        buffer = self.buffer(len(values))
-        for i, value in enumerate(values):
-            self.store(value, buffer, i)
-        return buffer
+    def _emit(self, line: str) -> None:
+        if len(self._lines) > self._block_end:
+            self._block_end = len(self._lines) + _BLOCK
+            self._lines += [f"br label %next{self._block_end}", f"next{self._block_end}:"]
+        self._lines.append(line)
 
-    def call(self, name: str, pointers: Sequence[str]) -> None:
-        """Add the call of a function."""
-        self._lines.append(f"call void {name}({', '.join(f'ptr {p}' for p in pointers)})")
+    def _operated(self, name: str, code: int, x: str, y: str) -> str:
+        return operation(code).format(v=f"%{name}", x=_operand(x), y=_operand(y))
+
+    def _compared(self, name: str, code: int, x: str, y: str) -> str:
+        return f"%{name} = fcmp {COMPARISONS[code]} double {_operand(x)}, {_operand(y)}"
+
+    def _negated(self, name: str, condition: str) -> str:
+        return f"%{name} = xor i1 %{condition}, true"
+
+    def _both(self, name: str, first: str, second: str) -> str:
+        return f"%{name} = and i1 %{first}, %{second}"
+
+    def _either(self, name: str, first: str, second: str) -> str:
+        return f"%{name} = or i1 %{first}, %{second}"
+
+    def _chosen(self, name: str, condition: str, x: str) -> str:
+        # without a branch
+        return (
+            f"%{name}m = sext i1 %{condition} to i64\n"
+            f"%{name}x = bitcast double {_operand(x)} to i64\n"
+            f"%{name}b = and i64 %{name}m, %{name}x\n"
+            f"%{name} = bitcast i64 %{name}b to double"
+        )
+
+    def _number(self, name: str, condition: str) -> str:
+        return f"%{name} = uitofp i1 %{condition} to double"
+
+    def _read(self, name: str, pointer: str, index: int) -> str:
+        if not index:
+            return f"%{name} = load double, ptr {_operand(pointer)}"
+        return f"%{name}p = {_place(pointer, index)}\n%{name} = load double, ptr %{name}p"
+
+    def _written(self, x: str, pointer: str, index: int) -> str:
+        return f"store double {_operand(x)}, ptr {_operand(self.element(pointer, index))}"
+
+    def _rounded(self, name: str, x: str) -> str:
+        return f"%{name} = call i64 @index(double {_operand(x)})"
+
+    def _summed(self, name: str, i: str, j: int | str) -> str:
+        return f"%{name} = add i64 %{i}, {j if isinstance(j, int) else '%' + j}"
+
+    def _element_or_nan(self, name: str, pointer: str, size: int, index: str) -> str:
+        place = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
+        return f"%{name} = call double @element({place})"
+
+    def _written_if_there(self, pointer: str, size: int, index: str, x: str) -> str:
+        place = f"ptr {_operand(pointer)}, i64 {size}, i64 %{index}"
+        return f"call void @put({place}, double {_operand(x)})"
+
+    def _looked_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str:
+        table = f"ptr {_operand(grid)}, i64 {size}"
+        return f"%{name} = call double @low_{mode}(double {_operand(x)}, {table})"
+
+    def _called(self, name: str, pointers: Sequence[str]) -> str:
+        return f"call void @{name}({', '.join(f'ptr {_operand(p)}' for p in pointers)})"
 
 
-def literals(values: np.ndarray) -> Table:
-    """Return constants, shape (n,)."""
-    return Table(map(literal, values.tolist()))
+def _function(name: str, parameters: Sequence[str], lines: Sequence[str]) -> str:
+    head = f"define internal void @{name}({', '.join(f'ptr %{p}' for p in parameters)})"
+    return "\n".join([f"{head} nounwind noinline {{", *lines, "ret void", "}"])
 
 
-def elements(pointer: str, size: int, first: int = 0) -> Values:
-    """Return numbers that are in memory one behind the other."""
-    return [(pointer, first + i) for i in range(size)]
+def _operand(name: str) -> str:
+    """Return a name or literal as assembly has it."""
+    if name.startswith("0x") or name == Assembly.nowhere:
+        return name
+    return f"@{name}" if name.startswith("table") else f"%{name}"
 
 
-def _is_literal(value: Value) -> bool:
-    return isinstance(value, str) and value.startswith("0x")
+def _place(pointer: str, index: int) -> str:
+    return f"getelementptr double, ptr {_operand(pointer)}, i64 {index}"
+
+
+def _helpers(text: str) -> str:
+    """Return the functions that instructions call, as far as assembly needs them."""
+    functions = re.findall(r"define internal \w+ (@\w+)\(.*?\n}\n", _HELPERS, re.DOTALL)
+    texts = re.findall(r"define internal .*?\n}\n", _HELPERS, re.DOTALL)
+    needed = [body for name, body in zip(functions, texts, strict=True) if f"{name}(" in text]
+    # one of them calls the first
+    return "".join(dict.fromkeys([texts[0], *needed]) if needed else [])

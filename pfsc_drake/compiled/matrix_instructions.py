@@ -1,4 +1,4 @@
-"""Instructions of CasADi's matrix functions in LLVM assembly, element by element.
+"""Instructions of CasADi's matrix functions as instructions on numbers.
 
 Moving numbers about (slices, concatenation, transposition) costs nothing: it only gives them other
 names. The order of every sum is the interpreter's.
@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.assembly import Code, Value, Values, literals
+from pfsc_drake.compiled.code import Code, Value, Values, literals
 from pfsc_drake.compiled.computed_indices import get_computed, indices, set_computed
 from pfsc_drake.compiled.operations import Untranslatable, is_known, literal, operation_name
 
@@ -202,8 +202,12 @@ def _found(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     sparsity = node.dep(0).sparsity()
     result = literal(float(sparsity.size1()))
     for value, row in reversed(list(zip(operands[0], sparsity.row(), strict=True))):
-        is_zero = code.new(f"fcmp oeq double {code.load(value)}, 0.0")
-        result = code.new(f"select i1 {is_zero}, double {result}, double {literal(float(row))}")
+        is_zero = code.apply(ca.OP_EQ, value, literal(0.0))
+        further = code.apply(ca.OP_IF_ELSE_ZERO, is_zero, result)
+        here = code.apply(ca.OP_NOT, is_zero)
+        result = code.apply(
+            ca.OP_ADD, further, code.apply(ca.OP_IF_ELSE_ZERO, here, literal(float(row)))
+        )
     return [result]
 
 

@@ -1,4 +1,4 @@
-"""CasADi functions in LLVM assembly: each function, and each that it calls, once."""
+"""CasADi functions in another language: each function, and each that it calls, once."""
 
 import hashlib
 import re
@@ -7,16 +7,13 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.assembly import Code, Constants, Value, Values, elements, literals
-from pfsc_drake.compiled.computed_indices import helpers, look_up
+from pfsc_drake.compiled.assembly import Assembly
+from pfsc_drake.compiled.code import Code, Tables, Value, Values, elements, literals
+from pfsc_drake.compiled.computed_indices import look_up
 from pfsc_drake.compiled.matrix_instructions import projected, translate_instruction
-from pfsc_drake.compiled.operations import (
-    Untranslatable,
-    declarations,
-    literal,
-)
+from pfsc_drake.compiled.operations import Untranslatable, literal
 
-__all__ = ["translate"]
+__all__ = ["Translation", "translate"]
 
 # of one function; machine code without optimizations keeps every value on the stack
 _MOST_INSTRUCTIONS = 50_000
@@ -35,24 +32,26 @@ def translate(function: ca.Function) -> str:
     Raises:
         Untranslatable: If it contains something that has no assembly here.
     """
-    module = _Module()
-    name = module.function(function)
-    code = Code(module.constants)
-    pointers = []
-    for i in range(function.n_in() + function.n_out()):
-        place = code.new(f"getelementptr ptr, ptr %table, i64 {i}")
-        pointers.append(code.new(f"load ptr, ptr {place}"))
-    code.call(name, pointers)
-    entry = code.text("@evaluate", ["%table"]).replace("define internal", "define", 1)
-    text = "\n".join([*module.texts, entry])
-    return "\n".join([declarations(text), module.constants.text(), helpers(text), text])
+    translation = Translation(Assembly)
+    name = translation.function(function)
+    n_parameters = function.n_in() + function.n_out()
+    return Assembly.module(translation.texts, translation.tables, name, n_parameters)
 
 
-class _Module:
-    """Functions that are translated so far."""
+class Translation:
+    """Functions that are translated, each before those that call it.
 
-    def __init__(self) -> None:
-        self.constants = Constants()
+    Args:
+        language: Of the code.
+
+    Attributes:
+        texts: The functions.
+        tables: Their tables.
+    """
+
+    def __init__(self, language: type[Code]) -> None:
+        self._language = language
+        self.tables = Tables()
         self.texts: list[str] = []
         self._names: dict[bytes, str] = {}
 
@@ -60,10 +59,16 @@ class _Module:
         """Translate a function where that has not been done, and return its name.
 
         Its parameters are pointers to the nonzeros of each argument, then of each result.
+
+        Args:
+            function: A function of scalar or matrix expressions.
+
+        Raises:
+            Untranslatable: If it contains something that cannot be translated.
         """
         key = hashlib.sha256(function.serialize().encode()).digest()
         if key not in self._names:
-            kinds: dict[str, Callable[[ca.Function], Code]] = {
+            kinds: dict[str, Callable[[ca.Function, str], str]] = {
                 "SXFunction": self._scalars,
                 "MXFunction": self._matrices,
                 "Map": self._map,
@@ -72,19 +77,14 @@ class _Module:
             kind = function.class_name()
             if kind not in kinds:
                 raise Untranslatable(f"{function.name()}, a {kind}")
-            code = kinds[kind](function)
-            if len(code) > _MOST_INSTRUCTIONS:
-                raise Untranslatable(f"{function.name()}, of {len(code)} instructions")
-            self._names[key] = f"@f{len(self._names)}"
-            self.texts.append(
-                code.text(self._names[key], [*_arguments(function), *_results(function)])
-            )
+            name = self._names[key] = f"f{len(self._names)}"
+            self.texts.append(kinds[kind](function, name))
         return self._names[key]
 
-    def _scalars(self, function: ca.Function) -> Code:
+    def _scalars(self, function: ca.Function, name: str) -> str:
         if function.n_instructions() > _MOST_INSTRUCTIONS:
             raise Untranslatable(f"{function.name()}, of {function.n_instructions()} instructions")
-        code = Code(self.constants)
+        code = self._language(self.tables)
         arguments, results = _arguments(function), _results(function)
         # the value that each place of the interpreter's memory has at present
         places: dict[int, Value] = {}
@@ -99,10 +99,10 @@ class _Module:
                 code.store(places[operands[0]], results[target[0]], target[1])
             else:
                 places[target[0]] = code.apply(what, *[places[i] for i in operands])
-        return code
+        return code.text(name, [*arguments, *results])
 
-    def _matrices(self, function: ca.Function) -> Code:
-        code = Code(self.constants)
+    def _matrices(self, function: ca.Function, name: str) -> str:
+        code = self._language(self.tables)
         arguments, results = _arguments(function), _results(function)
         look_up_modes = iter(_look_up_modes(function))
         # the numbers that each place of the interpreter's memory has at present
@@ -138,7 +138,9 @@ class _Module:
         for pointer, first, numbers in put_out:
             for i, number in enumerate(numbers):
                 code.store(number, pointer, first + i)
-        return code
+        if len(code) > _MOST_INSTRUCTIONS:
+            raise Untranslatable(f"{function.name()}, of {len(code)} instructions")
+        return code.text(name, [*arguments, *results])
 
     def _call(self, code: Code, function: ca.Function, operands: list[Values]) -> list[Values]:
         results = [code.buffer(function.nnz_out(i)) for i in range(function.n_out())]
@@ -146,43 +148,21 @@ class _Module:
         code.call(self.function(function), [*pointers, *results])
         return [elements(result, function.nnz_out(i)) for i, result in enumerate(results)]
 
-    def _map(self, function: ca.Function) -> Code:
+    def _map(self, function: ca.Function, name: str) -> str:
         """Translate a function that is evaluated with one set of columns after another."""
         once, repetitions = function.info()["f"], function.info()["n"]
-        name = self.function(once)
-        code = Code(self.constants)
-        code.add("br label %next")
-        code.add("next:")
-        code.add("%i = phi i64 [0, %0], [%following, %next]")
-        pointers = []
-        for pointer, size in [
-            *zip(_arguments(once), _sizes_in(once), strict=True),
-            *zip(_results(once), _sizes_out(once), strict=True),
-        ]:
-            offset = code.new(f"mul i64 %i, {size}")
-            pointers.append(code.new(f"getelementptr double, ptr {pointer}, i64 {offset}"))
-        code.call(name, pointers)
-        code.add("%following = add i64 %i, 1")
-        code.add(f"%done = icmp sge i64 %following, {repetitions}")
-        code.add("br i1 %done, label %end, label %next")
-        code.add("end:")
-        return code
+        sizes = [once.nnz_in(i) for i in range(once.n_in())]
+        sizes += [once.nnz_out(i) for i in range(once.n_out())]
+        parameters = [*_arguments(once), *_results(once)]
+        called = self.function(once)
+        return self._language.repeated(name, parameters, sizes, called, repetitions)
 
-    def _switch(self, function: ca.Function) -> Code:
+    def _switch(self, function: ca.Function, name: str) -> str:
         """Translate a function whose first argument chooses one of several."""
         cases = [*function.info()["f"], function.info()["f_def"]]
         names = [self._case(function, case) for case in cases]
-        code = Code(self.constants)
-        index, *arguments = _arguments(function)
-        chosen = code.new(f"call i64 @index(double {code.load((index, 0))})")
-        choices = " ".join(f"i64 {i}, label %case{i}" for i in range(len(cases) - 1))
-        code.add(f"switch i64 {chosen}, label %case{len(cases) - 1} [{choices}]")
-        for i, name in enumerate(names):
-            code.add(f"case{i}:")
-            code.call(name, [*arguments, *_results(function)])
-            code.add("br label %end")
-        code.add("end:")
-        return code
+        parameters = [*_arguments(function), *_results(function)]
+        return self._language.switched(name, parameters, names)
 
     def _case(self, function: ca.Function, case: ca.Function) -> str:
         """Return the name of a case of a switch, with the switch's patterns of nonzeros."""
@@ -193,7 +173,7 @@ class _Module:
         wanted_out = [case.sparsity_out(i) for i in range(case.n_out())]
         if given_in == wanted_in and given_out == wanted_out:
             return inner
-        code = Code(self.constants)
+        code = self._language(self.tables)
         operands = [
             projected(elements(pointer, given.nnz()), given, wanted)
             for pointer, given, wanted in zip(_arguments(case), given_in, wanted_in, strict=True)
@@ -204,7 +184,7 @@ class _Module:
         ):
             for i, number in enumerate(projected(numbers, given, wanted)):
                 code.store(number, result, i)
-        name = f"@case{len(self.texts)}"
+        name = f"case{len(self.texts)}"
         self.texts.append(code.text(name, [*_arguments(case), *_results(case)]))
         return name
 
@@ -227,16 +207,8 @@ def _look_up_modes(function: ca.Function) -> list[str]:
 
 
 def _arguments(function: ca.Function) -> list[str]:
-    return [f"%a{i}" for i in range(function.n_in())]
+    return [f"a{i}" for i in range(function.n_in())]
 
 
 def _results(function: ca.Function) -> list[str]:
-    return [f"%r{i}" for i in range(function.n_out())]
-
-
-def _sizes_in(function: ca.Function) -> list[int]:
-    return [function.nnz_in(i) for i in range(function.n_in())]
-
-
-def _sizes_out(function: ca.Function) -> list[int]:
-    return [function.nnz_out(i) for i in range(function.n_out())]
+    return [f"r{i}" for i in range(function.n_out())]

@@ -1,0 +1,280 @@
+"""Straight code of one function, in whatever language: numbers by name, memory where it must be."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, literal
+
+__all__ = ["Code", "Tables", "Value", "Values", "elements", "literals"]
+
+Value = str | tuple[str, int]
+"""A number: its name, its literal, or pointer and element where it still is in memory.
+
+Memory that is named so does not change any more. Names of numbers begin with v, of conditions,
+which stand for 1.0 and 0.0, with c, of whole numbers with i.
+"""
+
+Values = list[Value]
+_ZERO = literal(0.0)
+
+
+class Table(list[Value]):
+    """Literals, perhaps very many."""
+
+
+class Tables:
+    """Constants that functions share, each content once.
+
+    Attributes:
+        names: Their pointers by content.
+    """
+
+    def __init__(self) -> None:
+        self.names: dict[tuple[Value, ...], str] = {}
+        # to look at 100,000 numbers again takes long
+        self._seen: dict[int, tuple[Table, str]] = {}
+
+    def pointer(self, values: Sequence[Value]) -> str:
+        """Return the pointer to a table.
+
+        Args:
+            values: Literals.
+        """
+        if id(values) in self._seen:
+            return self._seen[id(values)][1]
+        key = tuple(values)
+        if key not in self.names:
+            self.names[key] = f"table{len(self.names)}"
+        if isinstance(values, Table):
+            self._seen[id(values)] = values, self.names[key]
+        return self.names[key]
+
+
+class Code(ABC):
+    """Instructions of one function, one after another.
+
+    Args:
+        tables: Where constant tables go.
+
+    Attributes:
+        nowhere: The pointer to nothing, for what has no elements.
+    """
+
+    nowhere: ClassVar[str]
+
+    def __init__(self, tables: Tables) -> None:
+        self._tables = tables
+        self._lines: list[str] = []
+        self._loaded: dict[Value, str] = {}
+        self._names = 0
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def apply(self, code: int, x: Value, y: Value | None = None) -> str:
+        """Add an operation on numbers, and return its result.
+
+        Args:
+            code: The operation as CasADi counts them.
+            x: The first operand.
+            y: The second; nothing for operations of one.
+        """
+        if y is None:
+            y = x
+        if code in LOGIC:
+            return self._logic(code, x, y)
+        x, y = self.load(x), self.load(y)
+        if code in COMPARISONS:
+            return self._add("c", self._compared, code, x, y)
+        return self._add("v", self._operated, code, x, y)
+
+    def _logic(self, code: int, x: Value, y: Value) -> str:
+        is_true = self._truth(x)
+        if code == ca.OP_IF_ELSE_ZERO:
+            return self._add("v", self._chosen, is_true, self.load(y))
+        if code == ca.OP_NOT:
+            return self._add("c", self._negated, is_true)
+        both = self._both if code == ca.OP_AND else self._either
+        return self._add("c", both, is_true, self._truth(y))
+
+    def _truth(self, value: Value) -> str:
+        if isinstance(value, str) and value[0] == "c":
+            return value
+        # NaN is true
+        return self._add("c", self._compared, ca.OP_NE, self.load(value), _ZERO)
+
+    def load(self, value: Value) -> str:
+        """Return a number's name or literal, after loading it where it is in memory."""
+        if isinstance(value, str) and value[0] != "c":
+            return value
+        if value not in self._loaded:
+            if isinstance(value, str):
+                self._loaded[value] = self._add("v", self._number, value)
+            else:
+                self._loaded[value] = self._add("v", self._read, *value)
+        return self._loaded[value]
+
+    def store(self, value: Value, pointer: str, index: int) -> None:
+        """Write a number into memory."""
+        self._emit(self._written(self.load(value), pointer, index))
+
+    def pointer(self, values: Sequence[Value]) -> str:
+        """Return a pointer to numbers one behind the other; they are not to be overwritten."""
+        if not values:
+            return self.nowhere
+        if isinstance(values, Table) or all(_is_literal(value) for value in values):
+            return self._tables.pointer(values)
+        start = values[0]
+        if isinstance(start, tuple):
+            pointer, first = start
+            if all(value == (pointer, first + i) for i, value in enumerate(values)):
+                return self.element(pointer, first)
+        return self.copy(values)
+
+    def copy(self, values: Sequence[Value]) -> str:
+        """Return a pointer to a copy of numbers, which may be overwritten."""
+        buffer = self.buffer(len(values))
+        for i, value in enumerate(values):
+            self.store(value, buffer, i)
+        return buffer
+
+    def index(self, value: Value) -> str:
+        """Return a whole number, rounded towards zero, or one far below zero of what is none."""
+        return self._add("i", self._rounded, self.load(value))
+
+    def plus(self, i: str, j: int | str) -> str:
+        """Return the sum of two whole numbers."""
+        return self._add("i", self._summed, i, j)
+
+    def get(self, pointer: str, size: int, index: str) -> str:
+        """Return an element at a computed index, NaN where there is none."""
+        return self._add("v", self._element_or_nan, pointer, size, index)
+
+    def put(self, pointer: str, size: int, index: str, value: Value) -> None:
+        """Write an element at a computed index, if there is such an element."""
+        self._emit(self._written_if_there(pointer, size, index, self.load(value)))
+
+    def low(self, mode: str, grid: str, size: int, value: Value) -> str:
+        """Return where a number is in a grid: ``linear``, ``binary`` or ``exact`` search."""
+        return self._add("v", self._looked_up, mode, grid, size, self.load(value))
+
+    def call(self, name: str, pointers: Sequence[str]) -> None:
+        """Add the call of a function."""
+        self._emit(self._called(name, pointers))
+
+    def _add(self, kind: str, instruction: Callable[..., str], *operands: object) -> str:
+        self._names += 1
+        name = f"{kind}{self._names}"
+        self._emit(instruction(name, *operands))
+        return name
+
+    def _emit(self, line: str) -> None:
+        self._lines.append(line)
+
+    @abstractmethod
+    def text(self, name: str, parameters: Sequence[str]) -> str:
+        """Return the function.
+
+        Args:
+            name: Its name.
+            parameters: Names of its parameters, all of them pointers.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def repeated(
+        name: str, parameters: Sequence[str], sizes: Sequence[int], called: str, repetitions: int
+    ) -> str:
+        """Return a function that calls another with one part of its arrays after the other.
+
+        Args:
+            name: Its name.
+            parameters: Of both.
+            sizes: Number of elements in a part, of each parameter.
+            called: The other.
+            repetitions: Number of parts.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def switched(name: str, parameters: Sequence[str], cases: Sequence[str]) -> str:
+        """Return a function whose first argument says which of several others is called.
+
+        Args:
+            name: Its name.
+            parameters: The index, and those of the others.
+            cases: The others; the last of them where the index fits none.
+        """
+
+    @abstractmethod
+    def buffer(self, size: int) -> str:
+        """Return the pointer to memory that exists as long as the function runs."""
+
+    @abstractmethod
+    def element(self, pointer: str, index: int) -> str:
+        """Return the pointer to an element."""
+
+    # the instructions in the language; the first argument is the name of the result
+
+    @abstractmethod
+    def _operated(self, name: str, code: int, x: str, y: str) -> str: ...
+
+    @abstractmethod
+    def _compared(self, name: str, code: int, x: str, y: str) -> str: ...
+
+    @abstractmethod
+    def _negated(self, name: str, condition: str) -> str: ...
+
+    @abstractmethod
+    def _both(self, name: str, first: str, second: str) -> str: ...
+
+    @abstractmethod
+    def _either(self, name: str, first: str, second: str) -> str: ...
+
+    @abstractmethod
+    def _chosen(self, name: str, condition: str, x: str) -> str: ...
+
+    @abstractmethod
+    def _number(self, name: str, condition: str) -> str: ...
+
+    @abstractmethod
+    def _read(self, name: str, pointer: str, index: int) -> str: ...
+
+    @abstractmethod
+    def _written(self, x: str, pointer: str, index: int) -> str: ...
+
+    @abstractmethod
+    def _rounded(self, name: str, x: str) -> str: ...
+
+    @abstractmethod
+    def _summed(self, name: str, i: str, j: int | str) -> str: ...
+
+    @abstractmethod
+    def _element_or_nan(self, name: str, pointer: str, size: int, index: str) -> str: ...
+
+    @abstractmethod
+    def _written_if_there(self, pointer: str, size: int, index: str, x: str) -> str: ...
+
+    @abstractmethod
+    def _looked_up(self, name: str, mode: str, grid: str, size: int, x: str) -> str: ...
+
+    @abstractmethod
+    def _called(self, name: str, pointers: Sequence[str]) -> str: ...
+
+
+def literals(values: np.ndarray) -> Table:
+    """Return constants, shape (n,)."""
+    return Table(map(literal, values.tolist()))
+
+
+def elements(pointer: str, size: int, first: int = 0) -> Values:
+    """Return numbers that are in memory one behind the other."""
+    return [(pointer, first + i) for i in range(size)]
+
+
+def _is_literal(value: Value) -> bool:
+    return isinstance(value, str) and value.startswith("0x")
