@@ -13,6 +13,7 @@ __all__ = [
     "LOGIC",
     "Untranslatable",
     "declarations",
+    "function_name",
     "function_symbols",
     "is_known",
     "literal",
@@ -111,11 +112,26 @@ def operation(code: int) -> str:
     """
     if code in _INLINE:
         return "\n".join(_INLINE[code])
-    name = _UNARY_CALLS.get(code) or _BINARY_CALLS.get(code)
-    if name is None or _PREFIX + name not in function_symbols():
+    name, count = function_name(code)
+    if _PREFIX + name not in function_symbols():
         raise Untranslatable(f"operation {operation_name(code)}")
-    operands = "double {x}" if code in _UNARY_CALLS else "double {x}, double {y}"
+    operands = "double {x}" if count == 1 else "double {x}, double {y}"
     return f"{{v}} = call double @{_PREFIX}{name}({operands})"
+
+
+def function_name(code: int) -> tuple[str, int]:
+    """Return the mathematical function that an operation is, and its number of operands.
+
+    Args:
+        code: The operation as CasADi counts them.
+
+    Raises:
+        Untranslatable: If it is none.
+    """
+    name = _UNARY_CALLS.get(code) or _BINARY_CALLS.get(code)
+    if name is None:
+        raise Untranslatable(f"operation {operation_name(code)}")
+    return name, 1 if code in _UNARY_CALLS else 2
 
 
 def is_known(code: int) -> bool:

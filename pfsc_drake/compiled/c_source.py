@@ -1,0 +1,108 @@
+"""CasADi functions as C99 source."""
+
+import re
+from collections.abc import Mapping
+
+import casadi as ca
+
+from pfsc_drake.compiled.c_code import CCode, helpers, table_text
+from pfsc_drake.compiled.translation import Translation
+
+__all__ = ["c_source", "parameters"]
+
+_WORDS_OF_C = re.compile(
+    r"(auto|bool|break|case|catch|char|class|const|continue|default|delete|do|double|else|enum|"
+    r"explicit|export|extern|false|float|for|friend|goto|if|inline|int|long|mutable|namespace|new|"
+    r"operator|private|protected|public|register|restrict|return|short|signed|sizeof|static|struct|"
+    r"switch|template|this|throw|true|try|typedef|typename|union|unsigned|using|virtual|void|"
+    r"volatile|while)"
+)
+_OPEN = """\
+#ifdef __cplusplus
+extern "C" {
+#endif
+"""
+_CLOSE = """\
+#ifdef __cplusplus
+}
+#endif
+"""
+
+
+def c_source(functions: Mapping[str, ca.Function], prefix: str) -> dict[str, str]:
+    """Return functions as C99, which give the results of CasADi's interpreter to the last bit.
+
+    They are re-entrant, allocate nothing and need nothing but the mathematical library; what they
+    need of memory is on the stack. Arguments and results may overlap only where a function is of
+    matrix expressions (MX). Of compilers' options, none may fuse multiplication and addition
+    (``-std=c99`` or ``-ffp-contract=off``), or calculate inexactly.
+
+    Args:
+        functions: By the names that they are to have behind ``prefix_``: identifiers.
+        prefix: An identifier.
+
+    Returns:
+        Contents of ``prefix.c``, ``prefix.h`` and ``prefix_tables.h`` by their names. A function
+        takes a pointer to the nonzeros of each argument, then of each result, all of them by their
+        names (:func:`parameters`).
+
+    Raises:
+        Untranslatable: If a function contains something that has no translation.
+    """
+    translation = Translation(CCode)
+    declarations, definitions = [], []
+    for name, function in functions.items():
+        inner = translation.function(function)
+        given = parameters(function)
+        declared = f"void {prefix}_{name}({_declared(function, given)})"
+        declarations.append(f"{declared};\n")
+        definitions.append(f"{declared}\n{{\n    {inner}({', '.join(given)});\n}}\n")
+    guard = f"{prefix}_h".upper()
+    tables = [
+        table_text(name, [str(value) for value in values])
+        for values, name in translation.tables.names.items()
+    ]
+    text = "\n".join([*translation.texts, *definitions])
+    return {
+        f"{prefix}.h": "\n".join(
+            [f"#ifndef {guard}\n#define {guard}\n", _OPEN, *declarations, _CLOSE, "#endif\n"]
+        ),
+        f"{prefix}_tables.h": "\n".join(tables) or "/* there are none */\n",
+        f"{prefix}.c": "\n".join(
+            [
+                f'#include "{prefix}.h"\n\n#include <math.h>\n#include <stddef.h>\n',
+                f'#include "{prefix}_tables.h"\n',
+                helpers(text),
+                text,
+            ]
+        ),
+    }
+
+
+def parameters(function: ca.Function) -> list[str]:
+    """Return the names of a function's parameters in C: its arguments, then its results.
+
+    Args:
+        function: Any function. What is no identifier becomes one, and each is there once.
+    """
+    names: list[str] = []
+    for name in [*function.name_in(), *function.name_out()]:
+        name = re.sub(r"\W", "_", name)
+        while _WORDS_OF_C.fullmatch(name) or name in names:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _declared(function: ca.Function, names: list[str]) -> str:
+    sizes = [function.nnz_in(i) for i in range(function.n_in())]
+    types = ["const double"] * len(sizes) + ["double"] * function.n_out()
+    sizes += [function.nnz_out(i) for i in range(function.n_out())]
+    # there are no arrays of no elements
+    return (
+        ", ".join(
+            f"{kind} {name}[{size}]" if size else f"{kind} *{name}"
+            for kind, name, size in zip(types, names, sizes, strict=True)
+        )
+        or "void"
+    )
