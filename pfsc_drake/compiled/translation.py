@@ -54,6 +54,8 @@ class Translation:
         self.tables = Tables()
         self.texts: list[str] = []
         self._names: dict[bytes, str] = {}
+        # by address, so that they are kept: to read a function's content takes long
+        self._seen: dict[int, tuple[ca.Function, str]] = {}
 
     def function(self, function: ca.Function) -> str:
         """Translate a function where that has not been done, and return its name.
@@ -66,6 +68,8 @@ class Translation:
         Raises:
             Untranslatable: If it contains something that cannot be translated.
         """
+        if function.__hash__() in self._seen:
+            return self._seen[function.__hash__()][1]
         key = hashlib.sha256(function.serialize().encode()).digest()
         if key not in self._names:
             kinds: dict[str, Callable[[ca.Function, str], str]] = {
@@ -79,6 +83,7 @@ class Translation:
                 raise Untranslatable(f"{function.name()}, a {kind}")
             name = self._names[key] = f"f{len(self._names)}"
             self.texts.append(kinds[kind](function, name))
+        self._seen[function.__hash__()] = function, self._names[key]
         return self._names[key]
 
     def _scalars(self, function: ca.Function, name: str) -> str:
