@@ -3,17 +3,48 @@
 After B. Bischof, "Path and Surface Following Control for Industrial Robotic
 Applications", dissertation, TU Wien, 2018.
 
-Layers, imports only point downwards:
+The door: :func:`add_path_following` and what its arguments are made of. Behind it, imports only
+point downwards:
 
-* :mod:`pfsc_drake.systems`: Drake LeafSystems.
-* :mod:`pfsc_drake.control`: control laws as pure functions.
-* :mod:`pfsc_drake.robot`: kinematics and dynamics of serial chains.
-* :mod:`pfsc_drake.geometry`: curves, projection, moving frames.
+* :mod:`pfsc_drake.following`: whole controllers, from the joint state to the drives.
+* :mod:`pfsc_drake.systems`: blocks as Drake systems, one by one or fused; plants, drawing.
+* :mod:`pfsc_drake.physics`: what a controller meets and does not know.
+* :mod:`pfsc_drake.control`: what a controller knows: laws, manifolds, observers, fixtures.
+* :mod:`pfsc_drake.robot`: kinematics and dynamics.
+* :mod:`pfsc_drake.geometry`: curves, surfaces, regions, projection, moving frames.
+* :mod:`pfsc_drake.blocks`: components as expressions, and networks of them.
+* :mod:`pfsc_drake.compiled`: expressions as machine code.
 * :mod:`pfsc_drake.jets`: truncated Taylor arithmetic.
 """
+
+import importlib
+from typing import Any
 
 from pfsc_drake.errors import InputError
 
 __version__ = "0.1.0"
 
-__all__ = ["InputError", "__version__"]
+# what users import, and the modules that are loaded when they do
+_DOOR = {
+    "ControllerParameters": "pfsc_drake.following.options.controller",
+    "FaultParameters": "pfsc_drake.following.options.faults",
+    "Follower": "pfsc_drake.following.follower",
+    "FollowerOptions": "pfsc_drake.following.follower",
+    "GainParameters": "pfsc_drake.following.options.controller",
+    "LawGains": "pfsc_drake.following.options.controller",
+    "Path": "pfsc_drake.geometry",
+    "WaypointTable": "pfsc_drake.geometry",
+    "add_path_following": "pfsc_drake.following.path_following",
+    "fuse": "pfsc_drake.systems.fuse",
+    "path_from_waypoints": "pfsc_drake.geometry",
+    "rest_to_rest": "pfsc_drake.control.law.reference",
+}
+
+__all__ = ["InputError", "__version__", *_DOOR]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what is asked for, so that whoever needs a part does not wait for the whole."""
+    if name not in _DOOR:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_DOOR[name]), name)

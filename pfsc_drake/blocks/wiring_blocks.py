@@ -58,6 +58,28 @@ class Rows(Block):
         return {"part": u.whole[self._rows]}
 
 
+class Linear(Block):
+    """A constant matrix times a vector.
+
+    Ports:
+        vector (input): Shape (columns,).
+        product (output): Shape (rows,).
+
+    Args:
+        matrix: Shape (rows, columns).
+    """
+
+    def __init__(self, matrix: np.ndarray) -> None:
+        self._matrix = ca.sparsify(ca.DM(np.asarray(matrix, dtype=float)))
+        rows, columns = self._matrix.shape
+        self.inputs, self.outputs = {"vector": Port(columns)}, {"product": Port(rows)}
+        self.states = {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"product": ca.densify(self._matrix @ u.vector)}
+
+
 class Sum(Block):
     """The sum of vectors of one size.
 

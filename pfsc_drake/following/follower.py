@@ -1,0 +1,248 @@
+"""A whole controller as one diagram, with the ports that a robot has."""
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+
+from pfsc_drake.blocks.block import Block
+from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.smooth_start import SmoothStart
+from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.errors import InputError, require
+from pfsc_drake.following.believed import Believed
+from pfsc_drake.following.controller import add_controller
+from pfsc_drake.following.followed import Followed
+from pfsc_drake.following.law import make_law
+from pfsc_drake.following.options.controller import (
+    ControllerParameters,
+    GainParameters,
+    LawGains,
+)
+from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
+from pfsc_drake.robot.robot_model import gravity_function
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.fuse import fuse
+
+# 1/s, of poles that nobody chooses
+BANDWIDTH = 20.0
+
+
+@dataclass
+class FollowerOptions:
+    """What can be chosen of a path or surface following controller.
+
+    Attributes:
+        bandwidth: Of the error dynamics [1/s], for coordinates without gains of their own; their
+            poles are chosen by it, see :class:`GainParameters`.
+        controller: Gains, limits, friction, forces, posture, sampling time. Its law is the one
+            that the controller is added with.
+        faults: What is a fault.
+        friction: Coefficients f_c and f_v of the drives that are believed, each (N,).
+        posture: From where the posture at the start is looked for, shape (N,) [rad or m]; the
+            middle of the joints' limits if omitted.
+        transition: How long the reference takes from where the tool is at the start to the motion
+            that is wanted [s]; 0 for no such transition.
+        override: Whether there is a port for the pace of the motion, see :class:`TimedReference`.
+        measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
+            ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
+    """
+
+    bandwidth: float = BANDWIDTH
+    controller: ControllerParameters = field(default_factory=ControllerParameters)
+    faults: FaultParameters = field(default_factory=FaultParameters)
+    friction: tuple[np.ndarray, np.ndarray] | None = None
+    posture: np.ndarray | None = None
+    transition: float = 0.0
+    override: bool = False
+    measures: str = "plant_state"
+
+
+class Follower(Diagram):
+    """Path or surface following control of one arm: all that is sampled between state and drives.
+
+    All of its systems are blocks of one sampling time: :func:`~pfsc_drake.systems.fuse.fuse` makes
+    them one, :meth:`stepper` steps them without Drake.
+
+    Ports:
+        plant_state (input): State ``[q, v]`` of the plant; or instead of it
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
+        wrench (input): With ``controller.external_torque.source`` known or measured: force and
+            torque on the tool point, world axes, shape (6,) [N, Nm].
+        drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
+            servos
+        velocity_reference (output): Joint velocities, shape (N,) [rad/s or m/s].
+        actuation (output): The same in the order of the plant's actuators, held from tick to tick.
+        reference (output): Derivatives 0..r of the virtual output's reference by rows.
+        manifold_state (output): Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
+        manifold_point (output): Where on the manifold the tool is.
+        status (output): ``[fault, rcond, saturated drives]``, shape (3,).
+        fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
+
+    Args:
+        plant: The robot, finalized; as it is believed.
+        tool: Name of the frame whose origin follows the manifold.
+        law: Name of the law.
+        make: ``r -> Followed``: what is followed by a law of relative degree r.
+        options: What else is chosen.
+
+    Attributes:
+        robot: The robot as a chain of N joints.
+        followed: What is followed.
+        law: The law.
+        period: Sampling time [s].
+        start_posture: Joint coordinates at the start, shape (N,) [rad or m].
+
+    Raises:
+        InputError: If robot, law, manifold and options do not go together, or the start is out of
+            reach.
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        tool: str,
+        law: str,
+        make: Callable[[int], Followed],
+        options: FollowerOptions,
+    ) -> None:
+        super().__init__()
+        require(law in RELATIVE_DEGREE, "law", law, ", ".join(RELATIVE_DEGREE))
+        require(
+            options.measures in ("plant_state", "joint_state"),
+            "measures",
+            options.measures,
+            "plant_state, joint_state",
+        )
+        if not plant.HasFrameNamed(tool):
+            raise InputError(f"tool = {tool}: the plant has no frame of this name")
+        self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
+        self.followed = followed = make(RELATIVE_DEGREE[law])
+        self.start_posture = solve_pose(
+            self.robot, followed.start, self._near(options.posture), "start"
+        )
+        chosen = _with_gains(options.controller, law, options.bandwidth)
+        self.period = chosen.sampling_time
+        rest = RestPosture(self.start_posture, followed.point)
+        self.law = make_law(chosen, self.robot, followed.manifold, lambda: rest, options.faults)
+        self._builder = DiagramBuilder()
+        self._wire(chosen, options)
+        self._builder.BuildInto(self)
+        self.set_name(f"{law}_follower")
+
+    @property
+    def start_state(self) -> np.ndarray:
+        """State ``[q, v]`` of the plant at rest at the start; elastic joints carry the weight."""
+        q_J = self.start_posture
+        weight = np.array(gravity_function(self.robot)(q_J)).ravel()
+        rest = np.zeros(self.robot.dimension)
+        return self._coordinates.plant_state(
+            np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
+        )
+
+    def stepper(self, connected: tuple[str, ...] = ()) -> Stepper:
+        """Return the controller as something to call at every tick, without Drake.
+
+        ``stepper.step(plant_state=..)["drive_torque"]``; all outputs are in what it returns.
+
+        Args:
+            connected: Optional inputs that are given at every tick.
+        """
+        return Stepper(fuse(self).network, connected)
+
+    def _near(self, posture: np.ndarray | None) -> np.ndarray:
+        """Return from where the posture at the start is looked for, shape (N,)."""
+        if posture is not None:
+            if np.shape(posture) != (self.robot.dimension,):
+                raise InputError(
+                    f"posture: {np.size(posture)} values; the robot has {self.robot.dimension} "
+                    "joints"
+                )
+            return np.asarray(posture, dtype=float)
+        lower, upper = np.clip(self.robot.gather("position_limits"), -UNLIMITED, UNLIMITED).T
+        limited = np.maximum(-lower, upper) < UNLIMITED
+        return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
+
+    def _add(self, name: str, block: Block) -> BlockSystem:
+        return self._builder.AddNamedSystem(name, BlockSystem(block, self.period))
+
+    def _measured(self, options: FollowerOptions) -> OutputPort:
+        """Export what is measured, and return the joint state."""
+        if options.measures == "plant_state":
+            rows = np.vstack([self._coordinates.link_rows, self._coordinates.motor_rows])
+            measured = self._add("joint_state", Linear(rows))
+            self._builder.ExportInput(measured.GetInputPort("vector"), "plant_state")
+            return measured.GetOutputPort("product")
+        measured = self._add("joint_state", Collect({"measured": 4 * self.robot.dimension}))
+        self._builder.ExportInput(measured.GetInputPort("measured"), "joint_state")
+        return measured.GetOutputPort("all")
+
+    def _wire(self, chosen: ControllerParameters, options: FollowerOptions) -> None:
+        builder, law = self._builder, self.law
+        linearization = law.linearization
+        on_motors = chosen.law == "rigid" and not self.robot.is_rigid
+        joint_state = self._measured(options)
+        kinematics = builder.AddNamedSystem(
+            "tool_kinematics", ToolKinematics(self.robot, on_motors)
+        )
+        builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
+        pose = kinematics.GetOutputPort("tool_pose")
+        ports = {
+            "joint_state": joint_state,
+            "manifold_point": self.followed.add_projector(builder, pose),
+        }
+        source = chosen.external_torque.source
+        if source in ("known", "measured"):
+            wrench = self._add("wrench", Collect({"measured": 6}))
+            builder.ExportInput(wrench.GetInputPort("measured"), "wrench")
+            name = "wrench_ext" if source == "known" else "wrench_measured"
+            ports[name] = wrench.GetOutputPort("all")
+        believed = Believed(self.robot, options.friction)
+        controller, _, _ = add_controller(builder, law, believed, chosen, options.faults, ports)
+        r, m = linearization.relative_degree, linearization.num_outputs
+        reference = self._add("reference", TimedReference(self.followed.motion, r, m, self.period))
+        if options.override:
+            builder.ExportInput(reference.GetInputPort("override"), "override")
+        told = reference.GetOutputPort("reference")
+        if options.transition > 0.0:
+            smooth = self._add(
+                "smooth_start", SmoothStart(options.transition, r, m, r * m, self.period)
+            )
+            builder.Connect(told, smooth.GetInputPort("desired_reference"))
+            state = controller.GetOutputPort("manifold_state")
+            builder.Connect(state, smooth.GetInputPort("manifold_state"))
+            told = smooth.GetOutputPort("reference")
+        builder.Connect(told, controller.GetInputPort("reference"))
+        drive = controller.GetOutputPort(controller.drive_port)
+        order = np.eye(self.robot.dimension)[np.argsort(self._coordinates.actuators)]
+        hold = self._add("hold", Hold(self.robot.dimension))
+        builder.Connect(drive, hold.GetInputPort("value"))
+        actuation = self._add("actuation", Linear(order))
+        builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
+        builder.ExportOutput(drive, controller.drive_port)
+        builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
+        builder.ExportOutput(told, "reference")
+        builder.ExportOutput(ports["manifold_point"], "manifold_point")
+        for name in ("manifold_state", "status", "fault"):
+            builder.ExportOutput(controller.GetOutputPort(name), name)
+
+
+def _with_gains(options: ControllerParameters, law: str, bandwidth: float) -> ControllerParameters:
+    """Return options for a law, with gains of a bandwidth where there are none."""
+    chosen = copy.deepcopy(options)
+    chosen.law = law
+    gains = chosen.gains.setdefault(law, LawGains())
+    for kind in ("eta", "xi", "phi"):
+        if not getattr(gains, kind).is_given:
+            setattr(gains, kind, GainParameters(bandwidth=bandwidth))
+    return chosen

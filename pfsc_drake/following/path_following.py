@@ -1,0 +1,84 @@
+"""Path following control of an arm in one call."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.following.followed import Followed
+from pfsc_drake.following.follower import Follower, FollowerOptions
+from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.systems.control.path_projector import PathProjector
+
+_VELOCITY, _ACCELERATION = 0.1, 0.5  # m/s, m/s^2
+
+
+def add_path_following(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    tool: str,
+    path: Path,
+    law: str = "elastic",
+    *,
+    motion: PiecewisePolynomialCurve | None = None,
+    options: FollowerOptions | None = None,
+) -> Follower:
+    """Add a controller that lets a tool follow a path.
+
+    ::
+
+        follower = add_path_following(builder, plant, "tcp", path, law="rigid")
+        builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
+        builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
+
+    Nothing is connected: what is measured may come from encoders, and the drives be real ones.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: The robot, finalized, as the controller believes it.
+        tool: Name of the frame whose origin follows the path, with its orientation if the path
+            has one.
+        path: The path, smooth enough for the law.
+        law: ``velocity_servo``, ``rigid``, ``singular_perturbation``, ``visco_elastic`` or
+            ``elastic``.
+        motion: Arc length over time [m], e.g. from :func:`~pfsc_drake.rest_to_rest`; along the
+            whole path once if omitted.
+        options: What else is chosen.
+
+    Returns:
+        The controller, one diagram with the ports of :class:`Follower`.
+
+    Raises:
+        InputError: If robot, path, law and options do not go together, or the start is out of
+            reach.
+    """
+    chosen = options or FollowerOptions()
+    along = motion or rest_to_rest(
+        [0.0, path.length], velocity=_VELOCITY, acceleration=_ACCELERATION
+    )
+    period = chosen.controller.sampling_time
+
+    def followed(relative_degree: int) -> Followed:
+        oriented = path.orientation is not None
+        manifold = PathManifold(relative_degree, oriented=oriented, turning=path.frame.turns)
+
+        def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
+            projector = inside.AddNamedSystem(
+                "path_projector", PathProjector(path, relative_degree, period)
+            )
+            inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+            return projector.GetOutputPort("manifold_point")
+
+        eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
+        point = path.evaluator(relative_degree).evaluate_at(path.arc_length.parameter(eta))
+        R_e = None
+        if oriented:
+            R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
+        start = ToolTarget(point[manifold.layout.position][:3], R_e)
+        return Followed(manifold, along, start, point, add_projector)
+
+    follower = Follower(plant, tool, law, followed, chosen)
+    builder.AddSystem(follower)
+    return follower

@@ -1,0 +1,132 @@
+"""Path following of a user's own plant: one call, a diagram, and what it refuses."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+import pfsc_drake
+from pfsc_drake import FollowerOptions, WaypointTable, add_path_following, path_from_waypoints
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.models.files import models_directory
+
+POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]]
+
+
+@pytest.fixture(scope="module", name="path")
+def fixture_path():
+    return path_from_waypoints(WaypointTable(np.array(POINTS)), smoothness=6, closed=True)
+
+
+def load(builder, name):
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(models_directory() / "comau_racer_1_4" / f"{name}.sdf"))
+    plant.Finalize()
+    return plant
+
+
+def closed_loop(path, model, law, options=None, **changes):
+    """Return a simulator with the robot at the start, and the follower."""
+    builder = DiagramBuilder()
+    plant = load(builder, model)
+    follower = add_path_following(
+        builder, plant, "tool_point", path, law, options=options, **changes
+    )
+    builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
+    builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
+    if follower.HasInputPort("override"):
+        builder.ExportInput(follower.GetInputPort("override"), "override")
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(root), follower.start_state)
+    return simulator, follower
+
+
+def read(simulator, follower, port):
+    context = follower.GetMyContextFromRoot(simulator.get_context())
+    return follower.GetOutputPort(port).Eval(context)
+
+
+@pytest.mark.parametrize(
+    ("model", "law"),
+    [("comau_racer_1_4", "rigid"), ("comau_racer_1_4_elastic", "elastic")],
+)
+def test_a_users_own_plant_follows_a_users_own_path(path, model, law):
+    """The tool, by Drake's kinematics, is on the path and where the motion has it."""
+    motion = rest_to_rest([0.05, 0.25], velocity=0.5, acceleration=4.0)
+    simulator, follower = closed_loop(path, model, law, motion=motion)
+    simulator.AdvanceTo(0.3)
+    assert read(simulator, follower, "fault")[0] == Fault.NONE
+    diagram, root = simulator.get_system(), simulator.get_context()
+    plant = diagram.GetSystems()[0]
+    pose = plant.GetFrameByName("tool_point").CalcPoseInWorld(plant.GetMyContextFromRoot(root))
+    eta = motion.derivatives(np.array([0.3]), 0)[0, 0, 0]
+    theta = np.array([path.arc_length.parameter(eta)])
+    wanted = path.position.derivatives(theta, 0)[0, 0]
+    # accelerating, a held torque lags by half a sample along the path
+    np.testing.assert_allclose(pose.translation(), wanted, rtol=0, atol=3e-5)
+    assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
+    assert eta > 0.1
+
+
+def test_velocity_servos_are_told_velocities(path):
+    builder = DiagramBuilder()
+    plant = load(builder, "comau_racer_1_4")
+    follower = add_path_following(builder, plant, "tool_point", path, "velocity_servo")
+    context = follower.CreateDefaultContext()
+    follower.GetInputPort("plant_state").FixValue(context, follower.start_state)
+    told = follower.GetOutputPort("velocity_reference").Eval(context)
+    np.testing.assert_allclose(told, 0.0, atol=1e-9)
+    assert not follower.HasOutputPort("drive_torque")
+
+
+def test_an_override_slows_the_progress_and_not_the_tool(path):
+    simulator, follower = closed_loop(
+        path, "comau_racer_1_4", "rigid", FollowerOptions(override=True)
+    )
+    override = simulator.get_system().GetInputPort("override")
+    override.FixValue(simulator.get_mutable_context(), 0.5)
+    simulator.AdvanceTo(1.0)
+    eta, *xi = read(simulator, follower, "manifold_state")[:3]
+    plan = follower.followed.motion.derivatives(np.array([0.5]), 0)[0, 0, 0]
+    assert eta == pytest.approx(plan, abs=1e-5)
+    assert np.linalg.norm(xi) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"law": "rigit"}, "law = rigit; allowed: velocity_servo, rigid"),
+        ({"tool": "tcp"}, "tool = tcp: the plant has no frame of this name"),
+        ({"options": FollowerOptions(measures="q")}, "measures = q; allowed: plant_state"),
+        ({"options": FollowerOptions(posture=np.zeros(5))}, "posture: 5 values; .* 6 joints"),
+        ({"options": FollowerOptions(bandwidth=-3.0)}, "bandwidth = -3"),
+    ],
+)
+def test_what_is_refused(path, changes, message):
+    builder = DiagramBuilder()
+    plant = load(builder, "comau_racer_1_4")
+    given = {"tool": "tool_point", "law": "rigid"} | changes
+    with pytest.raises(InputError, match=message):
+        add_path_following(builder, plant, path=path, **given)
+
+
+def test_a_path_out_of_reach_is_refused():
+    far = path_from_waypoints(
+        WaypointTable(np.array(POINTS) + np.array([3.0, 0.0, 0.0])), smoothness=6, closed=True
+    )
+    builder = DiagramBuilder()
+    plant = load(builder, "comau_racer_1_4")
+    with pytest.raises(InputError, match=r"^start: "):
+        add_path_following(builder, plant, "tool_point", far, "rigid")
+
+
+def test_the_door_is_open():
+    for name in pfsc_drake.__all__:
+        assert getattr(pfsc_drake, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'window'"):
+        pfsc_drake.window  # noqa: B018
