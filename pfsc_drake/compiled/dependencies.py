@@ -120,14 +120,15 @@ class _Walk:
 
     def _instruction(self, operation: int, node: ca.MX, operands: Pattern) -> Pattern:
         """Return what an instruction's results depend on, from the same of its operands."""
+        if not node.n_dep():
+            return _nothing(node.nnz(), operands)
         if operation == ca.OP_CALL:
             return self.function(node.which_function()) @ operands
         if operation in _READS_EVERYTHING:
-            return _everything(node.nnz(), operands.shape[0]) @ operands
+            return _of_all(operands, node.nnz())
         if operation == ca.OP_LOW:
-            table, sought = node.dep(0).nnz(), node.dep(1).nnz()
-            one_by_one = sp.eye_array(sought, dtype=bool)
-            return sp.csr_array(sp.hstack([_everything(sought, table), one_by_one])) @ operands
+            table, sought = operands[: node.dep(0).nnz()], operands[node.dep(0).nnz() :]
+            return _of_all(table, node.nnz()) + sought
         if node.is_unary() or node.is_binary():
             pattern = _entry_by_entry(node, operands)
             if pattern is not None:
@@ -185,6 +186,16 @@ def _calls(function: ca.Function) -> bool:
 def _everything(n_rows: int, n_columns: int) -> sp.csr_array:
     """Return a pattern in which everything depends on everything."""
     return sp.csr_array(np.ones((n_rows, n_columns), dtype=bool))
+
+
+def _of_all(operands: Pattern, n_rows: int) -> Pattern:
+    """Return the pattern of results that each depend on all operands, however many these are."""
+    if isinstance(operands, np.ndarray):
+        return np.repeat(operands.any(axis=0, keepdims=True), n_rows, axis=0)
+    columns = np.unique(operands.nonzero()[1])
+    rows, every = np.repeat(np.arange(n_rows), len(columns)), np.tile(columns, n_rows)
+    shape = n_rows, operands.shape[1]
+    return sp.csr_array((np.ones(len(rows), dtype=bool), (rows, every)), shape=shape)
 
 
 def _nothing(n_rows: int, like: Pattern) -> Pattern:
