@@ -19,7 +19,7 @@ class PieceTable:
     def __init__(self, breakpoints: ArrayLike, coefficients: ArrayLike) -> None:
         breaks, table = np.asarray(breakpoints, float), np.asarray(coefficients, float)
         pieces, self.quantities, self._powers = table.shape
-        self._breakpoints = ca.MX(ca.DM(breaks))
+        self._piece = piece_function(breaks)
         self._table = ca.MX(ca.DM(table.reshape(pieces, -1).T))
         self._power_row = _power_row(self._powers)
 
@@ -29,8 +29,8 @@ class PieceTable:
         Args:
             theta: Scalar.
         """
-        piece = ca.low(self._breakpoints, theta, {"lookup_mode": "binary"})
-        return piece, theta - self._breakpoints[piece]
+        piece, u = self._piece(theta)
+        return piece, u
 
     def __call__(self, theta: ca.MX, first: int = 0, count: int | None = None) -> ca.MX:
         """Return values of neighbouring quantities, shape (count,).
@@ -45,6 +45,13 @@ class PieceTable:
         n = self._powers
         own = ca.reshape(self._table[n * first : n * (first + count), piece], n, count)
         return ca.vec(self._power_row(u) @ own)
+
+
+def piece_function(breakpoints: np.ndarray) -> ca.Function:
+    """``theta -> number of the piece, theta - theta_s``; the first or last one from outside."""
+    theta, table = ca.MX.sym("theta"), ca.MX(ca.DM(breakpoints))
+    piece = ca.low(table, theta, {"lookup_mode": "binary"})
+    return ca.Function("piece", [theta], [piece, theta - table[piece]])
 
 
 def _power_row(count: int) -> ca.Function:

@@ -53,14 +53,10 @@ class Basis(ABC):
 
     @abstractmethod
     def at(self, u: ca.SX) -> ca.SX:
-        """Functions as expressions, [size], of what :meth:`local` returns."""
-
-    @abstractmethod
-    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
-        """What the functions on a piece are functions of, from its begin and a wrapped theta."""
+        """Functions as expressions, [size], of theta, or of its way from the piece's begin."""
 
     def function(self, order: int) -> ca.Function:
-        """Return ``u -> derivatives 0..order``, [order + 1, size], with u as `local` has it."""
+        """Return ``u -> derivatives 0..order``, [order + 1, size], with u as `at` has it."""
         u = ca.SX.sym("u")
         values = self.at(u)
         rows = [(ca.sparsify(ca.DM(D)) @ values).T for D in self.derivations(order)]
@@ -80,6 +76,8 @@ class TrigonometricBasis(Basis):
         closed: Whether the domain is a full turn that closes.
     """
 
+    is_local = False
+
     def __init__(self, domain: tuple[float, float], harmonics: int, *, closed: bool) -> None:
         derivation = np.zeros((2 * harmonics + 1, 2 * harmonics + 1))
         for k in range(1, harmonics + 1):
@@ -98,10 +96,6 @@ class TrigonometricBasis(Basis):
         """See the base class."""
         waves = [(ca.cos(k * u), ca.sin(k * u)) for k in range(1, self._harmonics + 1)]
         return ca.vertcat(1.0, *[value for wave in waves for value in wave])
-
-    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
-        """See the base class."""
-        return theta
 
     def sampler(self) -> Values:
         """See the base class."""
@@ -128,6 +122,8 @@ class PowerBasis(Basis):
         closed: Whether theta is periodic.
     """
 
+    is_local = True
+
     def __init__(self, breakpoints: ArrayLike, degree: int, *, closed: bool = False) -> None:
         derivation = np.diag(np.arange(1.0, degree + 1), -1)
         super().__init__(breakpoints, derivation, closed=closed)
@@ -144,10 +140,6 @@ class PowerBasis(Basis):
         for _ in range(1, self.size):
             powers.append(powers[-1] * u)
         return ca.vertcat(*powers)
-
-    def local(self, theta: ca.MX, breakpoint: ca.MX) -> ca.MX:
-        """See the base class."""
-        return theta - breakpoint
 
     def sampler(self) -> Values:
         """See the base class."""

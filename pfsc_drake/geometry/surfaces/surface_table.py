@@ -2,6 +2,7 @@
 
 import casadi as ca
 
+from pfsc_drake.geometry.piece_table import piece_function
 from pfsc_drake.geometry.surfaces.basis import Basis
 from pfsc_drake.geometry.surfaces.extended import Beyond, ExtendedSurface
 from pfsc_drake.geometry.surfaces.partials import partial_orders
@@ -58,19 +59,18 @@ class _Direction:
 
     def __init__(self, basis: Basis, beyond: Beyond | None) -> None:
         self._basis, self._beyond = basis, beyond
-        self._breakpoints = ca.MX(ca.DM(basis.breakpoints))
+        self._piece = piece_function(basis.breakpoints)
         self._functions: dict[int, ca.Function] = {}
 
     def __call__(self, theta: ca.MX, order: int) -> tuple[ca.MX, ca.MX]:
         """Return the number of the piece, and derivatives 0..order, shape (order + 1, size)."""
         basis = self._basis
         begin, end = float(basis.breakpoints[0]), float(basis.breakpoints[-1])
-        wrapped, piece = theta, ca.MX(0.0)
+        wrapped = theta
         if basis.closed:
             wrapped = theta - ca.floor((theta - begin) / (end - begin)) * (end - begin)
-        if basis.pieces > 1:
-            piece = ca.low(self._breakpoints, wrapped, {"lookup_mode": "binary"})
-        u = basis.local(wrapped, self._breakpoints[piece])
+        piece, from_begin = self._piece(wrapped)
+        u = from_begin if basis.is_local else wrapped
         if order not in self._functions:
             self._functions[order] = self._function(order)
         outside = ca.logic_or(theta < begin, theta > end)
