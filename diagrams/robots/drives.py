@@ -16,12 +16,12 @@ from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.safety import safe_state, supervision
+from pfsc_drake.physics.bus_delay import BusDelay
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.bus_delay import add_bus_delay
 from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 from pfsc_drake.systems.physics.velocity_servo import VelocityServo
@@ -98,9 +98,10 @@ def _add_servo(
     )
     velocity = ports["drive"]
     if servo.bus_delay > 0.0:
-        bus = add_bus_delay(
-            builder, velocity, servo.bus_delay, tick, lost=(servo.lost.begin, servo.lost.end)
-        )
+        lost = servo.lost.begin, servo.lost.end
+        delay = BusDelay(chain.dimension, servo.bus_delay, tick, lost)
+        bus = builder.AddNamedSystem("bus_delay", BlockSystem(delay, tick))
+        builder.Connect(velocity, bus.GetInputPort("sent"))
         builder.Connect(bus.GetOutputPort("silence"), system.GetInputPort("silence"))
         velocity = bus.GetOutputPort("delivered")
     elif ratio > 1:

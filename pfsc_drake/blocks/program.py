@@ -123,10 +123,12 @@ class Program:
         if like is not None:
             numbers = range(len(like.stages))
             return [[n for n in order if like._stage_of[n.results[0]] == k] for k in numbers]
-        groups: dict[Needs, list[Node]] = {}
+        groups: dict[tuple[Needs, Needs], list[Node]] = {}
         for node in order:
-            groups.setdefault(self._needs_of(node, at_start=False), []).append(node)
-        return [nodes for _, nodes in sorted(groups.items(), key=lambda item: len(item[0]))]
+            needs, at_start = (self._needs_of(node, at_start=begin) for begin in (False, True))
+            groups.setdefault((needs, at_start), []).append(node)
+        # what a node takes from another needs no more than itself
+        return [groups[key] for key in sorted(groups, key=lambda key: (len(key[0]), len(key[1])))]
 
     def _stages(self, groups: list[list[Node]]) -> tuple[list[Stage], dict[str, int]]:
         """Return the stages of groups of nodes, and the stage of each wire."""

@@ -103,7 +103,7 @@ class JointEncoders(Block):
 
     def _velocity(self, x: Values, t: Any, q: Any, q_before: Any, v_before: Any) -> Any:
         quotient = (q - q_before) / self._period
-        return where(t > x.tick, v_before + self._weight * (quotient - v_before), v_before)
+        return where(t > x.tick + 0.5, v_before + self._weight * (quotient - v_before), v_before)
 
     def _quantized(self, u: Values) -> tuple[Any, Any, Any, Any]:
         """Return ``q_J`` and ``q_M`` in whole steps, with their velocities."""

@@ -17,9 +17,10 @@ from diagrams.tasks.task import Task
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.margins.modes import in_loop
+from pfsc_drake.physics.bus_delay import BusDelay
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.tool_compensation import ToolCompensation
-from pfsc_drake.systems.physics.bus_delay import BusDelay
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 Kind = TypeVar("Kind", bound=LeafSystem)
@@ -185,8 +186,9 @@ class StationLoop:
         systems = {system.get_name(): system for system in self.station.diagram.GetSystems()}
         N = self.station.robot.dimension
         for system in systems.values():
-            if isinstance(system, BusDelay):  # newest sample first
-                return self.map.rows(system)[:N], True
+            if isinstance(system, BlockSystem) and isinstance(system.block, BusDelay):
+                newest = system.states["samples"].start
+                return self.map.rows(system)[newest : newest + N], True
         name = "velocity_hold" if "velocity_hold" in systems else "hold"
         return self.map.rows(systems[name])[-N:], name != "hold"
 

@@ -131,12 +131,10 @@ def test_a_bus_delays_by_its_time(settings):
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    bus = station.diagram.GetSubsystemByName("bus_delay")
     delivered = []
     for tick in range(80):
         simulator.AdvanceTo((tick + 0.5) * TICK)
-        inner = bus.GetMyContextFromRoot(root)
-        delivered.append(bus.GetOutputPort("delivered").Eval(inner))
+        delivered.append(station.blocks.output(root, "bus_delay.delivered"))
     _, signals = station.log.read(root)
     sent = signals["law"][:, station.law.layout.drive]
     assert np.abs(np.diff(sent[-20:], axis=0)).max() > 1e-5
@@ -153,11 +151,10 @@ def test_a_bus_samples_at_the_ticks_of_the_law_whatever_the_servo_does(settings)
     root = simulator.get_mutable_context()
     station.set_start(root)
     simulator.Initialize()
-    bus = station.diagram.GetSubsystemByName("bus_delay")
     delivered = []
     for quarter in range(40):
         simulator.AdvanceTo((quarter + 0.5) * TICK / 4)
-        delivered.append(bus.GetOutputPort("delivered").Eval(bus.GetMyContextFromRoot(root)))
+        delivered.append(station.blocks.output(root, "bus_delay.delivered"))
     sent = station.log.read(root)[1]["law"][:, station.law.layout.drive]
     np.testing.assert_array_equal(delivered[8:], np.repeat(sent, 4, axis=0)[:32])
 

@@ -6,11 +6,14 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.blocks.program import Program
 from pfsc_drake.errors import InputError
-from pfsc_drake.systems.physics.bus_delay import BusDelay, add_bus_delay
+from pfsc_drake.physics.bus_delay import BusDelay
+from pfsc_drake.systems.block_system import BlockSystem
 
 T = 1e-3
-PORTS = {BusDelay: "delivered", ZeroOrderHold: "y"}
+PORTS = {BlockSystem: "delivered", ZeroOrderHold: "y"}
 
 
 class Clock(LeafSystem):
@@ -35,6 +38,12 @@ class LateStarter(LeafSystem):
     def _start(self, context, state):
         state.set_value([5.0])
         return EventStatus.Succeeded()
+
+
+def add_bus_delay(builder, port, delay, period, lost=(0.0, 0.0)):
+    bus = builder.AddSystem(BlockSystem(BusDelay(port.size(), delay, period, lost), period))
+    builder.Connect(port, bus.GetInputPort("sent"))
+    return bus
 
 
 def build(delay, period=T):
@@ -87,11 +96,15 @@ def test_what_a_sender_had_before_it_was_initialized_is_never_delivered():
 
 
 def test_no_direct_feedthrough():
-    assert not BusDelay(3, 2e-3, 1e-3).HasAnyDirectFeedthrough()
+    """But at the start, when it delivers what is sent then."""
+    program = Program(Network.of(BusDelay(3, 2e-3, 1e-3)))
+    for port in ("delivered", "silence"):
+        stage, _ = program.output(port)
+        assert not any(source.kind == "input" for source in program.stages[stage].needs)
 
 
 def test_contexts_do_not_share_samples():
-    bus = BusDelay(1, 2e-3, 1e-3)
+    bus = BlockSystem(BusDelay(1, 2e-3, 1e-3), 1e-3)
     simulators = [Simulator(bus) for _ in range(2)]
     for value, simulator in enumerate(simulators):
         context = simulator.get_mutable_context()
