@@ -49,6 +49,16 @@ class Stepper:
         self._x[:] = self._initial.results["x_start"]
         self._name_states()
 
+    def set_state(self, name: str, value: Any) -> None:
+        """Set what is remembered, after the start.
+
+        Args:
+            name: Of the state.
+            value: Of the state.
+        """
+        self._x[self._program.states[name]] = value
+        self._name_states()
+
     def step(self, **inputs: Any) -> dict[str, np.ndarray]:
         """Return the outputs of a tick by name, and go on to the next.
 

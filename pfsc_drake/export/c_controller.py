@@ -1,0 +1,217 @@
+"""A network of blocks as a controller in C99."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.blocks.program import Program
+from pfsc_drake.compiled.c_source import c_source, parameters
+from pfsc_drake.errors import InputError
+
+_FUNCTIONS = "controller_functions"
+_HEADER = """\
+/* {title}
+
+   One call of controller_initialize, then one of controller_step every {period:g} s. Nothing is
+   allocated, nothing is kept but what is in controller_state: any number of controllers may run.
+*/
+#ifndef CONTROLLER_H
+#define CONTROLLER_H
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+#define CONTROLLER_SAMPLING_TIME {period!r} /* s */
+
+typedef struct {{
+    double tick; /* number of the next tick */
+    double x[{size}];
+}} controller_state;
+
+typedef struct {{
+{inputs}
+}} controller_inputs;
+
+typedef struct {{
+{outputs}
+}} controller_outputs;
+
+/* Begin where the inputs say. */
+void controller_initialize(controller_state *state, const controller_inputs *inputs);
+
+/* Evaluate one tick; returns the fault, 0 for none. */
+int controller_step(
+    controller_state *state, const controller_inputs *inputs, controller_outputs *outputs);
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+_SOURCE = """\
+#include "controller.h"
+
+#include <string.h>
+
+#include "{functions}.h"
+
+void controller_initialize(controller_state *state, const controller_inputs *inputs)
+{{
+    {unused}state->tick = 0.0;
+    {functions}_initial({initial});
+}}
+
+int controller_step(
+    controller_state *state, const controller_inputs *inputs, controller_outputs *outputs)
+{{
+    double x_next[{size}];
+    {functions}_step({step});
+    memcpy(state->x, x_next, sizeof x_next);
+    state->tick += 1.0;
+    return {fault};
+}}
+"""
+
+
+@dataclass(frozen=True)
+class CController:
+    """A controller in C99.
+
+    Attributes:
+        program: What it does.
+        period: Sampling time [s].
+        title: What it is.
+        presets: States that it begins with, by name; the others are what the inputs say.
+        scenario: What it was made from: a name, or a hash.
+    """
+
+    program: Program
+    period: float
+    title: str = "Controller"
+    presets: Mapping[str, np.ndarray] = field(default_factory=dict)
+    scenario: str = ""
+
+    @classmethod
+    def of(cls, network: Network, period: float, **about: Any) -> "CController":
+        """Return the controller that a network is.
+
+        Args:
+            network: Of blocks.
+            period: Sampling time [s].
+            about: Further attributes.
+
+        Raises:
+            InputError: If it has no output ``fault``, or no input.
+        """
+        if "fault" not in network.outputs or not network.inputs:
+            raise InputError(
+                f"export: outputs {', '.join(network.outputs)} and inputs "
+                f"{', '.join(network.inputs)}; there must be fault among the former, and one of "
+                "the latter"
+            )
+        return cls(Program(network), period, **about)
+
+    def files(self) -> dict[str, str]:
+        """Return the contents of all source files and of ``interface.json``, by name."""
+        step, initial = self.program.step(), self._initial()
+        functions = c_source({"step": step, "initial": initial}, _FUNCTIONS)
+        size = max(self.program.size, 1)
+        given = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
+        fault = f"(int) outputs->{_identifier('fault')}[0]"
+        return functions | {
+            "controller.h": _HEADER.format(
+                title=self.title,
+                period=self.period,
+                size=size,
+                inputs=_members(self.interface()["inputs"]),
+                outputs=_members(self.interface()["outputs"]),
+            ),
+            "controller.c": _SOURCE.format(
+                functions=_FUNCTIONS,
+                size=size,
+                unused="" if initial.n_in() > 1 else "(void)inputs;\n    ",
+                initial=", ".join(self._arguments(initial, given | {"x_start": "state->x"})),
+                step=", ".join(self._arguments(step, given)),
+                fault=fault,
+            ),
+            "interface.json": json.dumps(self.interface(), indent=2) + "\n",
+        }
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write all files, and return them.
+
+        Args:
+            folder: Made if it does not exist.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        written = []
+        for name, text in self.files().items():
+            (folder / name).write_text(text, encoding="utf-8")
+            written.append(folder / name)
+        return written
+
+    def interface(self) -> dict[str, Any]:
+        """Return what ``interface.json`` says."""
+        network = self.program.network
+        inputs = [
+            {"name": name, "size": port.size, "unit": port.unit}
+            for name, port in network.inputs.items()
+        ]
+        outputs = [
+            {"name": name, "size": network.wires[wire], "unit": network.units[name]}
+            for name, wire in network.outputs.items()
+        ]
+        return {
+            "inputs": inputs,
+            "outputs": outputs,
+            "state_bytes": 8 * (1 + max(self.program.size, 1)),
+            "sampling_time": self.period,
+            "scenario": self.scenario,
+        }
+
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states that are set before the start, and which: ``x`` and ``preset``."""
+        x, preset = np.zeros(self.program.size), np.zeros(len(self.program.states))
+        for name, value in self.presets.items():
+            x[self.program.states[name]] = value
+            preset[list(self.program.states).index(name)] = 1.0
+        return x, preset
+
+    def _initial(self) -> ca.Function:
+        """Return ``(t, inputs ..) -> x_start``."""
+        names = self.program.initial_inputs
+        t = ca.MX.sym("t")
+        u = {name: ca.MX.sym(name, self.program.network.inputs[name].size) for name in names}
+        x, preset = self.start()
+        begun = self.program.initial(ca.DM(x), ca.DM(preset), t, *u.values())
+        return ca.Function("initial", [t, *u.values()], [begun], ["t", *u], ["x_start"])
+
+    def _arguments(self, function: ca.Function, given: Mapping[str, str]) -> list[str]:
+        """Return what a function in C is called with."""
+        n = function.n_in()
+        names = [*function.name_in(), *function.name_out()]
+        return [
+            given.get(name, f"{'inputs' if i < n else 'outputs'}->{member}")
+            for i, (name, member) in enumerate(zip(names, map(_identifier, names), strict=True))
+        ]
+
+
+def _identifier(name: str) -> str:
+    """Return a name as one of C."""
+    return parameters(ca.Function("f", [ca.SX.sym("x")], [], [name], []))[0]
+
+
+def _members(ports: list[dict[str, Any]]) -> str:
+    return "\n".join(
+        f"    double {_identifier(port['name'])}[{port['size']}];"
+        + (f" /* {port['unit']} */" if port["unit"] else "")
+        for port in ports
+    )
