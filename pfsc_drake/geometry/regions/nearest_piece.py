@@ -1,4 +1,4 @@
-"""The nearest place of a curve among all of its pieces, as an expression."""
+"""The nearest place of a boundary among all of its pieces, as an expression."""
 
 import math
 
@@ -16,13 +16,13 @@ ON_NO_PIECE = -1.0
 
 
 def nearest_foot(pieces: Pieces, foot: ca.Function) -> ca.Function:
-    """Function ``point -> foot`` of the nearest of all feet on the pieces of a curve.
+    """Function ``point -> foot`` of the nearest of all feet on the pieces of a boundary.
 
     As :class:`NearestFoot` finds it, but without a tree: the bounds of all pieces are evaluated,
     and those that may be nearer than what was found are tried in the order of their bounds.
 
     Args:
-        pieces: All of the curve, [n, 1].
+        pieces: All of the boundary; their numbers go along the second direction first.
         foot: Local minimum near the middle of a piece, ``(point, number) -> foot``, shape (k,): its
             distance [m]; the number of the piece it is on, -1 on an end; whether the point is on
             the other side than the normal there; and what else is wanted to be known.
@@ -56,9 +56,9 @@ def _try_next(pieces: Pieces, foot: ca.Function) -> ca.Function:
 
     So have those beside a foot that is the only one of its block.
     """
-    count = len(pieces.radius)
+    count = pieces.radius.size
     low, best = ca.MX.sym("low", count), ca.MX.sym("best", foot.size1_out(0))
-    point, numbers = ca.MX.sym("point", 3), ca.MX(ca.DM(np.arange(float(count))))
+    point, numbers = ca.MX.sym("point", 3), _row(np.arange(float(count)))
     number = ca.mmin(ca.if_else(low <= ca.mmin(low), numbers, count - 1.0))
     found = foot(point, number)
     piece = ca.fmax(found[PIECE], 0.0)
@@ -66,10 +66,7 @@ def _try_next(pieces: Pieces, foot: ca.Function) -> ca.Function:
     alone = ca.logic_and(
         found[PIECE] != ON_NO_PIECE, found[DISTANCE] < ca.if_else(found[BELOW], below, above)
     )
-    apart = ca.fabs(numbers - piece)
-    if pieces.closed[0]:
-        apart = ca.fmin(apart, count - apart)
-    done = ca.logic_or(numbers == number, ca.logic_and(alone, apart <= BLOCK))
+    done = ca.logic_or(numbers == number, ca.logic_and(alone, _beside(pieces, piece)))
     return ca.Function(
         "try_next",
         [low, best, point],
@@ -78,6 +75,26 @@ def _try_next(pieces: Pieces, foot: ca.Function) -> ca.Function:
             ca.if_else(found[DISTANCE] < best[DISTANCE], found, best),
         ],
     )
+
+
+def _beside(pieces: Pieces, piece: ca.MX) -> ca.MX:
+    """Which pieces are within the block around one, [n]."""
+    row = ca.floor(piece / pieces.radius.shape[1])
+    places = row, piece - row * pieces.radius.shape[1]
+    within = ca.MX(1.0)
+    for place, of_each, count, closed in zip(
+        places,
+        np.indices(pieces.radius.shape, dtype=float),
+        pieces.radius.shape,
+        pieces.closed,
+        strict=True,
+    ):
+        if count > 1:
+            apart = ca.fabs(_row(of_each) - place)
+            if closed:
+                apart = ca.fmin(apart, count - apart)
+            within = ca.logic_and(within, apart <= BLOCK)
+    return within
 
 
 def _unless_done(advance: ca.Function) -> ca.Function:

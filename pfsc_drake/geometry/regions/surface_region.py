@@ -1,23 +1,29 @@
 """Regions bounded by any surface."""
 
 import math
-from bisect import bisect_right
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.foot import FootFinder
+from pfsc_drake.geometry.regions.nearest_piece import ON_NO_PIECE, nearest_foot
 from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
-from pfsc_drake.geometry.regions.region import Distance, Region
+from pfsc_drake.geometry.regions.region import Distance, FormulaRegion, Symbol, direction
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
 from pfsc_drake.geometry.surfaces.partials import partial_index
-from pfsc_drake.geometry.surfaces.projection import Pair, SurfaceProjector
+from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
 from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
 
 # Of the normal on a piece, rad, as far as these numbers of pieces in a direction allow.
 _TURNING = 0.12
 _FEWEST_PIECES, _MOST_PIECES = 16, 192
+# Pieces that a formula bounds one by one, which takes 0.05 us each, and some of them again.
+_MOST_IN_FORMULA = 512
 # Samples along a piece by which its bend is bounded.
 _SAMPLES = 3
 
@@ -29,7 +35,7 @@ class _SurfaceFoot(NamedTuple):
     signed: Distance
 
 
-class SurfaceRegion(Region):
+class SurfaceRegion(FormulaRegion):
     """What lies on one side of a surface, a spline fit for instance.
 
     The foot is the nearest point of the whole surface: pieces of it, whose bends are bounded from
@@ -48,56 +54,77 @@ class SurfaceRegion(Region):
         InputError: The surface is not regular.
     """
 
-    def __init__(self, surface: Surface, *, above: bool) -> None:
-        self._surface = surface
-        self._sign = 1.0 if above else -1.0
-        edges = _edges(surface)
-        self._middles = [(0.5 * (values[1:] + values[:-1])).tolist() for values in edges]
-        self._inner = [values[1:-1].tolist() for values in edges]
-        self._sample = surface.flat_sampler(1)
-        self._projector = SurfaceProjector(surface)
-        self._nearest = NearestFoot(_pieces(surface, edges), self._project)
+    symbol = ca.MX
 
-    @property
-    def signed_distance(self) -> NoReturn:
-        """See the base class."""
-        raise InputError(
-            "fitted surface: its nearest place is searched for, in as many steps as that takes; no"
-            " formula has it"
-        )
+    def __init__(self, surface: Surface, *, above: bool) -> None:
+        edges = _edges(surface)
+        self._pieces = _pieces(surface, edges)
+        self._foot = _foot_of_piece(surface, edges, 1.0 if above else -1.0)
+        self._project = PlainFunction(self._foot)
+        self._nearest = NearestFoot(self._pieces, self._foot_near)
 
     def distance(self, x: float, y: float, z: float) -> Distance:
         """See the base class."""
         return self._nearest(x, y, z).signed
 
-    def _project(self, x: float, y: float, z: float, row: int, column: int) -> _SurfaceFoot:
-        guess = (self._middles[0][row], self._middles[1][column])
-        foot = self._projector.project((x, y, z), guess)
-        a, b, c, ux, uy, uz, vx, vy, vz = self._sample(*foot.theta).tolist()
-        a, b, c = x - a, y - b, z - c
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        along = (a * nx + b * ny + c * nz) / length
-        away = math.sqrt(a * a + b * b + c * c)
-        if away and (foot.at_border or not foot.converged):
-            # along the way from the foot, which a normal is not
-            side = 1.0 if foot.at_border else math.copysign(1.0, along * self._sign)
-            scale = side / away
-            signed = side * away, scale * a, scale * b, scale * c
-        else:
-            scale = self._sign / length
-            signed = self._sign * along, scale * nx, scale * ny, scale * nz
-        piece = None if foot.at_border else self._piece(foot.theta)
-        return _SurfaceFoot(away, piece, bool(along < 0.0), signed)
+    def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
+        """See the base class.
 
-    def _piece(self, theta: Pair) -> tuple[int, int]:
-        first, second = (
-            bisect_right(inner, value if begin <= value <= end else _wrapped(value, begin, end))
-            for inner, value, (begin, end) in zip(
-                self._inner, theta, self._surface.domain, strict=True
+        Raises:
+            InputError: The surface has too many pieces.
+        """
+        count = self._pieces.radius.size
+        if count > _MOST_IN_FORMULA:
+            raise InputError(
+                f"surface of {count} pieces: the nearest is searched for in a tree of them; a"
+                f" formula has at most {_MOST_IN_FORMULA}"
             )
-        )
-        return first, second
+        foot = nearest_foot(self._pieces, self._foot)(point)
+        return foot[3], foot[4:]
+
+    def _foot_near(self, x: float, y: float, z: float, row: int, column: int) -> _SurfaceFoot:
+        columns = self._pieces.radius.shape[1]
+        away, piece, below, *signed = self._project(x, y, z, row * columns + column)
+        place = None if piece == ON_NO_PIECE else divmod(int(piece), columns)
+        return _SurfaceFoot(away, place, bool(below), tuple(signed))
+
+
+def _foot_of_piece(surface: Surface, edges: list[np.ndarray], sign: float) -> ca.Function:
+    """Function ``(point, number) -> foot``, see :func:`nearest_foot`, with h and n, shape (7,).
+
+    Args:
+        surface: The surface.
+        edges: Lines between pieces in both directions.
+        sign: 1 if the side that the normal (4.3) points to is admissible, -1 if the other one is.
+    """
+    point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
+    table, columns = SurfaceTable(surface), len(edges[1]) - 1
+    finder = FootFinder(lambda theta: table(theta, 2), surface.domain, surface.closed, LONGEST_STEP)
+    row = ca.floor(number / columns)
+    middles = [ca.MX(ca.DM(0.5 * (e[1:] + e[:-1]))) for e in edges]
+    foot = finder.find(point, ca.vertcat(middles[0][row], middles[1][number - row * columns]))
+    position, first, second = ca.horzsplit(table(foot.theta, 1))
+    normal = ca.cross(first, second)
+    normal = normal / ca.norm_2(normal)
+    along = ca.dot(point - position, normal)
+    away, outwards = direction(point - position, (0.0, 0.0, 0.0))
+    # of what is not above a normal, the way from the foot
+    side = ca.if_else(foot.beyond_end, 1.0, ca.copysign(1.0, sign * along))
+    is_normal = ca.logic_or(
+        away == 0.0, ca.logic_and(foot.converged, ca.logic_not(foot.beyond_end))
+    )
+    places = []
+    for k, ((begin, end), lines) in enumerate(zip(surface.domain, edges, strict=True)):
+        laps = ca.floor((foot.theta[k] - begin) / (end - begin)) if surface.closed[k] else 0.0
+        places.append(ca.low(ca.MX(ca.DM(lines)), foot.theta[k] - laps * (end - begin)))
+    found = [
+        away,
+        ca.if_else(foot.beyond_end, ON_NO_PIECE, columns * places[0] + places[1]),
+        along < 0.0,
+        ca.if_else(is_normal, sign * along, side * away),
+        ca.if_else(is_normal, sign * normal, side * outwards),
+    ]
+    return ca.Function("foot_of_piece", [point, number], [ca.vertcat(*found)])
 
 
 def normal_points_outwards(surface: Surface) -> bool:
@@ -114,10 +141,6 @@ def normal_points_outwards(surface: Surface) -> bool:
     ]
     density = np.sum(about * np.cross(first, second), axis=-1)
     return bool(np.einsum("ij,i,j->", density, *cells) > 0.0)
-
-
-def _wrapped(value: float, begin: float, end: float) -> float:
-    return begin + (value - begin) % (end - begin)
 
 
 def _edges(surface: Surface) -> list[np.ndarray]:

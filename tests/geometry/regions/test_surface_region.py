@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.geometry import (
     FourierCurve,
     SurfaceProjector,
@@ -107,6 +108,17 @@ def test_gradient_is_that_of_the_distance(case):
             assert n == pytest.approx(gradient(region.distance, y), abs=1e-5)
         # the foot
         assert abs(region.distance(*(y - h * np.array(n)))[0]) < 1e-12
+
+
+def test_the_formula_of_few_pieces_finds_what_the_tree_finds():
+    """Above and below a bump, and beside its border."""
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, 12), np.linspace(-0.3, 0.3, 9), indexing="ij")
+    points = np.stack([x, y, 0.04 * np.cos(4.0 * x) * np.cos(3.0 * y)], axis=-1)
+    region = SurfaceRegion(surface_through_grid(points, smoothness=3), above=False)
+    formula = PlainFunction(region.signed_distance)
+    for place in np.random.default_rng(7).uniform(-0.6, 0.6, size=(200, 3)).tolist():
+        assert formula(*place) == pytest.approx(region.distance(*place), abs=1e-12)
+    assert math.isnan(formula(math.nan, 0.0, 0.0)[0])
 
 
 def test_it_is_lipschitz(case, examples):
