@@ -53,6 +53,7 @@ fuzz: setup
 
 benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
+	$(BIN)/python -m tests.benchmarks.paces
 
 models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer

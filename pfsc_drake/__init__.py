@@ -35,9 +35,11 @@ _DOOR = {
     "Path": "pfsc_drake.geometry",
     "WaypointTable": "pfsc_drake.geometry",
     "add_path_following": "pfsc_drake.following.path_following",
+    "add_surface_following": "pfsc_drake.following.surface_following",
     "fuse": "pfsc_drake.systems.fuse",
     "path_from_waypoints": "pfsc_drake.geometry",
     "rest_to_rest": "pfsc_drake.control.law.reference",
+    "straight_lines": "pfsc_drake.control.law.reference",
 }
 
 __all__ = ["InputError", "__version__", *_DOOR]

@@ -1,0 +1,86 @@
+"""Surface following control of an arm in one call."""
+
+from typing import Literal
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.followed import Followed
+from pfsc_drake.following.follower import Follower, FollowerOptions
+from pfsc_drake.geometry import PiecewisePolynomialCurve
+from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
+from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+
+
+def add_surface_following(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    tool: str,
+    surface: Surface,
+    motion: PiecewisePolynomialCurve,
+    law: str = "elastic",
+    *,
+    orientation: Literal["normal"] | None = None,
+    offset: np.ndarray | None = None,
+    start: tuple[float, float] | None = None,
+    options: FollowerOptions | None = None,
+) -> Follower:
+    """Add a controller that lets a tool follow a surface, see :func:`add_path_following`.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: The robot, finalized, as the controller believes it.
+        tool: Name of the frame whose origin follows the surface.
+        surface: The surface, smooth enough for the law.
+        motion: Two tangential coordinates over time [m], e.g. from
+            :func:`~pfsc_drake.straight_lines`.
+        law: See :func:`add_path_following`.
+        orientation: ``normal``: the tool's axes are those of the surface, turned by ``offset``;
+            None if its orientation does not matter.
+        offset: Rotation from the surface's axes to the tool's, shape (3, 3).
+        start: Parameters theta where the motion begins; the middle of the surface if omitted.
+        options: What else is chosen.
+
+    Returns:
+        The controller, one diagram with the ports of :class:`Follower`.
+
+    Raises:
+        InputError: If robot, surface, motion, law and options do not go together, or the start is
+            out of reach.
+    """
+    chosen = options or FollowerOptions()
+    if motion.dimension != 2:
+        raise InputError(f"motion: {motion.dimension} coordinates; a surface has 2")
+    theta = [sum(ends) / 2.0 for ends in surface.domain] if start is None else list(start)
+
+    def followed(relative_degree: int) -> Followed:
+        manifold = SurfaceManifold(relative_degree, orientation=orientation, offset=offset)
+        evaluator = SurfaceEvaluator(surface, relative_degree)
+
+        def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
+            projector = inside.AddNamedSystem(
+                "surface_projector",
+                ManifoldProjector(
+                    manifold.layout,
+                    lambda y_t, place: evaluator(y_t, place[:2].tolist(), place[2:].tolist()),
+                    lambda y_t: np.append(evaluator.project_globally(y_t).theta, eta),
+                    chosen.controller.sampling_time,
+                ),
+            )
+            inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+            return projector.GetOutputPort("manifold_point")
+
+        eta = motion.derivatives(np.array([motion.domain[0]]), 0)[0, 0]
+        y_t = evaluator.evaluate_at(theta)[manifold.layout.position][:3]
+        point = evaluator(y_t.tolist(), list(theta), eta.tolist())
+        R_e = manifold.orientation(point[None])[0] if manifold.is_oriented else None
+        return Followed(manifold, motion, ToolTarget(y_t, R_e), point, add_projector)
+
+    follower = Follower(plant, tool, law, followed, chosen)
+    builder.AddSystem(follower)
+    return follower
