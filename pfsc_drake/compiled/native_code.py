@@ -5,8 +5,8 @@ turns the same list into machine code: the same operations in the same order, no
 reordered, and CasADi's own mathematical library for sines and the like. Only the sign of a NaN may
 differ. What cannot be translated is left to the interpreter.
 
-Machine code is made without LLVM's optimizations: they take ten times as long, for a law of 8,000
-instructions seconds, and gain a fifth. It is kept for the next process.
+Machine code is made without LLVM's optimizations: they take seven times as long, for the whole tick
+of an elastic arm more than a second, and gain a fifth. It is kept for the next process.
 """
 
 import ctypes
@@ -75,9 +75,9 @@ _compiled: dict[str, NativeCode | str] = {}
 def native_code(function: ca.Function) -> NativeCode | None:
     """Return the machine code of a function, or None if there can be none.
 
-    Functions of the same content are made once per process. It takes 40 microseconds per
-    instruction the first time, as long as the interpreter takes for 5000 evaluations, and a few
-    milliseconds after that.
+    Functions of the same content are made once per process. It takes 10 to 20 microseconds per
+    instruction the first time, as long as the interpreter takes for some thousand evaluations, and
+    a few milliseconds in every process after that.
 
     Args:
         function: Any function; of scalar expressions (SX) or matrix expressions (MX) that is

@@ -70,5 +70,8 @@ class ObjectStore:
 def user_store() -> ObjectStore:
     """Return the store in the user's folder for what can be made again."""
     given = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(given) if Path(given).is_absolute() else Path("~/.cache").expanduser()
+    try:
+        base = Path(given) if Path(given).is_absolute() else Path.home() / ".cache"
+    except RuntimeError:  # there is no such user; nothing can be kept below what is no folder
+        base = Path(os.devnull)
     return ObjectStore(base / "pfsc_drake" / "machine_code")

@@ -81,3 +81,13 @@ def test_the_user_folder(tmp_path, monkeypatch, value):
     assert (tmp_path / ".cache" / "pfsc_drake" / "machine_code" / "key").exists()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "elsewhere"))
     assert user_store().get("key") is None
+
+
+def test_a_user_without_a_home_keeps_nothing(monkeypatch):
+    def fail():
+        raise RuntimeError("could not determine home directory")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", fail)
+    user_store().put("key", CODE)
+    assert user_store().get("key") is None
