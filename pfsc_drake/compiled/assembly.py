@@ -216,7 +216,7 @@ class Assembly(Code):
         if len(self._lines) > self._block_end:
             self._block_end = len(self._lines) + _BLOCK
             self._lines += [f"br label %next{self._block_end}", f"next{self._block_end}:"]
-        self._lines.append(line)
+        super()._emit(line)
 
     def _operated(self, name: str, code: int, x: str, y: str) -> str:
         return operation(code).format(v=f"%{name}", x=_operand(x), y=_operand(y))

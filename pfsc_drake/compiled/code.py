@@ -7,7 +7,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, literal
+from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, Untranslatable, literal
 
 __all__ = ["Code", "Tables", "Value", "Values", "elements", "literals"]
 
@@ -20,6 +20,8 @@ which stand for 1.0 and 0.0, with c, of whole numbers with i.
 
 Values = list[Value]
 _ZERO = literal(0.0)
+# of one function; machine code without optimizations keeps every value on the stack
+_MOST_INSTRUCTIONS = 50_000
 
 
 class Table(list[Value]):
@@ -72,9 +74,6 @@ class Code(ABC):
         self._loaded: dict[Value, str] = {}
         self._names = 0
 
-    def __len__(self) -> int:
-        return len(self._lines)
-
     def apply(self, code: int, x: Value, y: Value | None = None) -> str:
         """Add an operation on numbers, and return its result.
 
@@ -82,6 +81,9 @@ class Code(ABC):
             code: The operation as CasADi counts them.
             x: The first operand.
             y: The second; nothing for operations of one.
+
+        Raises:
+            Untranslatable: If the operation is not known, or there are too many instructions.
         """
         if y is None:
             y = x
@@ -173,6 +175,8 @@ class Code(ABC):
         return name
 
     def _emit(self, line: str) -> None:
+        if len(self._lines) >= _MOST_INSTRUCTIONS:
+            raise Untranslatable(f"a function of more than {_MOST_INSTRUCTIONS} instructions")
         self._lines.append(line)
 
     @abstractmethod

@@ -15,8 +15,6 @@ from pfsc_drake.compiled.operations import Untranslatable, literal
 
 __all__ = ["Translation", "translate"]
 
-# of one function; machine code without optimizations keeps every value on the stack
-_MOST_INSTRUCTIONS = 50_000
 _LOOK_UP_MODES = {"0": "linear", "1": "exact", "2": "binary"}
 
 
@@ -87,8 +85,6 @@ class Translation:
         return self._names[key]
 
     def _scalars(self, function: ca.Function, name: str) -> str:
-        if function.n_instructions() > _MOST_INSTRUCTIONS:
-            raise Untranslatable(f"{function.name()}, of {function.n_instructions()} instructions")
         code = self._language(self.tables)
         arguments, results = _arguments(function), _results(function)
         # the value that each place of the interpreter's memory has at present
@@ -143,8 +139,6 @@ class Translation:
         for pointer, first, numbers in put_out:
             for i, number in enumerate(numbers):
                 code.store(number, pointer, first + i)
-        if len(code) > _MOST_INSTRUCTIONS:
-            raise Untranslatable(f"{function.name()}, of {len(code)} instructions")
         return code.text(name, [*arguments, *results])
 
     def _call(self, code: Code, function: ca.Function, operands: list[Values]) -> list[Values]:

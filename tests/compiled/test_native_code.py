@@ -67,9 +67,13 @@ def test_unknown_operation_is_left_to_the_interpreter():
     assert why_not(FUNCTION) is None
 
 
-def test_huge_functions_are_left_to_the_interpreter(monkeypatch, afresh):
-    monkeypatch.setattr("pfsc_drake.compiled.translation._MOST_INSTRUCTIONS", 3)
-    assert why_not(FUNCTION) == f"f, of {FUNCTION.n_instructions()} instructions"
+@pytest.mark.parametrize("symbol", [ca.SX, ca.MX])
+def test_huge_functions_are_left_to_the_interpreter(monkeypatch, afresh, symbol):
+    monkeypatch.setattr("pfsc_drake.compiled.code._MOST_INSTRUCTIONS", 1000)
+    x = symbol.sym("x", 20, 20)
+    reason = why_not(ca.Function("f", [x], [x @ x]))
+    assert reason == "a function of more than 1000 instructions"
+    assert native_code(ca.Function("f", [x], [x[:4, :4] @ x[:4, :4]])) is not None
 
 
 def test_without_llvmlite(monkeypatch, afresh):
