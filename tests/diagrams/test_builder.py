@@ -17,22 +17,25 @@ WIRES = {
     ENCODERS: {
         ("tool_kinematics", "joint_state"),
         ("following_controller", "joint_state"),
-        ("log_signals", "u0"),
+        ("log_signals", "joint_state"),
     },
-    ("tool_kinematics", "tool_pose"): {("path_projector", "tool_pose"), ("log_signals", "u1")},
+    ("tool_kinematics", "tool_pose"): {
+        ("path_projector", "tool_pose"),
+        ("log_signals", "tool_pose"),
+    },
     ("path_projector", "manifold_point"): {
         ("following_controller", "manifold_point"),
-        ("log_signals", "u2"),
+        ("log_signals", "manifold_point"),
     },
     ("reference_generator", "reference"): {
         ("following_controller", "reference"),
-        ("log_signals", "u3"),
+        ("log_signals", "reference"),
     },
-    ("following_controller", "law"): {("log_signals", "u4")},
-    ("following_controller", "drive_torque"): {("hold", "u")},
-    ("hold", "y"): {("drives", "u0")},
+    ("following_controller", "law"): {("log_signals", "law")},
+    ("following_controller", "drive_torque"): {("hold", "value")},
+    ("hold", "held"): {("drives", "u0")},
     ("drives", "y0"): {("plant", "actuation")},
-    ("log_signals", "y0"): {("log", "data")},
+    ("log_signals", "all"): {("log", "data")},
 }
 
 

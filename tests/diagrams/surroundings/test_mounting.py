@@ -98,8 +98,7 @@ def test_the_way_back_starts_where_the_frame_stands():
     np.testing.assert_allclose(state[4:7], station.mounting.X_WF.translation(), atol=1e-12)
     np.testing.assert_allclose(state[11:14], station.mounting.X_WM.translation(), atol=1e-12)
     assert held(station, root) == 1.0
-    view = station.diagram.GetSubsystemByName("tool_motion")
-    motion = view.GetOutputPort("tool_motion").Eval(view.GetMyContextFromRoot(root))
+    motion = station.blocks.output(root, "tool_motion.tool_motion")
     np.testing.assert_allclose(motion[:3], station.mounting.X_WF.translation(), atol=1e-7)
     R = station.mounting.X_WF.rotation().matrix()
     np.testing.assert_allclose(motion[3:12].reshape(3, 3), R, atol=1e-7)

@@ -173,14 +173,13 @@ def test_a_posture_is_told_of_pushes(six_axes, source):
     station.set_start(root)
     simulator.AdvanceTo(0.075)
 
-    def value(name, port):
-        system = station.diagram.GetSubsystemByName(name)
-        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(root))
-
-    truth = value("link_pushes", "tau_ext")
+    pushes = station.diagram.GetSubsystemByName("link_pushes")
+    truth = pushes.GetOutputPort("tau_ext").Eval(pushes.GetMyContextFromRoot(root))
     assert np.abs(truth).max() > 10.0
     if source == "known":
-        assert np.array_equal(value("external_torque_of_posture", "tau_ext"), truth)
+        assert np.array_equal(
+            station.blocks.output(root, "external_torque_of_posture.tau_ext"), truth
+        )
     else:
-        seen = value("posture_torque_observer", "estimate")
+        seen = station.blocks.output(root, "posture_torque_observer.estimate")
         assert np.allclose(seen, truth, rtol=0, atol=0.1 * np.abs(truth).max())
