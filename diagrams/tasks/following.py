@@ -23,7 +23,6 @@ from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.controller import add_controller
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
 from pfsc_drake.systems.control.following_controller import FollowingController
 from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
@@ -196,7 +195,7 @@ def add_law(
 
 def _add_guidance(
     builder: DiagramBuilder, following: Following, signals: dict[str, OutputPort]
-) -> FixtureGuidance:
+) -> BlockSystem:
     """Add what leads a tool that has no reference of its own."""
     task, scenario = following.task, following.scenario
     assert isinstance(task, SpaceTask)  # see add_place

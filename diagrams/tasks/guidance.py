@@ -1,26 +1,30 @@
 """The reference of a tool that is led by hand, within virtual fixtures."""
 
+import casadi as ca
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
-from diagrams.tasks.space_guidance import SpaceTask, free_motion
+from diagrams.tasks.space_guidance import SpaceTask, free_motion, make_lead
 from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
+from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.labels import Mode
-from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
+from pfsc_drake.control.fixtures.lead import ServoLead
+from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
-from pfsc_drake.control.fixtures.record import GuidanceRecord
+from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.fixtures.soft_region import bearable_stiffness
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance, Guidance
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.control.near_regions import NearRegions
 
 # names of the values of the logged signal ``mode``
 MODES = tuple(mode.name.lower() for mode in Mode)
@@ -34,7 +38,7 @@ def add_guidance(
     order: int,
     ports: dict[str, OutputPort],
     start: np.ndarray,
-) -> FixtureGuidance:
+) -> BlockSystem:
     """Add what leads the tool.
 
     Args:
@@ -51,19 +55,18 @@ def add_guidance(
     Raises:
         InputError: If the rules do not suit the law.
     """
-    period, record = scenario.controller.sampling_time, GuidanceRecord(len(task.fixtures))
-    system = builder.AddNamedSystem(
-        "fixture_guidance",
-        FixtureGuidance(
-            make_guidance(scenario, task),
-            robot,
-            order,
-            len(task.manifold.coordinates),
-            record,
-            period,
-            _robot_limits(scenario, robot, task, start),
-        ),
-    )
+    period = scenario.controller.sampling_time
+    guidance = make_guidance(scenario, task, robot, order, start)
+    system = builder.AddNamedSystem("fixture_guidance", BlockSystem(guidance, period))
+    if guidance.tool.near is None:
+        regions = scheduled_regions(scenario, task)
+        near = builder.AddNamedSystem(
+            "near_regions", NearRegions(regions, len(task.fixtures), period)
+        )
+        builder.Connect(system.GetOutputPort("place"), near.GetInputPort("place"))
+        builder.Connect(near.GetOutputPort("near"), system.GetInputPort("near"))
+        if "regions_on" in ports:
+            builder.Connect(ports["regions_on"], near.GetInputPort("active"))
     wrench, ready = "wrench_measured", "tared"
     if scenario.compliance.source == "observed":
         wrench, ready = "wrench_observed", "ready"
@@ -100,36 +103,73 @@ def _robot_limits(
     )
 
 
-def make_guidance(scenario: Scenario, task: SpaceTask) -> Guidance:
+def make_guidance(
+    scenario: Scenario, task: SpaceTask, robot: RobotModel, order: int, start: np.ndarray
+) -> FixtureGuidance:
     """Return the rules that lead a scenario's tool.
 
     Args:
         scenario: The scenario.
         task: Leading it through space.
+        robot: The robot as it is believed.
+        order: Highest derivative of the reference that is needed.
+        start: Joint coordinates at the start, shape (N,).
 
     Raises:
         InputError: If the rules do not suit the law.
     """
-    parameters = scenario.fixtures or FixtureParameters()
-    admittance, period = free_motion(scenario), scenario.controller.sampling_time
-    regions = [fixture.region for fixture in task.fixtures]
-    nearby = ScheduledRegions(
-        regions,
-        parameters.guidance,
-        period,
-        speeds=task.region_speeds,
-        looks=parameters.looks or None,
+    parameters, lead = (scenario.fixtures or FixtureParameters()).guidance, task.lead
+    tool = LedTool(
+        tool_motion_function(robot),
+        lead,
+        free_motion(scenario),
+        len(task.fixtures),
+        near_expression(scenario, task),
+        order,
+        len(task.manifold.coordinates),
     )
-    lead = make_lead(scenario)
-    if parameters.guidance.rules == "printed":
+    if parameters.rules == "printed":
         if not isinstance(lead, ServoLead):
             raise InputError(
                 f"fixtures.guidance.rules = printed: controller.law = {scenario.controller.law}; "
                 "must be velocity_servo, as in Sec. 5.2.4"
             )
-        return PrintedGuidance(parameters.guidance.printed, admittance, lead, nearby)
+        return PrintedGuidance(tool, parameters.printed)
     stiffness = [fixture.stiffness for fixture in task.fixtures]
-    return ProgramGuidance(parameters.guidance, admittance, lead, nearby, stiffness)
+    limits = _robot_limits(scenario, robot, task, start)
+    return ProgramGuidance(tool, parameters, stiffness, limits)
+
+
+def near_expression(scenario: Scenario, task: SpaceTask) -> ca.Function | None:
+    """Return what is near as an expression; None where that takes a schedule of distances.
+
+    Args:
+        scenario: The scenario.
+        task: Leading it through space.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    if len(task.fixtures) > MOST_NEAR or parameters.looks:
+        return None
+    period = scenario.controller.sampling_time
+    within = reaches(parameters.guidance, period, task.region_speeds)
+    return near_rows([fixture.region for fixture in task.fixtures], within)
+
+
+def scheduled_regions(scenario: Scenario, task: SpaceTask) -> ScheduledRegions:
+    """Return the schedule of many distances.
+
+    Args:
+        scenario: The scenario.
+        task: Leading it through space.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    return ScheduledRegions(
+        [fixture.region for fixture in task.fixtures],
+        parameters.guidance,
+        scenario.controller.sampling_time,
+        speeds=task.region_speeds,
+        looks=parameters.looks or None,
+    )
 
 
 def stiff_regions(scenario: Scenario) -> list[str]:
@@ -151,17 +191,3 @@ def stiff_regions(scenario: Scenario) -> list[str]:
         for number, region in enumerate(fixtures.regions)
         if region.stiffness is not None and region.stiffness > most
     ]
-
-
-def make_lead(scenario: Scenario) -> Lead:
-    """Return what is between the velocity that is asked for and the tool.
-
-    Args:
-        scenario: The scenario.
-    """
-    parameters = scenario.fixtures or FixtureParameters()
-    period, degree = scenario.controller.sampling_time, RELATIVE_DEGREE[scenario.controller.law]
-    if degree > 1:
-        return FilterLead(degree, parameters.smoothing, period)
-    lag = parameters.lag_behind(scenario.servo.bandwidth)
-    return ServoLead(lag, scenario.servo.bus_delay, period)

@@ -15,6 +15,7 @@ from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.compliance.impedance import Profile
+from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.space import SpaceManifold
@@ -36,6 +37,7 @@ class SpaceTask(Task):
 
     Attributes:
         fixtures: The regions.
+        lead: What is between the velocity that is asked for and the tool.
 
     Raises:
         InputError: If a region cannot be made, or the start is missing or forbidden.
@@ -61,6 +63,7 @@ class SpaceTask(Task):
         given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
         require(bool(given), "start.position", given, allowed)
         self._start = np.array(given, dtype=float)
+        self.lead = make_lead(scenario)
         require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
         self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
@@ -165,3 +168,17 @@ def free_motion(scenario: Scenario) -> Admittance:
             "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
         )
     return Admittance(mass.value, damping.value, scenario.controller.sampling_time)
+
+
+def make_lead(scenario: Scenario) -> Lead:
+    """Return what is between the velocity that is asked for and the tool.
+
+    Args:
+        scenario: The scenario.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    period, degree = scenario.controller.sampling_time, RELATIVE_DEGREE[scenario.controller.law]
+    if degree > 1:
+        return FilterLead(degree, parameters.smoothing, period)
+    lag = parameters.lag_behind(scenario.servo.bandwidth)
+    return ServoLead(lag, scenario.servo.bus_delay, period)

@@ -7,7 +7,7 @@ from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.program import SLOTS
-from pfsc_drake.control.fixtures.record import SLOT
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 
 # of the record: log name, unit, labels
@@ -40,7 +40,7 @@ def add_guidance(
     task = station.task
     if "guidance" not in raw or not isinstance(task, SpaceTask):
         return
-    record = station.diagram.GetSubsystemByName("fixture_guidance").layout
+    record = GuidanceRecord(len(task.fixtures))
     rows = {name: raw["guidance"][:, part] for name, part in record.fields.items()}
     modes = np.nan_to_num(rows["mode"]).astype(int)
     log.add("mode", modes, "1", [mode.name.lower() for mode in Mode])
@@ -51,7 +51,7 @@ def add_guidance(
     log.add("near_regions", rows["near"], _SLOT_UNITS, slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), "1", names)
-    distances = task.distances(y_t, region_times(log, station))
+    distances = task.distances(y_t, region_times(log, task.lead.lag))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, "m", names)
     kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)
@@ -80,16 +80,15 @@ def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str]
     return kinds, forces
 
 
-def region_times(log: RunLog, station: Station) -> FloatArray:
+def region_times(log: RunLog, lag: float) -> FloatArray:
     """Return the clock of moving regions that the tool itself meets, shape (samples,).
 
     The rules look at where the tool will come to rest, and at the regions as they will be then.
 
     Args:
         log: With ``region_clock``.
-        station: The station that was simulated.
+        lag: How much later the tool is where the rules look [s].
     """
-    lag = station.diagram.GetSubsystemByName("fixture_guidance").lag
     clock = log["region_clock"].values[:, 0]
     if clock.size == 0:
         return clock

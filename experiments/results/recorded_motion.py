@@ -1,10 +1,12 @@
 """What a recording of a run draws, picked from its log."""
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
 from diagrams.station import Station
+from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.guidance_signals import region_times
 from experiments.results.run_log import FloatArray, RunLog
 
@@ -48,9 +50,15 @@ def collect_motion(
         _distance(log.time[frames], log["xi"].values[frames], start) if "xi" in log else None,
         log["wrench_ext"].values[frames, :3] if "wrench_ext" in log else None,
         _lifted(station, log["y_t"].values[frames], points),
-        region_times(log, station)[frames] if "region_clock" in log else None,
+        _region_times(station, log, frames),
         log["plate_pose"].values[frames] if "plate_pose" in log else None,
     )
+
+
+def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:
+    """Return the clock of moving regions that the tool meets, if there is one, shape (frames,)."""
+    task = station.task
+    return region_times(log, task.lead.lag)[frames] if isinstance(task, SpaceTask) else None
 
 
 def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:

@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
+from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.run_log import RunLog
 
 _SAMPLES = 1000
@@ -63,9 +64,10 @@ def _sensor(station: Station, root: Context) -> Callable[[], object]:
 
 def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:
     """Return what lets guidance, if there is any, have been at a place before."""
-    name = "fixture_guidance"
-    if not station.diagram.HasSubsystemNamed(name):
+    task = station.task
+    if not isinstance(task, SpaceTask):
         return lambda y_t: None
-    guidance = station.diagram.GetSubsystemByName(name)
-    context = guidance.GetMyMutableContextFromRoot(root)
-    return lambda y_t: guidance.set_place(context, y_t)
+    rest = task.lead.start
+    return lambda y_t: station.blocks.set_state(
+        root, "fixture_guidance.lead", np.array(rest(y_t)).ravel()
+    )

@@ -64,6 +64,6 @@ def test_a_person_switches_a_region_off(wedge, tmp_path):
     heights = []
     for time in (0.69, 0.9):
         simulator.AdvanceTo(time)
-        heights.append(station.log.now(root)["tool_pose"][2])
+        heights.append(station.log.now(station.blocks, root)["tool_pose"][2])
     assert heights[0] == pytest.approx(0.8, abs=1e-4)
     assert heights[1] < 0.79

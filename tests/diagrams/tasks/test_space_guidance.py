@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from diagrams.scenario import Scenario
 from diagrams.scenario.region import RegionParameters, Shift, Swinging
 from diagrams.scenario.surface_shapes import Plane
-from diagrams.tasks.guidance import make_guidance
+from diagrams.tasks.guidance import near_expression, scheduled_regions
 from diagrams.tasks.make import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_file
@@ -60,6 +60,8 @@ def test_as_many_distances_are_computed_as_the_scenario_has_it(scenario, looks):
     ]
     scenario.fixtures.looks = looks
     x, y, z = scenario.start.position = [0.95, 0.0, 0.801]
-    guidance = make_guidance(scenario, make_task(scenario, SCENARIOS))
-    step = guidance.step(guidance.start((x, y, z)), (x, y, z), (0, 0, 0), (0.0, 0.0, 0.0))
-    assert len(step.evaluated) == (looks or 5)
+    task = make_task(scenario, SCENARIOS)
+    assert (near_expression(scenario, task) is None) == bool(looks)
+    scheduled = scheduled_regions(scenario, task)
+    sight = scheduled.look(scheduled.start((x, y, z), 0.0), (x, y, z), 0.0, 0.0)
+    assert len(sight.evaluated) == (looks or 5)

@@ -9,11 +9,10 @@ import pytest
 from experiments.results.guidance_audit import AUDITED, Promise, audit
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
-from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
-from pfsc_drake.control.fixtures.program import SLOTS
-from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.control.fixtures.parameters import GuidanceParameters
+from pfsc_drake.control.fixtures.program import MOST_NEAR, SLOTS
+from pfsc_drake.control.fixtures.record import SLOT
 from pfsc_drake.geometry.regions.shapes import SphereRegion
 from tests.control.fixtures.point_robot import (
     DAMPING,
@@ -24,6 +23,7 @@ from tests.control.fixtures.point_robot import (
     ball,
     half_space,
     lead,
+    point,
     program,
     random_hand,
 )
@@ -45,10 +45,7 @@ def happened(damping=None):
         return np.array([-12.0, 0.0, 25.0 if t < 0.5 else -25.0])
 
     record = lead(guidance, (0.03, 0, 0.04), hand, 1.0, damping)
-    layout = GuidanceRecord(len(REGIONS))
-    pairs = zip(record.steps, record.force, strict=True)
-    values = np.array([layout.row(step, force) for step, force in pairs])
-    return np.array(record.y), values, layout
+    return np.array(record.y), np.array([s.record for s in record.steps]), guidance.layout
 
 
 @pytest.fixture(scope="module")
@@ -177,12 +174,25 @@ def test_what_a_budget_has_not_looked_at_limits_the_speed_and_is_no_alarm():
     around = [lambda y, clock, ball=ball: ball.distance(*y) for ball in balls]
     parameters = GuidanceParameters(largest_speed=2.0, braking=2.0)
     nearby = ScheduledRegions(balls, parameters, PERIOD, looks=2)
-    admittance, hard = Admittance(MASS, DAMPING, PERIOD), [math.inf] * len(balls)
-    guidance = ProgramGuidance(parameters, admittance, ServoLead(LAG, DELAY, PERIOD), nearby, hard)
-    record = lead(guidance, (0, 0, 0), random_hand(3), 1.0)
-    layout = GuidanceRecord(len(balls))
-    pairs = zip(record.steps, record.force, strict=True)
-    log = make_log((np.array(record.y), np.array([layout.row(*p) for p in pairs]), layout), around)
+    guidance = ProgramGuidance(
+        replace(point(REGIONS * 2), near=None), parameters, [math.inf] * len(balls)
+    )
+    memory = nearby.start((0.0, 0.0, 0.0), 0.0)
+
+    def look(z):
+        nonlocal memory
+        sight = nearby.look(memory, tuple(z), 0.0, 0.0)
+        memory = sight.memory
+        rows = np.zeros((MOST_NEAR, 6))
+        rows[:, 0] = -1.0
+        for row, p in zip(rows, sorted(sight.near, key=lambda p: p.h), strict=False):
+            row[:] = p.number, p.h, p.h_next, *p.n
+        looked_at = [float(i in sight.evaluated) for i in range(len(balls))]
+        return np.concatenate([rows.ravel(), [sight.speed_limit], looked_at])
+
+    record = lead(guidance, (0, 0, 0), random_hand(3), 1.0, look=look)
+    rows = np.array([step.record for step in record.steps])
+    log = make_log((np.array(record.y), rows, guidance.layout), around)
     limit = log["speed_limit"].values[:, 0]
     assert limit.min() < 0.4 * limit.max()
     assert worst(log)["audit_stationarity"] < 1e-9

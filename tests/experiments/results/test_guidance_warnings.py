@@ -11,20 +11,17 @@ from diagrams.scenario.fixtures import FixtureParameters
 from experiments.results.guidance_warnings import guidance_warnings, observed_lag
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.lead import ServoLead
-from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
+from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
-from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.control.fixtures.record import SLOT
 from pfsc_drake.following.options.controller import ControllerParameters
 from tests.control.fixtures.point_robot import (
-    DAMPING,
     DELAY,
     LAG,
-    MASS,
     PERIOD,
-    EveryRegion,
     half_space,
     lead,
+    point,
     random_hand,
 )
 
@@ -32,16 +29,10 @@ from tests.control.fixtures.point_robot import (
 def run(walls, believed, hand, start, noise=0.0):
     """Log of a point behind servos of 5 ms and a bus of 2 ms."""
     guidance = ProgramGuidance(
-        GuidanceParameters(),
-        Admittance(MASS, DAMPING, PERIOD),
-        ServoLead(believed, DELAY, PERIOD),
-        EveryRegion(walls),
-        [math.inf] * len(walls),
+        point(walls, believed), GuidanceParameters(), [math.inf] * len(walls)
     )
     record = lead(guidance, start, hand, 1.5)
-    layout = GuidanceRecord(len(walls))
-    pairs = zip(record.steps, record.force, strict=True)
-    rows = np.array([layout.row(*pair) for pair in pairs])
+    rows, layout = np.array([step.record for step in record.steps]), guidance.layout
     part = {name: rows[:, place] for name, place in layout.fields.items()}
     log = RunLog(PERIOD * np.arange(len(rows)))
     y = np.array(record.y)

@@ -8,14 +8,14 @@ from pydrake.systems.analysis import InitializeParams, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ZeroOrderHold
 
+from pfsc_drake.control.fixtures.fixture_guidance import LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
-from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
-from pfsc_drake.control.fixtures.record import GuidanceRecord
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.robot_model import tool_motion_function
-from pfsc_drake.systems.control.fixture_guidance import FixtureGuidance
+from pfsc_drake.systems.block_system import BlockSystem
 from tests.control.conftest import BENT, Robot
 
 PERIOD, M = 1e-3, 6
@@ -33,15 +33,13 @@ class Bench:
 
     def __init__(self, robot, lead, order=2, below=1e-3):
         self.q, n = np.array(BENT), robot.n
-        motion = np.array(tool_motion_function(robot.chain)(self.q, np.zeros(n))).ravel()
-        self.y_t = motion[:3]
+        motion = tool_motion_function(robot.chain)
+        self.y_t = np.array(motion(self.q, np.zeros(n))).ravel()[:3]
         regions = [HalfSpace(self.y_t - [0, 0, below], [0, 0, 1])]
-        nearby = ScheduledRegions(regions, PARAMETERS, PERIOD)
+        near = near_rows(regions, reaches(PARAMETERS, PERIOD, [0.0]))
         admittance = Admittance(MASS, DAMPING, PERIOD)
-        guidance = ProgramGuidance(PARAMETERS, admittance, lead, nearby, [math.inf])
-        self.system = FixtureGuidance(
-            guidance, robot.chain, order, M, GuidanceRecord(len(regions)), PERIOD
-        )
+        tool = LedTool(motion, lead, admittance, len(regions), near, order, M)
+        self.system = BlockSystem(ProgramGuidance(tool, PARAMETERS, [math.inf]), PERIOD)
         self.simulator = Simulator(self.system)
         self.context = self.simulator.get_mutable_context()
         self.fix(joint_state=[*self.q, *np.zeros(n)] * 2, wrench=PULL, ready=[1.0])
@@ -59,7 +57,7 @@ class Bench:
 
     def record(self, name):
         row = self.system.GetOutputPort("record").Eval(self.context)
-        return row[self.system.layout.fields[name]]
+        return row[self.system.block.layout.fields[name]]
 
 
 def test_a_force_moves_the_reference_one_tick_later(robot):
@@ -137,11 +135,13 @@ def test_a_force_that_is_no_number_counts_as_none(robot):
 def test_a_state_that_is_no_number_asks_for_nothing(robot):
     bench = Bench(robot, ServoLead(5e-3, 2e-3, PERIOD))
     bench.advance(20)
-    memory = bench.context.get_abstract_state(0).get_value().after.memory
+    names = set(bench.system.states) - {"force", "ready"}
+    before = {name: bench.system.state(bench.context, name) for name in names}
     bench.fix(joint_state=[np.nan] * 24)
     bench.advance(1)
     assert not bench.reference[1].any()
-    assert bench.context.get_abstract_state(0).get_value().after.memory is memory
+    for name, value in before.items():
+        np.testing.assert_array_equal(bench.system.state(bench.context, name), value)
     assert np.isnan(bench.record("point")).all()
 
 
@@ -170,9 +170,11 @@ def test_who_is_sampled_at_a_tick_sees_what_is_logged(robot):
 
 def test_two_contexts_do_not_share_their_memory(robot):
     bench = Bench(robot, FilterLead(2, 3e-3, PERIOD))
+    bench.simulator.Initialize()
     other = bench.context.Clone()
     bench.advance(50)
-    assert other.get_abstract_state(0).get_value().after.memory is None
+    assert bench.system.state(bench.context, "velocity").any()
+    assert not bench.system.state(other, "velocity").any()
     twin = bench.context.Clone()
     bench.advance(1)
     fresh = Simulator(bench.system, twin)
