@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -34,7 +35,7 @@ def led(robot, axes, count, **changes):
     limits = RobotLimits(robot.chain, given, np.array(START[MODEL]), oriented=True)
     kind = PathManifold(1, oriented=True) if count == 1 else SurfaceManifold(1)
     manifold = SimpleNamespace(
-        axes=lambda point: axes, layout=SimpleNamespace(size=1), coordinates=kind.coordinates
+        axes=lambda point: ca.DM(axes), layout=SimpleNamespace(size=1), coordinates=kind.coordinates
     )
     return LedMotion(limits, manifold, PERIOD)
 
