@@ -15,11 +15,11 @@ from pfsc_drake.control.compliance.payload_compensation import PayloadCompensati
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand
-from pfsc_drake.physics.suction import holding_cups
+from pfsc_drake.physics.suction import SuctionGripper, holding_cups
 from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.suction_gripper import SuctionGripper
+from pfsc_drake.systems.plants.applied_forces import AppliedForces
 
 
 def add_mounting(
@@ -63,16 +63,14 @@ def add_mounting(
         load = places[0].rotation().matrix().T @ weight
         held = holding_cups(plate.suction, 0, X_PT.rotation().matrix(), X_PT.translation(), load)
     half_size = np.array(plate.size[:2]) / 2.0
-    gripper = builder.AddNamedSystem(
-        "gripper", SuctionGripper(plate.suction, half_size, world.bodies, period, held)
-    )
+    cups = SuctionGripper(plate.suction, half_size, len(world.bodies), held)
+    gripper = builder.AddNamedSystem("gripper", BlockSystem(cups, period))
     state = world.plant.get_state_output_port()
     builder.Connect(motion.GetOutputPort("tool_motion"), gripper.GetInputPort("tool_motion"))
     builder.Connect(state, gripper.GetInputPort("plate_state"))
-    builder.Connect(
-        gripper.GetOutputPort("applied_spatial_force"),
-        world.plant.get_applied_spatial_force_input_port(),
-    )
+    applied = builder.AddNamedSystem("plate_pushes", AppliedForces(world.bodies))
+    builder.Connect(gripper.GetOutputPort("pushes"), applied.get_input_port())
+    builder.Connect(applied.get_output_port(), world.plant.get_applied_spatial_force_input_port())
     signals = {
         "plate_state": state,
         "plate_contact": world.contact.GetOutputPort("forces"),

@@ -1,10 +1,12 @@
 """Suction cups: rubber that holds a plate while there is a vacuum."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.errors import InputError
 
 FREE = -1.0  # index of the plate of a cup that holds none
@@ -69,6 +71,68 @@ def holding_cups(
     rims = np.column_stack([parameters.cups, np.zeros(len(parameters.cups))])
     anchors = p_PT + rims @ R_PT.T + load / (len(rims) * parameters.stiffness)
     return np.column_stack([np.full(len(rims), float(plate)), anchors]).ravel()
+
+
+class SuctionGripper(Block):
+    """Cups that push, seize, hold and let go of plates, see :func:`cups_function`.
+
+    What takes hold and lets go does so at ticks.
+
+    Ports:
+        tool_motion (input): ``[y_t, R_e by rows, v, w]``, shape (18,), see :class:`ToolMotion`.
+        plate_state (input): ``[q, v]`` of K free bodies of a MultibodyPlant, shape (13 K,).
+        vacuum (input): Above 0.5 there is one, shape (1,).
+        wrench (output): ``[force, torque]`` on the tool at the tool point, world axes, shape (6,)
+            [N, Nm].
+        pushes (output): ``[force, torque]`` on each plate at its origin, world axes, shape (6 K,)
+            [N, Nm].
+        held (output): Share of the cups that hold, 0 to 1, shape (1,).
+
+    State:
+        Of the ``cups``, shape (4n,).
+
+    Args:
+        parameters: The n cups.
+        half_size: Half length and half width of the plates [m], shape (2,).
+        num_plates: K.
+        held: State of the cups at the start; None if they hold nothing.
+    """
+
+    def __init__(
+        self,
+        parameters: SuctionParameters,
+        half_size: np.ndarray,
+        num_plates: int,
+        held: np.ndarray | None = None,
+    ) -> None:
+        self._count = len(parameters.cups)
+        self._start = free_cups(self._count) if held is None else held
+        self._function = cups_function(parameters, half_size, num_plates)
+        self.inputs = {
+            "tool_motion": Port(18, "m, 1, m/s, rad/s"),
+            "plate_state": Port(13 * num_plates, "1, m, rad/s, m/s"),
+            "vacuum": Port(1),
+        }
+        self.outputs = {
+            "wrench": Port(6, "N, Nm"),
+            "pushes": Port(6 * num_plates, "N, Nm"),
+            "held": Port(1),
+        }
+        self.inner = self.states = {"cups": 4 * self._count}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"cups": ca.DM(self._start)}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        wrench, pushes, later = self._function(x.cups, u.tool_motion, u.plate_state, u.vacuum)
+        held = ca.sum1(x.cups[::4] >= 0.0) / self._count
+        return {"wrench": wrench, "pushes": pushes, "held": held, "cups": later}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"cups": y.cups}
 
 
 def cups_function(

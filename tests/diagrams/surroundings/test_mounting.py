@@ -66,17 +66,14 @@ def plate_state(station):
 
 
 def held(station, root):
-    gripper = station.diagram.GetSubsystemByName("gripper")
-    return gripper.GetOutputPort("held").Eval(gripper.GetMyContextFromRoot(root))[0]
+    return station.blocks.output(root, "gripper.held")[0]
 
 
 def test_a_plate_lies_in_the_magazine_at_the_start(station):
     state, root = plate_state(station)
     np.testing.assert_allclose(state[4:7], station.mounting.X_WM.translation(), atol=1e-12)
     assert held(station, root) == 0.0
-    gripper = station.diagram.GetSubsystemByName("gripper")
-    wrench = gripper.GetOutputPort("wrench").Eval(gripper.GetMyContextFromRoot(root))
-    assert not wrench.any()
+    assert not station.blocks.output(root, "gripper.wrench").any()
 
 
 def test_a_plate_that_is_held_is_where_the_tool_is():
@@ -85,8 +82,7 @@ def test_a_plate_that_is_held_is_where_the_tool_is():
     p, _ = taught(station, 0.5)
     np.testing.assert_allclose(state[4:7], p, atol=1e-9)
     assert held(station, root) == 1.0
-    gripper = station.diagram.GetSubsystemByName("gripper")
-    wrench = gripper.GetOutputPort("wrench").Eval(gripper.GetMyContextFromRoot(root))
+    wrench = station.blocks.output(root, "gripper.wrench")
     weight = [0.0, 0.0, -9.81 * station.mounting.parameters.mass]
     np.testing.assert_allclose(wrench, [*weight, 0, 0, 0], atol=1e-3)  # 1e4 N/m and 1e-8 m
 

@@ -10,8 +10,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from pfsc_drake.physics.suction import SuctionParameters
-from pfsc_drake.systems.physics.suction_gripper import SuctionGripper
+from pfsc_drake.physics.suction import SuctionGripper, SuctionParameters
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.plants.applied_forces import AppliedForces
 
 MASS, SIZE, PERIOD = 0.8, (0.24, 0.16, 0.01), 1e-3
 DOWN = RotationMatrix.MakeXRotation(np.pi)
@@ -65,14 +66,15 @@ def fixture_log():
     builder.Connect(plant.get_geometry_pose_output_port(), pose)
     builder.Connect(scene_graph.get_query_output_port(), plant.get_geometry_query_input_port())
     script = builder.AddSystem(Script())
-    gripper = builder.AddSystem(
-        SuctionGripper(SuctionParameters(), np.array(SIZE[:2]) / 2.0, [plate.index()], PERIOD)
-    )
+    cups = SuctionGripper(SuctionParameters(), np.array(SIZE[:2]) / 2.0, 1)
+    gripper = builder.AddSystem(BlockSystem(cups, PERIOD))
+    pushes = builder.AddSystem(AppliedForces([plate.index()]))
     for name in ("tool_motion", "vacuum"):
         builder.Connect(script.GetOutputPort(name), gripper.GetInputPort(name))
     builder.Connect(plant.get_state_output_port(), gripper.GetInputPort("plate_state"))
     applied = plant.get_applied_spatial_force_input_port()
-    builder.Connect(gripper.GetOutputPort("applied_spatial_force"), applied)
+    builder.Connect(gripper.GetOutputPort("pushes"), pushes.get_input_port())
+    builder.Connect(pushes.get_output_port(), applied)
     sinks = {
         "held": LogVectorOutput(gripper.GetOutputPort("held"), builder, PERIOD),
         "wrench": LogVectorOutput(gripper.GetOutputPort("wrench"), builder, PERIOD),
