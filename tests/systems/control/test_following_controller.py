@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Gain, MatrixGain
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import ImpedanceStatus
 from pfsc_drake.control.compliance.tool_load import SensorFault
 from pfsc_drake.control.law.decoupling import DecouplingInverse
@@ -24,7 +25,7 @@ from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.control.following_controller import ControllerAccess, FollowingController
 from pfsc_drake.systems.control.path_projector import PathProjector
 from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
-from pfsc_drake.systems.fuse import fuse_blocks
+from pfsc_drake.systems.fuse import fuse, fuse_blocks
 
 PERIOD = 1e-3
 THETA = 0.6
@@ -394,3 +395,24 @@ def test_what_is_found_is_read_by_name_fused_or_not(fused, arm, path, make_law):
     # between ticks nothing is known but what is remembered
     assert access.fault(blocks, root) == Fault.MEASUREMENT_IMPLAUSIBLE
     assert np.flatnonzero(access.suspects(blocks, root)).tolist() == [7]
+
+
+def test_whatever_is_told_drives_get_finite_torques_within_their_limits(arm, path, make_law):
+    bench = Bench(arm, path, make_law(integral=500.0, limit=900.0), SupervisionParameters())
+    network = fuse(FollowingController(bench.law, PERIOD, SupervisionParameters())).network
+    good = {name: np.zeros(port.size) for name, port in network.inputs.items()}
+    good["joint_state"], good["manifold_point"] = bench.state, bench.point
+    good["reference"] = bench.reference
+    rng, controller, faults = np.random.default_rng(7), Stepper(network), set()
+    anything = [np.nan, np.inf, -np.inf, 1e308, -1e200, 1e20, -1e-320, 0.0]
+    for _ in range(150):
+        controller.start(**good)
+        for k in range(4):
+            told = {name: value.copy() for name, value in good.items()}
+            for value in told.values():
+                spoiled = rng.random(value.size) < (k > 0) * rng.choice([0.0, 0.05, 0.5, 1.0])
+                value[spoiled] = rng.choice(anything, spoiled.sum())
+            found = controller.step(**told)
+            assert np.all(np.abs(found["drive_torque"]) <= bench.law.limits)
+            faults.add(Fault(int(found["fault"][0])))
+    assert {Fault.NONE, Fault.INPUT_NOT_FINITE, Fault.MEASUREMENT_IMPLAUSIBLE} < faults
