@@ -4,6 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -26,7 +27,10 @@ class Basis(ABC):
         breakpoints: Ends of the pieces, [pieces + 1].
         closed: Whether the parameter is periodic.
         derivation: D, [size, size].
+        is_local: Whether they are functions of the way from the piece's begin.
     """
+
+    is_local: ClassVar[bool]
 
     def __init__(self, breakpoints: ArrayLike, derivation: np.ndarray, *, closed: bool) -> None:
         self.breakpoints = np.array(breakpoints, dtype=float)
