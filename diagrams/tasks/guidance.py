@@ -143,6 +143,8 @@ def make_guidance(
 def near_expression(scenario: Scenario, task: SpaceTask) -> ca.Function | None:
     """Return what is near as an expression; None where that takes a schedule of distances.
 
+    Many regions do, those whose distances are bounded in number, and what has no formula.
+
     Args:
         scenario: The scenario.
         task: Leading it through space.
@@ -152,7 +154,10 @@ def near_expression(scenario: Scenario, task: SpaceTask) -> ca.Function | None:
         return None
     period = scenario.controller.sampling_time
     within = reaches(parameters.guidance, period, task.region_speeds)
-    return near_rows([fixture.region for fixture in task.fixtures], within)
+    try:
+        return near_rows([fixture.region for fixture in task.fixtures], within)
+    except InputError:  # a fitted surface of many pieces
+        return None
 
 
 def scheduled_regions(scenario: Scenario, task: SpaceTask) -> ScheduledRegions:

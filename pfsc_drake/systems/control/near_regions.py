@@ -17,7 +17,6 @@ from pfsc_drake.control.fixtures.fixture_guidance import NEAR_COLUMNS
 from pfsc_drake.control.fixtures.near_rows import FAR, NOTHING
 from pfsc_drake.control.fixtures.nearby import ScheduledRegions
 from pfsc_drake.control.fixtures.program import MOST_NEAR
-from pfsc_drake.control.fixtures.schedule import ScheduleMemory
 from pfsc_drake.systems.optional_input import value_or_none
 
 
@@ -36,8 +35,7 @@ class NearRegions(LeafSystem):
             [m/s], and 1 of regions whose distance was computed, shape (48 + 1 + M,).
 
     State:
-        Discrete: whether there was a look, and the memory of the schedule, see
-        :class:`ScheduleMemory`.
+        Discrete: whether there was a look, and the memory of the schedule.
 
     Args:
         regions: All of them.
@@ -48,7 +46,7 @@ class NearRegions(LeafSystem):
     def __init__(self, regions: ScheduledRegions, num_regions: int, period: float) -> None:
         super().__init__()
         self._regions, self._count = regions, num_regions
-        size = 1 + ScheduleMemory.size(num_regions)
+        size = 1 + regions.memory_size
         memory = self.discrete_state_ticket(self.DeclareDiscreteState(size))
         self._place = self.DeclareVectorInputPort("place", 5)
         self._active = self.DeclareVectorInputPort("active", num_regions)
@@ -70,16 +68,13 @@ class NearRegions(LeafSystem):
             value.set_value((self._told([], 0.0, []), kept.copy()))
             return
         point = (x, y, z)
-        if kept[0]:
-            memory = ScheduleMemory.unpacked(kept[1:], self._regions.moving)
-        else:
-            memory = self._regions.start(point, clock)
+        memory = kept[1:] if kept[0] else self._regions.start(point, clock)
         sight = self._regions.look(memory, point, clock, clock_next)
         active = value_or_none(self._active, context)
         near = [p for p in sight.near if active is None or active[p.number] > 0.5]
         near = sorted(near, key=lambda p: p.h)[:MOST_NEAR]
         rows = [[p.number, p.h, p.h_next, *p.n] for p in near]
-        after = np.concatenate([[1.0], sight.memory.packed()])
+        after = np.concatenate([[1.0], sight.memory])
         value.set_value((self._told(rows, sight.speed_limit, sight.evaluated), after))
 
     def _told(self, rows: list[list[float]], limit: float, evaluated: Sequence[int]) -> np.ndarray:
