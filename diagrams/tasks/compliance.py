@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+import casadi as ca
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
@@ -14,9 +15,11 @@ from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
     ImpedanceLaw,
 )
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
-from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning
+from pfsc_drake.control.compliance.pressing import Pressing
+from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
@@ -26,9 +29,7 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
-from pfsc_drake.systems.control.impedance_tuner import ImpedanceTuner
-from pfsc_drake.systems.control.pressing import Pressing
+from pfsc_drake.systems.control.motion_limits import MotionLimits
 
 # up to which derivative the filter knows the external reference, see ImpedanceLaw
 _DESIRED_ORDER = 4
@@ -117,9 +118,9 @@ def add_compliance(
         lap=lap,
     )
     limits = _limits(scenario, linearization, robot, start)
-    impedance = builder.AddNamedSystem(
-        "impedance_filter", ImpedanceFilter(law, start="actual", limits=limits)
-    )
+    free = None if limits is None else limits.tangential
+    yielding = ImpedanceFilter(law, start="actual", free=free)
+    impedance = builder.AddNamedSystem("impedance_filter", BlockSystem(yielding, period))
     along = ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning)
     transform = builder.AddNamedSystem("manifold_force_transform", BlockSystem(along, period))
     reference = impedance.GetOutputPort("reference")
@@ -139,9 +140,7 @@ def add_compliance(
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]
     if limits is not None:
-        for name in ("joint_state", "manifold_point"):
-            builder.Connect(ports[name], impedance.GetInputPort(name))
-        signals["limit_force"] = impedance.GetOutputPort("limit_force")
+        signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
     # where guidance leads along, the impedance is the scenario's
     if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
         signals |= _add_tuner(builder, scenario, linearization, law, impedance, ports)
@@ -175,18 +174,34 @@ def _limits(
     return LedMotion(limits, manifold, scenario.controller.sampling_time)
 
 
+def _add_limits(
+    builder: DiagramBuilder,
+    limits: LedMotion,
+    impedance: BlockSystem,
+    ports: dict[str, OutputPort],
+) -> OutputPort:
+    """Let the filter move no faster than the robot can; return the forces that hold the hand."""
+    system = builder.AddNamedSystem("motion_limits", MotionLimits(limits, impedance.period))
+    sources = {"wanted_speed": impedance.GetOutputPort("wanted_speed")}
+    sources |= {name: ports[name] for name in ("joint_state", "manifold_point")}
+    for name, port in sources.items():
+        builder.Connect(port, system.GetInputPort(name))
+    builder.Connect(system.GetOutputPort("allowed_speed"), impedance.GetInputPort("allowed_speed"))
+    return system.GetOutputPort("limit_force")
+
+
 def _add_tuner(
     builder: DiagramBuilder,
     scenario: Scenario,
     linearization: Linearization,
     law: ImpedanceLaw,
-    impedance: ImpedanceFilter,
+    impedance: BlockSystem,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Let an operator change the impedance; return it as it is, and the tank that pays for it."""
     assert scenario.operator is not None
     coordinates = linearization.manifold.coordinates
-    given = law.impedance(np.zeros(len(coordinates)))
+    given = _impedance_at_origin(law)
     # what is rigid has no mass of its own
     soft = np.isfinite(given[STIFFNESS])
     along = given[MASS, indices(coordinates, Kind.TANGENTIAL)].max()
@@ -194,19 +209,14 @@ def _add_tuner(
     masses[indices(coordinates, Kind.ROTATIONAL)] = given[
         MASS, indices(coordinates, Kind.ROTATIONAL)
     ]
-    tuning = ImpedanceTuning(
-        scenario.operator.tuning, coordinates, masses, law.period, varying=not law.is_constant
-    )
+    tuning = ImpedanceTuner(scenario.operator.tuning, law, coordinates, masses)
     sources = {
         "wish": ports["impedance_wish"],
         "manifold_state": ports["manifold_state"],
         "reference": impedance.GetOutputPort("reference"),
         "desired_reference": ports["desired_reference"],
     }
-    sizes = tuple(port.size() for port in list(sources.values())[1:])
-    tuner = builder.AddNamedSystem(
-        "impedance_tuner", ImpedanceTuner(tuning, law.impedance, sizes, law.period)
-    )
+    tuner = builder.AddNamedSystem("impedance_tuner", BlockSystem(tuning, law.period))
     for name, port in sources.items():
         builder.Connect(port, tuner.GetInputPort(name))
     builder.Connect(tuner.GetOutputPort("impedance"), impedance.GetInputPort("impedance"))
@@ -231,7 +241,7 @@ def _add_press(
             "compliance.press: must be null unless controller.manifold is surface, which has one "
             "transversal coordinate"
         )
-    mass, damping = law.impedance(np.zeros(len(coordinates)))[[MASS, DAMPING], across.start]
+    mass, damping = _impedance_at_origin(law)[[MASS, DAMPING], across.start]
     if not damping > 0.0:
         raise InputError(
             f"compliance.transversal.damping = {damping:g}: must be positive where a tool presses, "
@@ -247,8 +257,14 @@ def _add_press(
         press.allowed_difference,
         press.taken_off(end),
     )
-    system = builder.AddNamedSystem("pressing", pressing)
+    system = builder.AddNamedSystem("pressing", BlockSystem(pressing, law.period))
     for name, port in ports.items():
         builder.Connect(port, system.GetInputPort(name))
     signals = {name: system.GetOutputPort(name) for name in ("press", "pressed_force")}
     return signals | {"press_lost": system.GetOutputPort("lost")}
+
+
+def _impedance_at_origin(law: ImpedanceLaw) -> np.ndarray:
+    """Return masses, dampings and stiffnesses where all coordinates are zero, shape (3, m)."""
+    found: np.ndarray = ca.DM(law.impedance(ca.DM.zeros(law.num_outputs))).full().reshape(3, -1)
+    return found

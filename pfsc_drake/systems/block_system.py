@@ -74,6 +74,7 @@ class BlockSystem(LeafSystem):
             for name, port in whole.inputs.items()
         }
         self._optional = [name for name, port in whole.inputs.items() if port.optional]
+        self._asked: set[str] = set()
         self._stages: list[CacheEntry] = []
         always = {self.discrete_state_ticket(memory)}
         for k, stage in enumerate(declared.stages):
@@ -157,7 +158,7 @@ class BlockSystem(LeafSystem):
 
     def _program(self, context: Context) -> "_Functions":
         """Return the functions for what is connected."""
-        left = frozenset(n for n in self._optional if not self._inputs[n].HasValue(context))
+        left = frozenset(n for n in self._optional if not self._is_connected(context, n))
         if left not in self._programs:
             program = self._declared
             if left:
@@ -165,6 +166,17 @@ class BlockSystem(LeafSystem):
                 program = Program(Network.of(self.block, left), self._declared)
             self._programs[left] = _Functions(program)
         return self._programs[left]
+
+    def _is_connected(self, context: Context, name: str) -> bool:
+        """Return whether an input has a value; to ask evaluates what it is connected to."""
+        if name in self._asked:
+            # it was asked for by way of this very input
+            return True
+        self._asked.add(name)
+        try:
+            return bool(self._inputs[name].HasValue(context))
+        finally:
+            self._asked.discard(name)
 
     def _given(
         self,

@@ -2,20 +2,16 @@
 
 import enum
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Union
+from typing import Any, NamedTuple, Union
 
+import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.compliance.impedance_functions import (
-    coefficients,
-    reference_function,
-    update_function,
-)
+from pfsc_drake.control.cases import all_finite, all_of, first_of, is_finite, where
+from pfsc_drake.control.compliance.impedance_transition import rates_of, transition_of
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
 from pfsc_drake.errors import InputError
@@ -35,10 +31,6 @@ class ImpedanceStatus(enum.IntFlag):
     FORCE_NOT_FINITE = 1
     IMPEDANCE_NOT_VALID = 2
     REFERENCE_NOT_FINITE = 4
-
-
-# attributes of an enumeration are looked up slowly
-_OK = ImpedanceStatus.OK
 
 
 @dataclass
@@ -77,8 +69,8 @@ class Profile:
         """Whether it is no constant."""
         return bool(self.at)
 
-    def interpolant(self, lap: float | None = None) -> Callable[[float], float]:
-        """Return the parameter as a function of what it goes over.
+    def interpolant(self, lap: float | None = None) -> Callable[[Any], Any]:
+        """Return the parameter as a function of what it goes over, a number or an expression.
 
         Args:
             lap: Period of what it goes over, if it has one.
@@ -96,18 +88,19 @@ class Profile:
             slopes[[0, -1]] = 0.0
         else:
             at, values, slopes = self._periodic(at, values, lap)
-        pieces = CubicHermiteSpline(at, values, slopes).c.T.tolist()
-        breakpoints, lowest = at.tolist(), min(self.values)
-        begin = breakpoints[0]
+        pieces = CubicHermiteSpline(at, values, slopes).c.T
+        begins = [ca.DM([begin, *piece]) for begin, piece in zip(at, pieces, strict=False)]
+        ends, first, last, lowest = at[1:], float(at[0]), float(at[-1]), min(self.values)
 
-        def value(x: float) -> float:
+        def value(x: Any) -> Any:
             if lap is not None:
-                x = begin + (x - begin) % lap
-            x = min(max(x, breakpoints[0]), breakpoints[-1])
-            i = min(bisect_right(breakpoints, x), len(pieces)) - 1
-            a, b, c, d = pieces[i]
-            x -= breakpoints[i]
-            return max(((a * x + b) * x + c) * x + d, lowest)
+                x = x - lap * ca.floor((x - first) / lap)
+            x = first_of((x < first, first), (x > last, last), otherwise=x)
+            cases = zip([x < end for end in ends], begins, strict=True)
+            piece = first_of(*list(cases)[:-1], otherwise=begins[-1])
+            x = x - piece[0]
+            y = ((piece[1] * x + piece[2]) * x + piece[3]) * x + piece[4]
+            return where(y < lowest, lowest, y)
 
         return value
 
@@ -197,6 +190,22 @@ def _on_path(kind: CoordinateImpedance, length: float) -> CoordinateImpedance:
     return kind
 
 
+class ImpedanceState(NamedTuple):
+    """What an impedance remembers, numbers (``casadi.DM``) or expressions.
+
+    Attributes:
+        position: y_p, shape (m,) [m, rad].
+        velocity: y_p', shape (m,) [m/s, rad/s].
+        force: Of the last interval, shape (m,) [N, Nm].
+        impedance: Rows mass, damping, stiffness of the last interval, shape (3 m,).
+    """
+
+    position: Any
+    velocity: Any
+    force: Any
+    impedance: Any
+
+
 class ImpedanceLaw:
     """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, of every coordinate, sampled.
 
@@ -206,7 +215,7 @@ class ImpedanceLaw:
     e is formed anew at every tick and absorbs it. Hence no step in y_p or y_p'.
 
     Over an interval e obeys its differential equation with force and parameters held, solved
-    exactly (:mod:`~pfsc_drake.control.compliance.impedance_functions`); ``y_d`` goes on by its
+    exactly (:mod:`~pfsc_drake.control.compliance.impedance_transition`); ``y_d`` goes on by its
     Taylor polynomial of order ``desired_order``. What that misses acts like a disturbance of e: on
     a sine of 1 m, 5 rad/s, 3e-5 m for order 2 and 6e-11 m for order 4 with Tab. 3.2, and
     5e-3 m and 1e-8 m for a free mass. Order 2 is the least, for (3.42) contains ``y_d''``.
@@ -273,10 +282,7 @@ class ImpedanceLaw:
         ]
         self._row = [list(used).index(coordinate.kind) for coordinate in coordinates]
         self.is_constant = not any(p.varies for row in table for p in row)
-        self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], 0.0))
-        # the impedance that the coefficients belong to
-        self._key, self._coefficients = b"", np.zeros((8, m))
-        self._bind_functions()
+        self._constant = self._at(dict.fromkeys([*self._names, _ACROSS], ca.DM(0.0)))
 
     def _check_profiles(self, used: dict[Kind, CoordinateImpedance]) -> None:
         """Refuse profiles over something that the manifold does not have."""
@@ -291,77 +297,70 @@ class ImpedanceLaw:
                         f"{', '.join(allowed)}"
                     )
 
-    def _bind_functions(self) -> None:
-        """Give both functions one set of arrays for what they have in common."""
-        m, p = self.num_outputs, self.desired_order
-        # of the state before they need y_p, y_p', force; the impedance is that of the next
-        self._before, self._desired = np.zeros((3, m)), np.zeros((p + 1, m))
-        self._after = np.zeros((6, m))
-        self._used = self._after[3:]
-        shared = {
-            "motion": self._before[:2],
-            "desired": self._desired,
-            "last_force": self._before[2],
-            "mass": self._used[MASS],
-            "coefficients": self._coefficients,
-        }
-        step = BoundFunction(update_function(m, p, self.period), next=self._after[:3], **shared)
-        self._force, self._step = step.arguments["force"], step.evaluate
-        self._unusable = step.results["unusable"]
-        respond = BoundFunction(
-            reference_function(m, p, self.relative_degree, self._response_order), **shared
-        )
-        self._reference = respond.results["reference"].reshape(-1, m)
-        self._respond = respond.evaluate
-
-    def impedance(self, y: np.ndarray) -> np.ndarray:
-        """Return masses, dampings, stiffnesses, shape (3, m), at a virtual output y (m,)."""
+    def impedance(self, y: Any) -> Any:
+        """Return masses, dampings, stiffnesses, shape (3 m,), at a virtual output y (m,)."""
         if self.is_constant:
             return self._constant
-        x = dict(zip(self._names, y.tolist(), strict=True))
-        return self._at(x | {_ACROSS: math.hypot(*y[self._across])})
+        x, across = dict(zip(self._names, ca.vertsplit(y), strict=True)), y[self._across]
+        single = self._across.stop - self._across.start == 1
+        return self._at(x | {_ACROSS: ca.fabs(across) if single else ca.norm_2(across)})
 
-    def _at(self, x: dict[str, float]) -> np.ndarray:
+    def _at(self, x: dict[str, Any]) -> Any:
         rows = [[function(x[over]) for over, function in row] for row in self._profiles]
-        return np.array(rows).T[:, self._row]
+        return ca.vertcat(*[rows[i][k] for k in range(3) for i in self._row])
 
-    def start(self, motion: np.ndarray) -> np.ndarray:
-        """Return a state, shape (6, m), that moves on from ``[y_p, y_p']``, shape (2, m).
-
-        Its rows are y_p, y_p', force, mass, damping, stiffness.
-        """
-        return np.vstack([motion, np.zeros(self.num_outputs), self.impedance(motion[0])])
+    def start(self, motion: Any) -> ImpedanceState:
+        """Return a state that moves on from ``[y_p, y_p']``, shape (2 m,)."""
+        position, velocity = ca.vertsplit(motion, self.num_outputs)
+        idle = ca.DM.zeros(self.num_outputs)
+        return ImpedanceState(position, velocity, idle, self.impedance(position))
 
     def update(
-        self, state: np.ndarray, desired: np.ndarray, force: np.ndarray, impedance: np.ndarray
-    ) -> tuple[np.ndarray, ImpedanceStatus]:
+        self, state: ImpedanceState, desired: Any, force: Any, impedance: Any = None
+    ) -> tuple[ImpedanceState, Any]:
         """Return the state one period later, and what of the inputs could not be used.
 
         Args:
-            state: See :meth:`start`, shape (6, m).
-            desired: Derivatives 0..desired_order of y_d, one row each, shape (.., m);
-                unless all are finite, y_p rests.
+            state: At the last tick.
+            desired: Derivatives 0..desired_order of y_d by rows, shape (.. m,); unless all are
+                finite, y_p rests.
             force: Manifold forces [N, Nm], shape (m,); unless all are finite, zero.
-            impedance: Rows mass, damping, stiffness, shape (3, m); unless valid, the last.
-        """
-        valid = self._prepare(impedance)
-        if not valid:
-            self._prepare(state[3:])
-        self._before[:], self._desired[:], self._force[:] = state[:3], desired, force
-        self._step()
-        force_lost, desired_lost = self._unusable.tolist()
-        status = _OK
-        if force_lost or desired_lost or not valid:
-            status = ImpedanceStatus(
-                int(force_lost) * ImpedanceStatus.FORCE_NOT_FINITE
-                | int(not valid) * ImpedanceStatus.IMPEDANCE_NOT_VALID
-                | int(desired_lost) * ImpedanceStatus.REFERENCE_NOT_FINITE
-            )
-        return self._after.copy(), status
+            impedance: Rows mass, damping, stiffness, shape (3 m,); unless valid, the last. The
+                constant one if omitted.
 
-    def push_to(
-        self, state: np.ndarray, speed: np.ndarray, force: np.ndarray, free: slice
-    ) -> np.ndarray:
+        Returns:
+            The state, and an :class:`ImpedanceStatus`.
+        """
+        T, valid = self.period, 1.0
+        if impedance is None:
+            impedance = self._constant
+        else:
+            valid = self._is_valid(impedance)
+            impedance = where(valid, impedance, state.impedance)
+        force_known, desired_known = all_finite(force), all_finite(desired)
+        tau, y_d = where(force_known, force, 0.0), ca.vertsplit(desired, self.num_outputs)
+        (a, b, c, d, p), rates = transition_of(impedance, T)
+        e, e_1 = state.position - y_d[0], state.velocity - y_d[1]
+        f = tau / ca.vertsplit(impedance, self.num_outputs)[MASS]
+        weights = [T**k / math.factorial(k) for k in range(self.desired_order + 1)]
+        position = sum(w * row for w, row in zip(weights, y_d, strict=True))
+        velocity = sum(w * row for w, row in zip(weights, y_d[1:], strict=False))
+        position += where(rates.yields, a * e + b * e_1 + p * f, 0.0)
+        velocity += where(rates.yields, c * e + d * e_1 + b * f, 0.0)
+        later = ImpedanceState(
+            where(desired_known, position, state.position),
+            where(desired_known, velocity, 0.0),
+            tau,
+            impedance,
+        )
+        status = (
+            ImpedanceStatus.FORCE_NOT_FINITE * ca.logic_not(force_known)
+            + ImpedanceStatus.IMPEDANCE_NOT_VALID * ca.logic_not(valid)
+            + ImpedanceStatus.REFERENCE_NOT_FINITE * ca.logic_not(desired_known)
+        )
+        return later, status
+
+    def push_to(self, state: ImpedanceState, speed: Any, force: Any, free: slice) -> Any:
         """Return the force after which some coordinates have other speeds, shape (m,).
 
         Args:
@@ -370,36 +369,41 @@ class ImpedanceLaw:
             force: That force, shape (m,).
             free: Which coordinates; those that are rigid keep their force.
         """
-        change = np.zeros(self.num_outputs)
-        change[free] = speed - state[1, free]
+        (_, b, _, _, _), rates = transition_of(state.impedance, self.period)
+        mass = ca.vertsplit(state.impedance, self.num_outputs)[MASS]
         # e'(T) contains b f / m
-        gain, yields = self._coefficients[1], self._coefficients[7] > 0.0
-        return np.where(yields, force + change * state[3 + MASS] / gain, force)
+        more = (speed - state.velocity[free]) * mass[free] / b[free]
+        parts = [force[: free.start], force[free], force[free.stop :]]
+        parts[1] += where(rates.yields[free], more, 0.0)
+        return ca.vertcat(*parts)
 
-    def _prepare(self, impedance: np.ndarray) -> bool:
-        """Put what follows from an impedance in place, and return whether it is valid.
+    def _is_valid(self, impedance: Any) -> Any:
+        """Return whether masses, dampings and stiffnesses are what they can be."""
+        mass, damping, stiffness = ca.vertsplit(impedance, self.num_outputs)
+        return all_of(
+            mass > 0.0, is_finite(mass), damping >= 0.0, is_finite(damping), stiffness >= 0.0
+        )
 
-        It rarely changes, and is remembered.
-        """
-        key = impedance.tobytes()
-        if key == self._key:
-            return True
-        # a sum is finite only if all its terms are; NaN fails every comparison
-        finite, positive = math.isfinite(impedance[:STIFFNESS].sum()), impedance[MASS].min() > 0.0
-        if not (finite and positive and impedance.min() >= 0.0):
-            return False
-        self._coefficients[:] = coefficients(impedance, self.period)
-        self._used[:] = impedance
-        self._key = key
-        return True
-
-    def reference(self, state: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Return derivatives 0..r of y_p, one row each, shape (r + 1, m).
+    def reference(self, state: ImpedanceState, desired: Any) -> Any:
+        """Return derivatives 0..r of y_p by rows, shape ((r + 1) m,).
 
         From the second on they are those at the last interval's end, with its force and
         parameters. For the arguments see :meth:`update`.
         """
-        self._prepare(state[3:])
-        self._before[:], self._desired[:] = state[:3], desired
-        self._respond()
-        return self._reference.copy()
+        y_d, rates = ca.vertsplit(desired, self.num_outputs), rates_of(state.impedance)
+        mass = ca.vertsplit(state.impedance, self.num_outputs)[MASS]
+        response = [state.position - y_d[0], state.velocity - y_d[1]]
+        force = state.force / mass
+        for _ in range(2, self._response_order + 1):
+            response.append(force - rates.damping * response[-1] - rates.stiffness * response[-2])
+            force = 0.0
+        # a motion that is known is not rounded by a difference and a sum
+        rows = [
+            where(rates.yields, state.position, y_d[0]),
+            where(rates.yields, state.velocity, y_d[1]),
+        ]
+        for k in range(2, self.relative_degree + 1):
+            yielding = k <= self._response_order
+            more = where(rates.yields, response[k], 0.0) if yielding else 0.0
+            rows.append(y_d[k] + more)
+        return ca.vertcat(*rows[: self.relative_degree + 1])

@@ -1,12 +1,11 @@
 """A force with which a tool is to press on a surface, over time."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
-from pfsc_drake.compiled.plain_function import PlainFunction
 from pfsc_drake.control.law.transition import Transition
 from pfsc_drake.errors import InputError
 
@@ -88,7 +87,7 @@ class PressParameters:
         """
         return end - self.retreat_time
 
-    def over_time(self, end: float, stiffest: float) -> Callable[[float, float, float], float]:
+    def over_time(self, end: float, stiffest: float) -> Callable[[Any, Any, Any], Any]:
         """Return the force along the inward normal that the workpiece is to bear.
 
         Args:
@@ -98,22 +97,21 @@ class PressParameters:
 
         Returns:
             Function of the time, of the time of touch-down, infinite before it, and of how far the
-            tool is from where it was when it began to be taken off, [s], [s], [m] -> [N].
+            tool is from where it was when it began to be taken off, [s], [s], [m] -> [N]; of
+            numbers or expressions.
         """
-        since, off = ca.SX.sym("since"), self.taken_off(end)
-        rest = PlainFunction(ca.Function("rest", [since], [Transition(self.ramp, 0).at(since)]))
+        rest, off = Transition(self.ramp, 0), self.taken_off(end)
         stiffness = min(2.0 * self.retreat / self.clearance, stiffest)
 
-        def change(time: float, begin: float) -> float:
-            return 1.0 - rest(time - begin)[0]
+        def change(time: Any, begin: Any) -> Any:
+            return 1.0 - rest.at(time - begin)
 
-        def force(time: float, touch_down: float, lifted: float) -> float:
+        def force(time: Any, touch_down: Any, lifted: Any) -> Any:
             pressed = self.approach * change(time, self.begin)
-            if touch_down < math.inf:
-                pressed += (self.force - self.approach) * change(time, touch_down)
+            pressed += (self.force - self.approach) * change(time, touch_down)
             share_off = change(time, off)
             spring = stiffness * (self.clearance - lifted)
-            lift = max(-self.retreat, min(self.retreat, spring))
+            lift = ca.fmax(-self.retreat, ca.fmin(self.retreat, spring))
             return (1.0 - share_off) * pressed - share_off * lift
 
         return force

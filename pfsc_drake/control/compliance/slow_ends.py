@@ -3,6 +3,9 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
 
 from pfsc_drake.errors import InputError, require
 
@@ -52,8 +55,8 @@ class SlowEnds:
         """Whether it is no constant."""
         return self.most > self.least
 
-    def interpolant(self, lap: float | None = None) -> Callable[[float], float]:
-        """Return the damping as a function of the arc length [m].
+    def interpolant(self, lap: float | None = None) -> Callable[[Any], Any]:
+        """Return the damping as a function of the arc length [m], a number or an expression.
 
         Args:
             lap: Length of a closed path, which has no ends.
@@ -68,8 +71,8 @@ class SlowEnds:
         least, span, length = self.least, self.most - self.least, self.length
         start_rate, end_rate = self.start_rate, self.end_rate
 
-        def value(eta: float) -> float:
-            slow = 3.0 - 2.0 * math.tanh(start_rate * eta)
-            return least + span * (slow + math.tanh(end_rate * (eta - length)))
+        def value(eta: Any) -> Any:
+            slow = 3.0 - 2.0 * ca.tanh(start_rate * eta)
+            return least + span * (slow + ca.tanh(end_rate * (eta - length)))
 
         return value

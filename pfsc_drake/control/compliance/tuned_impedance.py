@@ -3,12 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.compliance.impedance import DAMPING, MASS, STIFFNESS
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
 from pfsc_drake.errors import InputError
 
@@ -53,7 +55,7 @@ class TuningParameters:
                 raise InputError(f"{key} = {value}: must be positive and finite")
 
 
-class ImpedanceTuning:
+class ImpedanceTuner(Block):
     """Leads mass, damping and stiffness from what they are to what somebody wishes.
 
     The motion itself never jumps (:class:`ImpedanceLaw`), but a spring that becomes stiffer by
@@ -77,113 +79,121 @@ class ImpedanceTuning:
     Parameters that vary over the manifold by themselves are, unless somebody wishes otherwise, what
     they are, unpaid: whoever wrote them down answers for them.
 
+    The impedance follows at once from state and inputs, so that the deflection at which a spring
+    becomes stiffer is the one that is paid for. The filter's reference does not depend on it, and
+    there is no algebraic loop. A motion that is not finite changes nothing.
+
+    Ports:
+        wish (input): Stiffness and damping, tangential, transversal and rotational, shape (6,);
+            what is negative stays as given.
+        manifold_state (input): Derivatives of yhat by rows, where parameters depend on it.
+        reference (input): Derivatives of y_p by rows, from :class:`ImpedanceFilter`.
+        desired_reference (input): Derivatives of y_d by rows.
+        impedance (output): Rows mass, damping, stiffness, shape (3 m,), from this tick on.
+        tank (output): Energy that stiffening springs may take [J], shape (1,).
+
+    State:
+        Impedance by rows, rates ``e'`` of the last tick, and tank.
+
     Args:
         parameters: See :class:`TuningParameters`.
+        law: Of the filter, whose impedance is the one without wishes.
         coordinates: The m coordinates of the virtual output.
         masses: Of coordinates that are rigid as given, for the time that they are not, (m,).
-        period: Sampling time T [s].
-        varying: Whether the given parameters vary over the manifold.
     """
 
     def __init__(
         self,
         parameters: TuningParameters,
+        law: ImpedanceLaw,
         coordinates: Sequence[Coordinate],
         masses: np.ndarray,
-        period: float,
-        *,
-        varying: bool = False,
     ) -> None:
-        self.num_outputs, self._reserve = len(coordinates), parameters.reserve
-        function = _tuning_function(parameters, coordinates, masses, period, varying=varying)
-        bound = BoundFunction(function)
-        self._arguments, self._evaluate = list(bound.arguments.values()), bound.evaluate
-        self._next = bound.results["next"]
+        self._parameters, self._law, self._masses = parameters, law, ca.DM(masses)
+        self._returning = ca.DM(_returning(parameters, coordinates))
+        places = zip(*(wishes_of(coordinate.kind) for coordinate in coordinates), strict=True)
+        self._stiffnesses, self._dampings = (list(place) for place in places)
+        m, r = law.num_outputs, law.relative_degree
+        motion = "m, rad, per s, .."
+        self.inputs = {
+            "wish": Port(WISHES, "N/m, N s/m, Nm/rad, Nm s/rad"),
+            "manifold_state": Port(r * m, motion),
+            "reference": Port((r + 1) * m, motion),
+            "desired_reference": Port((law.desired_order + 1) * m, motion),
+        }
+        self.outputs = {"impedance": Port(3 * m, "kg, N s/m, N/m"), "tank": Port(1, "J")}
+        self.states = {"impedance": 3 * m, "rate": m, "tank": 1}
+        self.inner = {"rate": m, "left": 1}
 
-    def start(self, given: np.ndarray) -> np.ndarray:
-        """Return a memory that starts with the impedance as given, shape (4 m + 1,).
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"impedance": self._given(u), "tank": ca.DM(self._parameters.reserve)}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        m = self._law.num_outputs
+        error = u.reference[: 2 * m] - u.desired_reference[: 2 * m]
+        known, (e, rate) = all_finite(error), ca.vertsplit(error, m)
+        impedance, left = self._granted(x, self._given(u), u.wish, e, rate)
+        return {
+            "impedance": where(known, impedance, x.impedance),
+            "tank": x.tank,
+            "rate": where(known, rate, x.rate),
+            "left": where(known, left, x.tank),
+        }
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"impedance": y.impedance, "rate": y.rate, "tank": y.left}
+
+    def _given(self, u: Values) -> Any:
+        """Return the impedance without wishes, shape (3 m,)."""
+        return self._law.impedance(u.manifold_state[: self._law.num_outputs])
+
+    def _granted(self, x: Values, given: Any, wish: Any, e: Any, rate: Any) -> tuple[Any, Any]:
+        """Return the impedance from now on, shape (3 m,), and what is left in the tank.
 
         Args:
-            given: Rows mass, damping, stiffness, shape (3, m).
+            x: States.
+            given: The impedance without wishes, shape (3 m,).
+            wish: See the port.
+            e: ``y_p - y_d``, shape (m,).
+            rate: ``e'``, shape (m,).
         """
-        idle = np.zeros(self.num_outputs)
-        return np.concatenate([given.ravel(), idle, [self._reserve]])
+        parameters, T = self._parameters, self._law.period
+        _, last_damping, last_stiffness = ca.vertsplit(x.impedance, e.numel())
+        given_mass, given_damping, given_stiffness = ca.vertsplit(given, e.numel())
+        asked_stiffness, asked_damping = wish[self._stiffnesses], wish[self._dampings]
+        wished_stiffness = where(asked_stiffness < 0.0, given_stiffness, asked_stiffness)
+        wished_damping = where(asked_damping < 0.0, given_damping, asked_damping)
+        mass = where(given_stiffness < ca.inf, given_mass, self._masses)
 
-    def advance(
-        self, memory: np.ndarray, given: np.ndarray, wish: np.ndarray, error: np.ndarray
-    ) -> np.ndarray:
-        """Return the memory after one period; its first rows are the impedance from now on.
+        was_soft, shall_be_soft = last_stiffness < ca.inf, wished_stiffness < ca.inf
+        share = -math.expm1(-T / parameters.ramp) if parameters.ramp > 0.0 else 1.0
+        spent = last_damping * ca.fmin(rate**2, x.rate**2)
+        filled = x.tank + T * ca.sum1(where(was_soft, spent, 0.0))
+        tank = ca.fmin(filled, parameters.capacity)
 
-        Args:
-            memory: Impedance by rows, rates of the last tick, tank; shape (4 m + 1,).
-            given: Impedance without wishes: rows mass, damping, stiffness, shape (3, m).
-            wish: Stiffness and damping of each of KINDS, shape (6,); what is negative is as given.
-            error: Rows ``e = y_p - y_d`` and ``e'``, shape (2, m).
-        """
-        if not math.isfinite(error.sum()):
-            return memory
-        for argument, value in zip(self._arguments, (memory, given, wish, error), strict=True):
-            argument[:] = value.ravel()
-        self._evaluate()
-        return self._next.copy()
+        aim = where(shall_be_soft, wished_stiffness, self._returning)
+        change = where(was_soft, share * (aim - last_stiffness), 0.0)
+        cost = ca.sum1(ca.fmax(change, 0.0) * e**2) / 2.0
+        paid = where(cost > tank, tank / cost, 1.0)
+        granted = last_stiffness + where(change > 0.0, paid * change, change)
+        # what was rigid is not deflected
+        stiffness = where(was_soft, granted, wished_stiffness)
+        near = ca.fabs(e) < parameters.caught_within
+        near = ca.logic_and(near, ca.fabs(rate) < parameters.caught_below)
+        stiffness = where(ca.logic_and(ca.logic_not(shall_be_soft), near), ca.inf, stiffness)
 
-
-def _tuning_function(
-    parameters: TuningParameters,
-    coordinates: Sequence[Coordinate],
-    masses: np.ndarray,
-    period: float,
-    *,
-    varying: bool,
-) -> ca.Function:
-    """Return ``(memory, given, wish, error) -> next``, see :meth:`ImpedanceTuning.advance`."""
-    m = len(coordinates)
-    memory, given_rows = ca.SX.sym("memory", 4 * m + 1), ca.SX.sym("given", 3 * m)
-    wish, error = ca.SX.sym("wish", WISHES), ca.SX.sym("error", 2 * m)
-    last = dict(zip((MASS, DAMPING, STIFFNESS), ca.vertsplit(memory[: 3 * m], m), strict=True))
-    given = dict(zip((MASS, DAMPING, STIFFNESS), ca.vertsplit(given_rows, m), strict=True))
-    last_rate, tank, (e, rate) = memory[3 * m : 4 * m], memory[-1], ca.vertsplit(error, m)
-    places = zip(*(wishes_of(coordinate.kind) for coordinate in coordinates), strict=True)
-    asked_stiffness, asked_damping = (wish[list(place)] for place in places)
-    wished_stiffness = ca.if_else(asked_stiffness < 0.0, given[STIFFNESS], asked_stiffness)
-    wished_damping = ca.if_else(asked_damping < 0.0, given[DAMPING], asked_damping)
-    mass = ca.if_else(given[STIFFNESS] < ca.inf, given[MASS], masses)
-
-    was_soft, shall_be_soft = last[STIFFNESS] < ca.inf, wished_stiffness < ca.inf
-    share = -math.expm1(-period / parameters.ramp) if parameters.ramp > 0.0 else 1.0
-    spent = last[DAMPING] * ca.fmin(rate**2, last_rate**2)
-    filled = tank + period * ca.sum1(ca.if_else(was_soft, spent, 0.0))
-    tank = ca.fmin(filled, parameters.capacity)
-
-    aim = ca.if_else(shall_be_soft, wished_stiffness, _returning(parameters, coordinates))
-    change = ca.if_else(was_soft, share * (aim - last[STIFFNESS]), 0.0)
-    cost = ca.sum1(ca.fmax(change, 0.0) * e**2) / 2.0
-    paid = ca.if_else(cost > tank, tank / cost, 1.0)
-    granted = last[STIFFNESS] + ca.if_else(change > 0.0, paid * change, change)
-    # what was rigid is not deflected
-    stiffness = ca.if_else(was_soft, granted, wished_stiffness)
-    caught = ca.logic_and(
-        ca.fabs(e) < parameters.caught_within, ca.fabs(rate) < parameters.caught_below
-    )
-    caught = ca.logic_and(ca.logic_not(shall_be_soft), caught)
-    stiffness = ca.if_else(caught, ca.inf, stiffness)
-
-    led_back = ca.logic_and(ca.logic_not(shall_be_soft), stiffness < ca.inf)
-    critical = 2.0 * ca.sqrt(ca.if_else(led_back, stiffness, 0.0) * mass)
-    approached = last[DAMPING] + share * (wished_damping - last[DAMPING])
-    damping = ca.if_else(was_soft, approached, wished_damping)
-    damping = ca.if_else(led_back, ca.fmax(damping, critical), damping)
-    if varying:
-        stiffness = ca.if_else(asked_stiffness < 0.0, given[STIFFNESS], stiffness)
-        damping = ca.if_else(asked_damping < 0.0, given[DAMPING], damping)
-    left = ca.fmax(tank - paid * cost, 0.0)
-    return ca.Function(
-        "impedance_tuning",
-        [memory, given_rows, wish, error],
-        [ca.cse(ca.densify(ca.vertcat(mass, damping, stiffness, rate, left)))],
-        ["memory", "given", "wish", "error"],
-        ["next"],
-    )
+        led_back = ca.logic_and(ca.logic_not(shall_be_soft), stiffness < ca.inf)
+        critical = 2.0 * ca.sqrt(where(led_back, stiffness, 0.0) * mass)
+        approached = last_damping + share * (wished_damping - last_damping)
+        damping = where(was_soft, approached, wished_damping)
+        damping = where(led_back, ca.fmax(damping, critical), damping)
+        if not self._law.is_constant:
+            stiffness = where(asked_stiffness < 0.0, given_stiffness, stiffness)
+            damping = where(asked_damping < 0.0, given_damping, damping)
+        return ca.vertcat(mass, damping, stiffness), ca.fmax(tank - paid * cost, 0.0)
 
 
 def _returning(parameters: TuningParameters, coordinates: Sequence[Coordinate]) -> np.ndarray:

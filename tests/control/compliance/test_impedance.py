@@ -1,7 +1,9 @@
 """Impedance filters against closed forms, matrix exponentials and an independent solver."""
 
 import math
+from functools import cache
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,15 +13,15 @@ from scipy.linalg import expm
 
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     ImpedanceStatus,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_functions import transition
+from pfsc_drake.control.compliance.impedance_transition import transition
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
+from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 
 PERIOD = 1e-3
 POSITION, POSE = (PathManifold(2, oriented=o).coordinates for o in (False, True))
@@ -33,7 +35,24 @@ def constant(m, d, k):
 
 def make_law(tangential=TANGENTIAL, transversal=TRANSVERSAL, r=2, period=PERIOD, **options):
     parameters = ImpedanceParameters(constant(*tangential), constant(*transversal))
-    return ImpedanceLaw(parameters, POSITION, r, period, **options)
+    return ImpedanceOnNumbers(parameters, POSITION, r, period, **options)
+
+
+def on_numbers(profile, lap=None):
+    """Return a profile as a function of arrays."""
+    x = ca.SX.sym("x")
+    function = ca.Function("profile", [x], [profile.interpolant(lap)(x)])
+    return lambda values: function(ca.DM(np.atleast_2d(values))).full().ravel()
+
+
+def numbers(damping, stiffness, time):
+    return [float(x) for x in solution(time)(damping, stiffness)]
+
+
+@cache
+def solution(time):
+    rates = [ca.SX.sym("damping"), ca.SX.sym("stiffness")]
+    return ca.Function("solution", rates, transition(*rates, time))
 
 
 def by_exponential(damping, stiffness, time):
@@ -75,21 +94,21 @@ def test_a_force_step_gives_the_closed_form(parameters):
 def test_the_transition_is_the_matrix_exponential(log_damping, log_stiffness):
     """Any damping ratio; the numbers are scaled to T = 1, which is no restriction."""
     rates = (10.0**log_damping, 10.0**log_stiffness, 1.0)
-    assert np.allclose(transition(*rates), by_exponential(*rates), rtol=1e-12, atol=1e-14)
+    assert np.allclose(numbers(*rates), by_exponential(*rates), rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize("damping", [1e-9, 0.3, 0.99, 1.01, 4.0, 20.0])
 def test_critical_damping_is_nothing_special(damping):
     for detune in (0.0, 1e-14, -1e-14, 1e-8, -1e-8, 1e-3, -1e-3):
         rates = (damping, damping**2 / 4 * (1 + detune), 1.0)
-        assert np.allclose(transition(*rates), by_exponential(*rates), rtol=1e-13, atol=1e-14)
+        assert np.allclose(numbers(*rates), by_exponential(*rates), rtol=1e-13, atol=1e-14)
 
 
 @pytest.mark.parametrize("parameters", [TANGENTIAL, TRANSVERSAL])
 def test_table_3_2_is_exact_at_one_millisecond(parameters):
     """An explicit Euler step would just stop a motion with d/m = 1000 1/s within one period."""
     m, d, k = parameters
-    a, b, c, e, p = transition(d / m, k / m, PERIOD)
+    a, b, c, e, p = numbers(d / m, k / m, PERIOD)
     assert np.allclose([a, b, c, e, p], by_exponential(d / m, k / m, PERIOD), rtol=2e-14, atol=0)
     w = math.sqrt(d**2 / 4 / m**2 - k / m)
     trace = 2.0 * math.exp(-d / 2 / m * PERIOD) * math.cosh(w * PERIOD)
@@ -246,7 +265,7 @@ def test_inputs_that_cannot_be_used():
 def test_infinite_stiffness_is_position_control():
     """A coordinate is rigid exactly, whatever its state; released, it goes on from y_d."""
     parameters = ImpedanceParameters(transversal=constant(*TRANSVERSAL))
-    law, rng = ImpedanceLaw(parameters, POSE, 4, PERIOD), np.random.default_rng(6)
+    law, rng = ImpedanceOnNumbers(parameters, POSE, 4, PERIOD), np.random.default_rng(6)
     state = law.start(rng.uniform(-1, 1, (2, 6)))
     desired, rigid = rng.uniform(-1, 1, (5, 6)), [0, 3, 4, 5]
     assert np.array_equal(law.reference(state, desired)[:, rigid], desired[:, rigid])
@@ -267,43 +286,44 @@ def test_infinite_stiffness_is_position_control():
 
 def test_profiles():
     profile = Profile(over="xi", at=[0.0, 0.01, 0.03, 0.04], values=[5.0, 0.0, 0.0, 80.0])
-    value = profile.interpolant()
-    assert [value(x) for x in (-1.0, *profile.at, 2.0)] == pytest.approx([5, 5, 0, 0, 80, 80])
+    value = on_numbers(profile)
+    assert value([-1.0, *profile.at, 2.0]) == pytest.approx([5, 5, 0, 0, 80, 80])
     x = np.linspace(-0.01, 0.05, 60001)
-    y = np.array([value(v) for v in x])
+    y = value(x)
     assert y.min() == 0.0
     assert np.all(np.diff(y)[x[1:] <= 0.01] <= 0.0)
     assert np.all(np.diff(y)[x[:-1] >= 0.01] >= 0.0)
     assert np.abs(np.diff(y, 2)).max() < 1e-3 * np.abs(np.diff(y)).max()
+    assert np.isnan(value(np.nan))
     kinds = CoordinateImpedance(
         Profile(1.0), profile, Profile(over="eta", at=[1, 2], values=[3, 9])
     )
-    law = ImpedanceLaw(ImpedanceParameters(kinds, kinds, kinds), POSE, 2, PERIOD)
+    law = ImpedanceOnNumbers(ImpedanceParameters(kinds, kinds, kinds), POSE, 2, PERIOD)
     impedance = law.impedance(np.array([1.5, 0.024, -0.032, 1.0, 1.0, 1.0]))
     assert np.allclose(impedance, np.array([[1.0], [80.0], [6.0]]) * np.ones(6))
     kinds.mass.value = 0.0
     with pytest.raises(InputError, match="mass"):
-        ImpedanceLaw(ImpedanceParameters(kinds), POSITION, 2, PERIOD)
+        ImpedanceOnNumbers(ImpedanceParameters(kinds), POSITION, 2, PERIOD)
 
 
 def test_profiles_go_round_closed_paths():
     lap = 2.5
     profile = Profile(over="eta", at=[0.5, 1.0, 2.0], values=[3.0, 9.0, 1.0])
-    value = profile.interpolant(lap)
+    value = on_numbers(profile, lap)
     eta = np.linspace(-3.0, 6.0, 2001)
-    around = np.array([value(x) for x in eta])
-    np.testing.assert_allclose([value(x + 2 * lap) for x in eta], around, atol=1e-12)
+    around = value(eta)
+    np.testing.assert_allclose(value(eta + 2 * lap), around, atol=1e-12)
     for at, wanted in zip(profile.at, profile.values, strict=True):
         assert value(at) == pytest.approx(wanted)
         assert value(at - lap) == pytest.approx(wanted)
     # from the last breakpoint to the first of the next lap it goes straight up, without a step
-    seam = np.array([value(x) for x in np.linspace(2.0, 3.0, 200)])
+    seam = value(np.linspace(2.0, 3.0, 200))
     assert np.all(np.diff(seam) >= 0.0)
     assert np.abs(np.diff(around)).max() < 0.2
     slopes = np.gradient(around, eta)
     assert np.abs(np.diff(slopes)).max() < 1.0
     # one that names both ends of the lap
-    whole = Profile(over="eta", at=[0.0, 1.0, lap], values=[3.0, 9.0, 3.0]).interpolant(lap)
+    whole = on_numbers(Profile(over="eta", at=[0.0, 1.0, lap], values=[3.0, 9.0, 3.0]), lap)
     assert whole(lap + 1.0) == pytest.approx(9.0)
     with pytest.raises(InputError, match=r"2\.5 m long"):
         Profile(at=[0.0, 2.6], values=[1.0, 1.0]).interpolant(lap)
@@ -316,8 +336,8 @@ def test_an_impedance_goes_round_closed_paths():
         Profile(1.0), Profile(1.0), Profile(over="eta", at=[0.2, 1.0], values=[100.0, 900.0])
     )
     parameters = ImpedanceParameters(constant(*TANGENTIAL), soft)
-    law = ImpedanceLaw(parameters, POSITION, 2, PERIOD, lap=2.0)
-    straight = ImpedanceLaw(parameters, POSITION, 2, PERIOD)
+    law = ImpedanceOnNumbers(parameters, POSITION, 2, PERIOD, lap=2.0)
+    straight = ImpedanceOnNumbers(parameters, POSITION, 2, PERIOD)
     y, later = np.array([0.6, 0.0, 0.0]), np.array([2.6, 0.0, 0.0])
     np.testing.assert_allclose(law.impedance(y), law.impedance(later), rtol=1e-12)
     assert straight.impedance(later)[2, 1] == 900.0
@@ -330,7 +350,7 @@ def over(what):
 
 
 def test_profiles_over_a_single_coordinate():
-    law = ImpedanceLaw(over("xi_2"), POSITION, 2, 1e-3)
+    law = ImpedanceOnNumbers(over("xi_2"), POSITION, 2, 1e-3)
     damping = law.impedance(np.array([9.0, 9.0, 1.0]))[1]
     assert np.array_equal(damping, [0.0, 2.0, 2.0])
 
@@ -340,7 +360,7 @@ def test_profiles_over_a_single_coordinate():
     [
         (lambda: Profile(-1.0), "value: -1.0"),
         (
-            lambda: ImpedanceLaw(over("theta"), POSITION, 2, 1e-3),
+            lambda: ImpedanceOnNumbers(over("theta"), POSITION, 2, 1e-3),
             "compliance.transversal.damping.over: 'theta'; must be one of eta, xi_1, xi_2, xi",
         ),
         (lambda: Profile(at=[0.0, 0.0], values=[1.0, 2.0]), "at: .* increasing"),

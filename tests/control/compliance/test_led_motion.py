@@ -8,7 +8,6 @@ import pytest
 
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
@@ -17,6 +16,7 @@ from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
+from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 from tests.control.conftest import Robot
 from tests.control.fixtures.arm_robot import START
 
@@ -81,7 +81,7 @@ def test_the_force_that_brings_a_speed_about_is_that_of_the_impedance():
     soft = CoordinateImpedance(Profile(2.0), Profile(30.0), Profile(500.0))
     free = CoordinateImpedance(Profile(5.0), Profile(60.0), Profile(0.0))
     coordinates = PathManifold(2, oriented=True).coordinates
-    law = ImpedanceLaw(ImpedanceParameters(free, soft), coordinates, 2, PERIOD)
+    law = ImpedanceOnNumbers(ImpedanceParameters(free, soft), coordinates, 2, PERIOD)
     motion = np.zeros((2, 6))
     motion[:, :3] = [[0.1, 0.01, -0.02], [0.4, -0.1, 0.05]]
     state, desired, force = law.start(motion), np.zeros((3, 6)), np.arange(6.0)

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from pfsc_drake.control.compliance.impedance import (
     DAMPING,
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
 from pfsc_drake.errors import InputError
+from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 
 LENGTH, LEAST, MOST = 1.1, 90.0, 3000.0  # m, N s/m; Tab. 5.5
 MASS, STIFFNESS, PERIOD = 3.0, 1.0, 1e-3
@@ -49,7 +49,7 @@ def law(length=LENGTH):
     tangential = CoordinateImpedance(Profile(MASS), SlowEnds(LEAST, MOST), Profile(STIFFNESS))
     along = Coordinate("eta", Kind.TANGENTIAL, "tau_par")
     parameters = ImpedanceParameters(tangential=tangential).on_path(length)
-    return ImpedanceLaw(parameters, [along], 1, PERIOD)
+    return ImpedanceOnNumbers(parameters, [along], 1, PERIOD)
 
 
 def test_the_length_is_that_of_the_path():

@@ -5,21 +5,22 @@ import math
 import numpy as np
 import pytest
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import (
     DAMPING,
     STIFFNESS,
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
 from pfsc_drake.control.compliance.tuned_impedance import (
     AS_GIVEN,
-    ImpedanceTuning,
+    ImpedanceTuner,
     TuningParameters,
 )
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
+from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 
 PERIOD = 1e-3
 COORDINATES = PathManifold(2, oriented=False).coordinates
@@ -39,33 +40,43 @@ class Bench:
     """A filter at rest on its manifold, a tuning, and a hand."""
 
     def __init__(self, parameters=SOFT, **options):
-        self.law = ImpedanceLaw(parameters, COORDINATES, 2, PERIOD)
+        self.law = ImpedanceOnNumbers(parameters, COORDINATES, 2, PERIOD)
         self.given = self.law.impedance(np.zeros(3))
-        self.tuning = ImpedanceTuning(
-            TuningParameters(**options), COORDINATES, np.full(3, 3.0), PERIOD
+        masses = np.full(3, 3.0)
+        self.tuner = Stepper(
+            ImpedanceTuner(TuningParameters(**options), self.law.law, COORDINATES, masses)
         )
-        self.memory = self.tuning.start(self.given)
+        self.impedance = self.given
         self.state, self.work = self.law.start(np.zeros((2, 3))), 0.0
         self.wish = NOTHING.copy()
 
     def tick(self, force=(0.0, 0.0, 0.0)):
         """Go on by a tick, and count the work of the hand."""
         before = self.state[0].copy()
-        self.memory = self.tuning.advance(self.memory, self.given, self.wish, self.state[:2])
+        self.tune(self.state[:2])
         self.state, _ = self.law.update(
             self.state, np.zeros((3, 3)), np.asarray(force), self.impedance
         )
         self.work += float(np.dot(force, self.state[0] - before))
+
+    def tune(self, error, y=(0.0, 0.0, 0.0)):
+        """Let the wish be followed for a tick."""
+        self.impedance = self.tuner.step(
+            wish=self.wish,
+            manifold_state=[*y, 0.0, 0.0, 0.0],
+            reference=[*np.ravel(error), 0.0, 0.0, 0.0],
+            desired_reference=np.zeros(9),
+        )["impedance"].reshape(3, 3)
+
+    @property
+    def tank(self):
+        return self.tuner.states["tank"][0]
 
     def hold_at(self, place, ticks, strength=5e3):
         """Lead the second coordinate to a place, as a stiff hand does."""
         for _ in range(ticks):
             error, rate = place - self.state[0, 1], self.state[1, 1]
             self.tick((0.0, strength * error - 100.0 * rate, 0.0))
-
-    @property
-    def impedance(self):
-        return self.memory[:9].reshape(3, 3)
 
     @property
     def stored(self):
@@ -107,7 +118,7 @@ def test_any_motion_is_passive():
             for _ in range(int(random.integers(10, 80))):
                 bench.tick(force)
                 assert bench.work >= bench.stored - 0.02 - 1e-9
-                assert bench.memory[-1] >= 0.0
+                assert bench.tank >= 0.0
 
 
 def test_on_the_manifold_a_wish_is_followed_with_its_time_constant():
@@ -125,7 +136,7 @@ def test_at_depth_stiffness_waits_for_what_dampers_dissipate():
     bench = Bench(reserve=0.05)
     bench.wish[WISH["across"]] = [0.0, 30.0]
     bench.hold_at(0.05, 1000)
-    full = bench.memory[-1]
+    full = bench.tank
     bench.wish[WISH["across"]] = [5000.0, 30.0]
     bench.hold_at(0.05, 3000)
     there = bench.state[0, 1]
@@ -171,23 +182,28 @@ def test_a_wish_for_nothing_changes_nothing():
 
 
 def test_parameters_that_vary_by_themselves_do_so_at_once():
-    tuning = ImpedanceTuning(TuningParameters(), COORDINATES, np.full(3, 3.0), PERIOD, varying=True)
-    given = np.array([[3.0] * 3, [90.0] * 3, [0.0, 100.0, 100.0]])
-    memory = tuning.start(given)
-    stiffer = given + np.array([[0.0], [0.0], [500.0]])
-    error = np.array([[0.0, 0.1, 0.1], [0.0] * 3])
-    wish = NOTHING.copy()
-    wish[1] = 30.0  # damping along
-    now = tuning.advance(memory, stiffer, wish, error)[:9].reshape(3, 3)
-    assert np.array_equal(now[STIFFNESS], stiffer[STIFFNESS])
-    assert np.array_equal(now[DAMPING, 1:], stiffer[DAMPING, 1:])
-    assert 89.0 < now[DAMPING, 0] < 90.0
+    stiffness = Profile(over="eta", at=[0.0, 1.0], values=[100.0, 600.0])
+    across = CoordinateImpedance(Profile(3.0), Profile(90.0), stiffness)
+    bench = Bench(ImpedanceParameters(impedance(3.0, 90.0, 0.0), across))
+    bench.wish[1] = 30.0  # damping along
+    bench.tune(np.zeros((2, 3)))
+    assert bench.impedance[STIFFNESS].tolist() == [0.0, 100.0, 100.0]
+    error = [[0.0, 0.1, 0.1], [0.0] * 3]
+    bench.tune(error, y=[2.0, 0.1, 0.1])
+    assert bench.impedance[STIFFNESS].tolist() == [0.0, 600.0, 600.0]
+    assert np.array_equal(bench.impedance[DAMPING, 1:], [90.0, 90.0])
+    assert 88.0 < bench.impedance[DAMPING, 0] < 90.0
 
 
 def test_a_motion_that_is_not_finite_changes_nothing():
     bench = Bench()
-    memory = bench.tuning.advance(bench.memory, bench.given, NOTHING, np.full((2, 3), np.nan))
-    assert np.array_equal(memory, bench.memory)
+    bench.wish[WISH["across"]] = [3000.0, 90.0]
+    bench.hold_at(0.01, 20)
+    before, impedance_before = dict(bench.tuner.states), bench.impedance
+    bench.tune(np.full((2, 3), np.nan))
+    assert np.array_equal(bench.impedance, impedance_before)
+    for name, value in before.items():
+        assert np.array_equal(bench.tuner.states[name], value)
 
 
 def test_numbers_out_of_range_are_refused():

@@ -13,10 +13,10 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuning, TuningParameters
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
+from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
-from pfsc_drake.systems.control.impedance_tuner import ImpedanceTuner
+from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD = 1e-3
 COORDINATES = PathManifold(2, oriented=False).coordinates
@@ -27,10 +27,10 @@ def station():
     """A filter that is pulled with 30 N across, and its tuner."""
     soft = CoordinateImpedance(Profile(3.0), Profile(150.0), Profile(1000.0))
     law = ImpedanceLaw(ImpedanceParameters(transversal=soft), COORDINATES, 2, PERIOD)
-    tuning = ImpedanceTuning(TuningParameters(), COORDINATES, np.full(3, 3.0), PERIOD)
+    tuning = ImpedanceTuner(TuningParameters(), law, COORDINATES, np.full(3, 3.0))
     builder = DiagramBuilder()
-    impedance = builder.AddSystem(ImpedanceFilter(law))
-    tuner = builder.AddSystem(ImpedanceTuner(tuning, law.impedance, (6, 9, 9), PERIOD))
+    impedance = builder.AddSystem(BlockSystem(ImpedanceFilter(law), PERIOD))
+    tuner = builder.AddSystem(BlockSystem(tuning, PERIOD))
     constants = {
         "desired_reference": np.zeros(9),
         "manifold_state": np.zeros(6),

@@ -10,8 +10,9 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceParameters,
     Profile,
 )
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
+from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD = 1e-3
 POSITION = PathManifold(2, oriented=False).coordinates
@@ -27,7 +28,7 @@ class Bench:
     def __init__(self, start):
         soft = CoordinateImpedance(Profile(MASS), Profile(DAMPING), Profile(STIFFNESS))
         law = ImpedanceLaw(ImpedanceParameters(soft, soft), POSITION, 2, PERIOD)
-        self.system = ImpedanceFilter(law, start=start)
+        self.system = BlockSystem(ImpedanceFilter(law, start=start), PERIOD)
         self.context = self.system.CreateDefaultContext()
         self.fix(desired_reference=DESIRED, manifold_force=FORCE, manifold_state=ACTUAL, ready=[0])
         self.simulator = Simulator(self.system, self.context)

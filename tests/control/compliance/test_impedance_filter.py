@@ -1,18 +1,13 @@
-"""The filter as a system: over time, at its start, in a closed loop."""
+"""The filter: over time, at its start, and when what it is told changes."""
 
 import numpy as np
 import pytest
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import (
-    ConstantVectorSource,
     MatrixGain,
     VectorLogSink,
-    ZeroOrderHold,
 )
-from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
@@ -21,47 +16,36 @@ from pfsc_drake.control.compliance.impedance import (
     ImpedanceStatus,
     Profile,
 )
-from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import (
-    Path,
-    interpolate_orientation,
-    quaternion_to_matrix,
-    zyx_to_quaternion,
-)
-from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
-from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 
 PERIOD = 1e-3
-COORDINATES = {3 * (1 + o): PathManifold(2, oriented=o).coordinates for o in (False, True)}
+COORDINATES = PathManifold(2, oriented=False).coordinates
 TAU = np.array([4.0, -6.0, 9.0])
 DESIRED = np.array([0.5, 0.0, 0.0, 0.2, 0.0, 0.0, 0.1, 0.0, 0.0])
 MEASURED = np.array([0.48, 0.01, -0.02, 0.1, 0.03, 0.05])
 
 
-def make_law(r=2, m=3, far=300.0, **options):
-    """Return a law with the values of Tab. 3.2, but another damping far from the path."""
+def arguments(r=2, far=300.0):
+    """Return those of a law with the values of Tab. 3.2, but another damping far from the path."""
     damping = Profile(over="xi", at=[0.0, 0.02], values=[122.47, far])
     tangential = CoordinateImpedance(Profile(0.3), Profile(300.0), Profile(3000.0))
     transversal = CoordinateImpedance(Profile(0.3), damping, Profile(500.0))
     parameters = ImpedanceParameters(tangential, transversal)
-    return ImpedanceLaw(parameters, COORDINATES[m], r, PERIOD, **options)
+    return parameters, COORDINATES, r, PERIOD
 
 
 class Bench:
     """A filter in a context with fixed inputs."""
 
     def __init__(self, **options):
-        self.law = make_law()
-        self.system = ImpedanceFilter(self.law, **options)
+        self.law = ImpedanceOnNumbers(*arguments())
+        self.system = BlockSystem(ImpedanceFilter(self.law.law, **options), PERIOD)
         self.context = self.system.CreateDefaultContext()
         self.fix(desired_reference=DESIRED, manifold_force=TAU, manifold_state=MEASURED)
 
@@ -90,10 +74,13 @@ class Bench:
 
 def test_over_time_it_is_the_law():
     """With a reference, a force and parameters that all vary."""
-    law, eta_d = make_law(4), rest_to_rest([0.1, 0.4], velocity=0.5, acceleration=3.0)
+    law, eta_d = (
+        ImpedanceOnNumbers(*arguments(4)),
+        rest_to_rest([0.1, 0.4], velocity=0.5, acceleration=3.0),
+    )
     builder = DiagramBuilder()
     source = builder.AddSystem(BlockSystem(TimedReference(eta_d, 4, 3, PERIOD), PERIOD))
-    system = builder.AddSystem(ImpedanceFilter(law))
+    system = builder.AddSystem(BlockSystem(ImpedanceFilter(law.law), PERIOD))
     force = builder.AddSystem(MatrixGain(np.eye(3, 15) * [[80.0], [40.0], [0.0]]))
     measured = builder.AddSystem(MatrixGain(0.02 * np.ones((12, 15))))
     log = builder.AddSystem(VectorLogSink(15, PERIOD))
@@ -151,7 +138,8 @@ def test_what_is_not_measured_yet_is_awaited():
 def test_a_given_start_is_kept_by_one_initialization():
     bench = Bench(start="actual")
     position, velocity = np.array([0.3, 0.1, 0.2]), np.array([0.1, 0.0, -0.1])
-    bench.system.set_motion(bench.context, position, velocity)
+    bench.system.set_state(bench.context, "position", position)
+    bench.system.set_state(bench.context, "velocity", velocity)
     bench.start()
     assert np.array_equal(bench.motion(), [position, velocity])
     bench.tick(5)
@@ -230,7 +218,7 @@ def test_a_failed_sensor_is_no_force():
 
 
 def test_only_the_desired_reference_acts_at_once():
-    system = ImpedanceFilter(make_law())
+    system = BlockSystem(ImpedanceFilter(ImpedanceLaw(*arguments())), PERIOD)
     output = int(system.GetOutputPort("reference").get_index())
     acting = [
         system.get_input_port(i).get_name()
@@ -238,105 +226,3 @@ def test_only_the_desired_reference_acts_at_once():
         if system.HasDirectFeedthrough(i, output)
     ]
     assert acting == ["desired_reference"]
-
-
-def test_the_rotational_forces_may_depend_on_the_reference(path):
-    """phi_pd of (3.44) is the filter's own output; that is no algebraic loop.
-
-    It comes to rest where springs and torque do no work together in any turn.
-    """
-    stiffness, moment, manifold = 20.0, np.array([3.0, -5.0, 4.0]), PathManifold(2, oriented=True)
-    angle = CoordinateImpedance(Profile(0.1), Profile(4.0), Profile(stiffness))
-    parameters = ImpedanceParameters(angle, angle, angle)
-    law = ImpedanceLaw(parameters, COORDINATES[6], 2, PERIOD)
-    quaternions = zyx_to_quaternion(np.array([[0.4, -0.2, 0.7]]))
-    theta = np.array([0.0, 2.0 * np.pi])
-    turned = interpolate_orientation(quaternions, theta, smoothness=3, closed=True)
-    point = Path(path.position, turned).evaluator(2)([0.9, 0.2, 1.1], 0.6)
-    R_d = Rotation.from_matrix(quaternion_to_matrix(point[manifold.layout.quaternion][:4]))
-    builder = DiagramBuilder()
-    system = builder.AddSystem(ImpedanceFilter(law))
-    transform = builder.AddSystem(BlockSystem(ManifoldForceTransform(manifold), PERIOD))
-    builder.Connect(system.GetOutputPort("reference"), transform.GetInputPort("reference"))
-    builder.Connect(transform.get_output_port(), system.GetInputPort("manifold_force"))
-    simulator = Simulator(builder.Build())
-    root = simulator.get_mutable_context()
-    inside = system.GetMyMutableContextFromRoot(root)
-    for name in ("desired_reference", "manifold_state"):
-        port = system.GetInputPort(name)
-        port.FixValue(inside, np.zeros(port.size()))
-    inside = transform.GetMyMutableContextFromRoot(root)
-    transform.GetInputPort("wrench").FixValue(inside, [0.0, 0.0, 0.0, *moment])
-    transform.GetInputPort("manifold_point").FixValue(inside, point)
-    simulator.AdvanceTo(3.0)
-    output = system.GetOutputPort("reference").Eval(system.GetMyContextFromRoot(root))
-    phi = output.ravel()[3:6]
-    assert np.abs(phi).min() > 0.05
-
-    def turn(angles):
-        return R_d * Rotation.from_euler("ZYX", angles)
-
-    for i, step in enumerate(1e-6 * np.eye(3)):
-        way = (turn(phi + step) * turn(phi - step).inv()).as_rotvec()
-        assert stiffness * phi[i] * 2e-6 == pytest.approx(moment @ way, rel=1e-5)
-
-
-@pytest.mark.parametrize("start", ["reference", "actual"])
-def test_a_robot_yields_to_a_force(arm, path, request, start):
-    """In the intended wiring, with a sensor that measures a constant force: it yields by f / k."""
-    builder = DiagramBuilder()
-    plant = builder.AddSystem(MultibodyPlant(0.0))
-    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_3r")))
-    plant.Finalize()
-    chain, coordinates = chain_from_plant(plant, plant.GetFrameByName("tool_point"))
-    theta, force = 0.6, np.array([3.0, -4.0, 5.0, 0.0, 0.0, 0.0])
-    desired = np.array([path.arc_length.at(theta), *np.zeros(8)])
-    controller = FollowingController(request.getfixturevalue("make_law")(), PERIOD)
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    parts = {
-        "measured": builder.AddSystem(MatrixGain(rows)),
-        "kinematics": builder.AddSystem(ToolKinematics(chain)),
-        "projector": builder.AddSystem(PathProjector(path, 2, PERIOD)),
-        "controller": builder.AddSystem(controller),
-        "filter": builder.AddSystem(ImpedanceFilter(make_law(far=60.0), start=start)),
-        "transform": builder.AddSystem(
-            BlockSystem(ManifoldForceTransform(PathManifold(2, oriented=False)), PERIOD)
-        ),
-        "desired": builder.AddSystem(ConstantVectorSource(desired)),
-        "wrench": builder.AddSystem(ConstantVectorSource(force)),
-        "hold": builder.AddSystem(ZeroOrderHold(PERIOD, 3)),
-    }
-    builder.Connect(plant.get_state_output_port(), parts["measured"].get_input_port())
-    builder.Connect(parts["hold"].get_output_port(), plant.get_actuation_input_port())
-    for source, sink in (
-        ("measured", "kinematics.joint_state"),
-        ("measured", "controller.joint_state"),
-        ("kinematics", "projector.tool_pose"),
-        ("projector", "controller.manifold_point"),
-        ("projector", "transform.manifold_point"),
-        ("wrench", "transform.wrench"),
-        ("desired", "filter.desired_reference"),
-        ("transform", "filter.manifold_force"),
-        ("controller.manifold_state", "filter.manifold_state"),
-        ("filter.reference", "controller.reference"),
-        ("controller.drive_torque", "hold"),
-    ):
-        (a, _, output), (b, _, name) = source.partition("."), sink.partition(".")
-        begin = parts[a].GetOutputPort(output) if output else parts[a].get_output_port()
-        end = parts[b].GetInputPort(name) if name else parts[b].get_input_port()
-        builder.Connect(begin, end)
-    context = (diagram := builder.Build()).CreateDefaultContext()
-    q = arm.reach(path.position.derivatives(theta, 0)[0] + np.array([0.004, -0.006, 0.005]))
-    plant.SetPositions(plant.GetMyMutableContextFromRoot(context), q)
-    Simulator(diagram, context).AdvanceTo(1.5)
-
-    def output(part, name):
-        system = parts[part]
-        return system.GetOutputPort(name).Eval(system.GetMyContextFromRoot(context))
-
-    reference, yhat = output("filter", "reference"), output("controller", "manifold_state")
-    tau = output("transform", "manifold_force")
-    expected = desired[:3] + tau / [3000.0, 500.0, 500.0]
-    assert np.allclose(reference[:3], expected, rtol=0, atol=2e-5)
-    assert np.allclose(yhat[:3], reference[:3], rtol=0, atol=2e-5)
-    assert output("controller", "status")[0] == 0.0

@@ -1,80 +1,68 @@
 """A force reference among forces."""
 
-import math
-
+import casadi as ca
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import BasicVector, DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder
 
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.cases import where
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
     ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.press import PressParameters
+from pfsc_drake.control.compliance.pressing import Pressing
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
-from pfsc_drake.systems.control.impedance_filter import ImpedanceFilter
-from pfsc_drake.systems.control.pressing import Pressing
+from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD = 1e-3
 
 
 def _force(time, touch_down, lifted):
-    return 2.0 * time if touch_down == math.inf else 100.0 + touch_down
+    return where(touch_down < ca.inf, 100.0 + touch_down, 2.0 * time)
 
 
 def test_it_acts_against_its_coordinate():
-    system = Pressing(_force, 1e3, coordinate=2, num_outputs=5, reference_size=5, period=PERIOD)
-    context = system.CreateDefaultContext()
-    force = np.arange(5.0)
-    system.GetInputPort("manifold_force").FixValue(context, force)
-    context.SetTime(1.5)
-    pressed = system.GetOutputPort("pressed_force").Eval(context)
-    np.testing.assert_allclose(pressed, [0.0, 1.0, -1.0, 3.0, 4.0])
-    assert system.GetOutputPort("press").Eval(context) == [3.0]
+    stepper = Stepper(Pressing(_force, 1e3, 2, 5, 5, PERIOD))
+    stepper.tick = 1500
+    out = stepper.step(manifold_force=np.arange(5.0), reference=np.zeros(5), ready=0.0)
+    np.testing.assert_allclose(out["pressed_force"], [0.0, 1.0, -1.0, 3.0, 4.0])
+    assert out["press"] == [3.0]
 
 
 def test_it_keeps_the_time_of_touch_down():
     """Not before the sensor is tared, once, and for good."""
-    system = Pressing(_force, 3.0, coordinate=0, num_outputs=1, reference_size=1, period=PERIOD)
-    simulator = Simulator(system)
-    context = simulator.get_mutable_context()
-    measured, ready = (
-        system.GetInputPort(name).FixValue(context, [value])
-        for name, value in (("manifold_force", 50.0), ("ready", 0.0))
-    )
-
-    def press_at(time):
-        simulator.AdvanceTo(time)
-        return system.GetOutputPort("press").Eval(context).item()
-
-    assert press_at(0.0105) == pytest.approx(0.021)
-    ready.GetMutableData().set_value(BasicVector([1.0]))
-    measured.GetMutableData().set_value(BasicVector([2.9]))
-    assert press_at(0.0205) == pytest.approx(0.041)
-    measured.GetMutableData().set_value(BasicVector([3.0]))
-    assert press_at(0.0305) == pytest.approx(100.021)
-    measured.GetMutableData().set_value(BasicVector([0.0]))
-    assert press_at(0.0505) == pytest.approx(100.021)
+    stepper = Stepper(Pressing(_force, 3.0, 0, 1, 1, PERIOD))
+    told = [(50.0, 0.0)] * 11 + [(2.9, 1.0)] * 10 + [(3.0, 1.0)] * 10 + [(0.0, 1.0)] * 20
+    press = [
+        stepper.step(manifold_force=force, reference=0.0, ready=ready)["press"][0]
+        for force, ready in told
+    ]
+    time = PERIOD * np.arange(len(told))
+    np.testing.assert_allclose(press[:22], 2.0 * time[:22])
+    np.testing.assert_allclose(press[22:], 100.0 + 21 * PERIOD)
 
 
 def test_the_reference_needs_no_force():
-    system = Pressing(_force, 3.0, coordinate=0, num_outputs=1, reference_size=1, period=PERIOD)
-    assert not system.HasDirectFeedthrough(0, system.GetOutputPort("press").get_index())
+    program = Program(Network.of(Pressing(_force, 3.0, 0, 1, 1, PERIOD)))
+    needs = program.stages[program.output("press")[0]].needs
+    assert "manifold_force" not in {source.name for source in needs}
 
 
 @pytest.mark.parametrize(("measured", "lost"), [(-14.9, 0), (-15.1, 1), (24.9, 0), (25.1, 1)])
 def test_a_force_far_from_its_reference_is_lost_either_way(measured, lost):
     """5 N are asked for; nothing is lost before the sensor is tared."""
-    system = Pressing(lambda time, touch_down, lifted: 5.0, 3.0, 1, 2, 2, PERIOD, allowed=20.0)
-    context = system.CreateDefaultContext()
-    system.GetInputPort("manifold_force").FixValue(context, [1e3, measured])
-    ready = system.GetInputPort("ready").FixValue(context, [1.0])
-    assert system.GetOutputPort("lost").Eval(context) == [lost]
-    ready.GetMutableData().set_value(BasicVector([0.0]))
-    assert system.GetOutputPort("lost").Eval(context) == [0.0]
+    block = Pressing(lambda time, touch_down, lifted: ca.DM(5.0), 3.0, 1, 2, 2, PERIOD, 20.0)
+    given = {"manifold_force": [1e3, measured], "reference": np.zeros(2)}
+    assert Stepper(block).step(**given, ready=1.0)["lost"] == [lost]
+    assert Stepper(block).step(**given, ready=0.0)["lost"] == [0.0]
 
 
 @pytest.mark.parametrize("left", [-0.5, 0.0, 0.5])
@@ -86,19 +74,18 @@ def test_a_tool_that_is_taken_off_stays_there(left):
     coordinates = SurfaceManifold(2).coordinates
     law = ImpedanceLaw(ImpedanceParameters(transversal=across), coordinates, 2, PERIOD)
     builder = DiagramBuilder()
-    impedance = builder.AddSystem(ImpedanceFilter(law))
+    impedance = builder.AddSystem(BlockSystem(ImpedanceFilter(law), PERIOD))
     reference = impedance.GetOutputPort("reference")
-    pressing = builder.AddSystem(
-        Pressing(
-            press.over_time(end, damping**2 / (4.0 * mass)),
-            press.touching,
-            2,
-            3,
-            reference.size(),
-            PERIOD,
-            off=press.taken_off(end),
-        )
+    block = Pressing(
+        press.over_time(end, damping**2 / (4.0 * mass)),
+        press.touching,
+        2,
+        3,
+        reference.size(),
+        PERIOD,
+        off=press.taken_off(end),
     )
+    pressing = builder.AddSystem(BlockSystem(block, PERIOD))
     builder.Connect(reference, pressing.GetInputPort("reference"))
     builder.Connect(
         pressing.GetOutputPort("pressed_force"), impedance.GetInputPort("manifold_force")

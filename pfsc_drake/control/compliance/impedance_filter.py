@@ -1,0 +1,190 @@
+"""Compliance: from forces and an external reference to the loop's reference."""
+
+import math
+from typing import Any, Literal
+
+import casadi as ca
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, all_of, first_of, where
+from pfsc_drake.control.compliance.impedance import (
+    STIFFNESS,
+    ImpedanceLaw,
+    ImpedanceState,
+    ImpedanceStatus,
+)
+from pfsc_drake.errors import InputError
+
+
+class ImpedanceFilter(Block):
+    """Impedance ``m e'' + d e' + k e = tau``, ``e = y_p - y_d``, see :class:`ImpedanceLaw`.
+
+    It stands between the external reference y_d and the position loop, which follows
+    y_p (3.40)-(3.44). Neither y_p nor y_p' steps when the filter is engaged, when
+    parameters change, or when the external reference does.
+
+    The reference follows from the state and ``desired_reference``; force and
+    ``manifold_state`` enter the update only. So there is no algebraic loop through the
+    controller or through a contact, and no delay in the position loop: y_d passes at
+    once, and a force moves y_p after one period, as it does in the held impedance.
+
+    Ports:
+        desired_reference (input): Derivatives 0..p of y_d by rows, shape ((p + 1) m,),
+            p being the law's ``desired_order``: max(r, 2) unless chosen otherwise.
+        manifold_force (input): tau, shape (m,) [N, Nm]; from :class:`ManifoldForceTransform`.
+        manifold_state (input): Derivatives 0..r-1 of yhat by rows, shape (r m,); for
+            parameters that depend on eta or xi, and for ``start="actual"``.
+        engaged (input, optional): Above 0.5, the default, forces count; else they are
+            taken as zero, and y_p goes back to y_d as the springs pull it. Shape (1,).
+        ready (input, optional): Until it first rises above 0.5, what yields rests where it
+            started, whatever y_d and forces do: so that no coordinate is led by a sensor that is
+            not tared. Then it goes on to y_d as its impedance does. Shape (1,).
+        impedance (input, optional): Rows mass, damping, stiffness of every coordinate,
+            shape (3 m,), in place of the law's own.
+        allowed_speed (input, optional): Of the ``wanted_speed`` of the coordinates ``free``, what
+            the robot can follow [m/s]; they move no faster. From :class:`LedMotion`.
+        reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
+        status (output): :class:`ImpedanceStatus` of the last update, shape (1,).
+        damping (output): d of the last interval, shape (m,) [N s/m, Nm s/rad].
+        wanted_speed (output): y_p' of the coordinates ``free`` at the next tick as far as the hand
+            goes, then the largest of their masses [m/s, kg]; NaN while nothing moves. Only if there
+            are such coordinates.
+
+    State:
+        y_p (``position``), y_p' (``velocity``), and force and impedance of the last interval;
+        whether it has started, waits, was engaged; status. Until it has started, y_p = y_d.
+
+    Args:
+        law: The law.
+        start: Where y_p starts, and goes on from when ``engaged`` rises: ``reference`` from y_d,
+            then from y_p itself; ``actual`` from the measured yhat (and yhat' if r > 1, else y_d'),
+            so that the loop, not active before, has no error. What is not finite then is awaited.
+        free: Coordinates whose speed may be limited; none if omitted.
+
+    Raises:
+        InputError: If ``start`` is neither.
+    """
+
+    def __init__(
+        self,
+        law: ImpedanceLaw,
+        *,
+        start: Literal["reference", "actual"] = "reference",
+        free: slice | None = None,
+    ) -> None:
+        if start not in ("reference", "actual"):
+            raise InputError(f"start of an impedance filter: {start!r}; reference or actual")
+        self._law, self._at_actual, self._free = law, start == "actual", free
+        m, r = law.num_outputs, law.relative_degree
+        self.inputs = {
+            "desired_reference": Port((law.desired_order + 1) * m, "m, rad, per s, .."),
+            "manifold_force": Port(m, "N, Nm"),
+            "manifold_state": Port(r * m, "m, rad, per s, .."),
+            "engaged": Port(1, optional=True),
+            "ready": Port(1, optional=True),
+            "impedance": Port(3 * m, "kg, N s/m, N/m", optional=True),
+        }
+        self.outputs = {
+            "reference": Port((r + 1) * m, "m, rad, per s, .."),
+            "status": Port(1),
+            "damping": Port(m, "N s/m, Nm s/rad"),
+        }
+        if free is not None:
+            count = free.stop - free.start
+            self.inputs["allowed_speed"] = Port(count, "m/s", optional=True)
+            self.outputs["wanted_speed"] = Port(count + 1, "m/s, kg")
+        flags = ("started", "waits", "engaged", "status")
+        self.states = {"position": m, "velocity": m, "force": m, "impedance": 3 * m}
+        self.states |= dict.fromkeys(flags, 1)
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        motion = self._start_motion(u)
+        known = all_finite(motion)
+        state = self._law.start(where(known, motion, 0.0))
+        waits = 0.0 if u.ready is None else 1.0
+        return state._asdict() | {"started": known, "waits": waits, "engaged": 1.0}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        m, r = self._law.num_outputs, self._law.relative_degree
+        state, desired = _state(x), u.desired_reference[: (r + 1) * m]
+        # at rest where it yields
+        yields = ca.vertsplit(x.impedance, m)[STIFFNESS] < ca.inf
+        rest = ca.vertcat(x.position, ca.DM.zeros(r * m))
+        resting = where(ca.repmat(yields, r + 1, 1), rest, desired)
+        reference = first_of(
+            (ca.logic_not(x.started), desired),
+            (x.waits, resting),
+            otherwise=self._law.reference(state, u.desired_reference),
+        )
+        made = {"reference": reference, "status": x.status, "damping": x.impedance[m : 2 * m]}
+        if self._free is None:
+            return made
+        now, moves, _ = self._begun(x, u)
+        later, status = self._moved(now, u)
+        mass = ca.mmax(ca.vertsplit(later.impedance, m)[0][self._free])
+        wanted = where(ca.logic_and(moves, status == ImpedanceStatus.OK), 1.0, math.nan)
+        speed = wanted * later.velocity[self._free]
+        return made | {"wanted_speed": ca.vertcat(speed, mass)}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        now, moves, flags = self._begun(x, u)
+        later, status = self._moved(now, u)
+        if self._free is not None and u.allowed_speed is not None:
+            known = all_finite(y.wanted_speed)
+            speed = where(known, u.allowed_speed, later.velocity[self._free])
+            push = self._law.push_to(later, speed, later.force, self._free)
+            held, held_status = self._moved(now, u, push)
+            later = ImpedanceState(*[where(known, a, b) for a, b in zip(held, later, strict=True)])
+            status = where(known, held_status, status)
+        kept = {
+            name: where(moves, getattr(later, name), getattr(now, name)) for name in later._fields
+        }
+        awaited = where(flags["started"], ImpedanceStatus.OK, ImpedanceStatus.REFERENCE_NOT_FINITE)
+        return kept | flags | {"status": where(moves, status, awaited)}
+
+    def _start_motion(self, u: Values) -> Any:
+        """Return ``[y_p, y_p']`` from where it starts, shape (2 m,)."""
+        size = 2 * self._law.num_outputs
+        if not self._at_actual:
+            return u.desired_reference[:size]
+        measured = u.manifold_state[:size]
+        return ca.vertcat(measured, u.desired_reference[measured.numel() : size])
+
+    def _begun(self, x: Values, u: Values) -> tuple[ImpedanceState, Any, dict[str, Any]]:
+        """Return the state that goes on, whether it does, and what is remembered of that."""
+        now, engaged, started = _state(x), self._engaged(u), x.started
+        if self._at_actual:
+            rises = ca.logic_and(engaged, ca.logic_not(x.engaged))
+            started = ca.logic_and(started, ca.logic_not(rises))
+        motion = self._start_motion(u)
+        begins = all_of(ca.logic_not(started), all_finite(motion))
+        anew = self._law.start(where(all_finite(motion), motion, 0.0))
+        now = ImpedanceState(*[where(begins, a, b) for a, b in zip(anew, now, strict=True)])
+        started, waits = ca.logic_or(started, begins), ca.MX(0.0)
+        if u.ready is not None:
+            waited = ca.logic_or(x.waits, begins)
+            now = now._replace(velocity=where(waited, 0.0, now.velocity))
+            waits = ca.logic_and(waited, ca.logic_not(u.ready > 0.5))
+        flags = {"started": started, "waits": waits, "engaged": engaged}
+        return now, ca.logic_and(started, ca.logic_not(waits)), flags
+
+    def _engaged(self, u: Values) -> Any:
+        return ca.DM(1.0) if u.engaged is None else u.engaged > 0.5
+
+    def _moved(
+        self, now: ImpedanceState, u: Values, force: Any = None
+    ) -> tuple[ImpedanceState, Any]:
+        """Return the state a period later, and its status, by a force or the measured one."""
+        if force is None:
+            force = where(self._engaged(u), u.manifold_force, 0.0)
+        impedance = u.impedance
+        if impedance is None and not self._law.is_constant:
+            impedance = self._law.impedance(u.manifold_state[: self._law.num_outputs])
+        return self._law.update(now, u.desired_reference, force, impedance)
+
+
+def _state(x: Values) -> ImpedanceState:
+    return ImpedanceState(x.position, x.velocity, x.force, x.impedance)
