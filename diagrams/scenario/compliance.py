@@ -156,13 +156,13 @@ class SensorParameters:
         # accelerations are known to no component of the station
         known = self.inertia in ("differentiated", "none")
         require(known, "inertia", self.inertia, "differentiated, none")
+        require_not_negative("unknown_mass", self.unknown_mass)
+        self.transducer()
+        self.compensation()
         # until something comes there is nothing to tare, and a sensor that says nothing is lost
         longest = min(STILL_TIME, self.taring_time)
         allowed = f"at least 0 and below {longest:g} s"
         require(0.0 <= self.delay < longest, "delay", self.delay, allowed)
-        require_not_negative("unknown_mass", self.unknown_mass)
-        self.transducer()
-        self.compensation()
 
     def transducer(self) -> ForceTorqueParameters:
         """Return the properties of the sensor itself."""

@@ -56,7 +56,7 @@ class TunedParameter:
     """A stiffness or damping that can be changed.
 
     Attributes:
-        index: Among the wishes, see :class:`ImpedanceTuning`.
+        index: Among the wishes, see :class:`ImpedanceTuner`.
         slider: By which.
         top_is_rigid: Whether the highest value stands for what is given, which is rigid.
         always: Whether the slider counts where it starts, too, and not what is given.
