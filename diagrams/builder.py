@@ -126,7 +126,7 @@ def build_station(
         part,
         task,
         law,
-        place.projector,
+        place.projector.get_name(),
         access,
         log,
         initial_state,

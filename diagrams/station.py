@@ -22,7 +22,6 @@ from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import ControllerAccess
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
 
 _SERVO = "velocity_servo"
 # logged signals of faults, by system
@@ -51,7 +50,7 @@ class Station:
         part: The robot in it.
         task: What it is to do.
         law: The law.
-        projector: Projector system.
+        projector: Name of the projector.
         controller: Controller system.
         log: Log of ``joint_state``, ``tool_pose``, ``manifold_point``, ``reference``, ``law``;
             of what acts on the tool ``wrench_ext``, of a sensor what :func:`add_sensor`
@@ -72,7 +71,7 @@ class Station:
     part: RobotPart
     task: Task
     law: FollowingLaw
-    projector: ManifoldProjector
+    projector: str
     controller: ControllerAccess
     log: SignalLog
     initial_state: np.ndarray
@@ -123,8 +122,16 @@ class Station:
         if self.part.drives.step is not None:
             weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
             self.blocks.set_state(root, "hold.held", weight)
-        projector = self.projector.GetMyMutableContextFromRoot(root)
-        self.projector.set_place(projector, self.initial_place)
+        self.set_place(root, self.initial_place)
+
+    def set_place(self, root: Context, place: np.ndarray) -> None:
+        """Choose where on the manifold, on which branch of it, the tool is.
+
+        Args:
+            root: Context of the diagram.
+            place: As the projector remembers it.
+        """
+        self.blocks.set_state(root, f"{self.projector}.place", place)
 
     def place_robot(self, root: Context, state: np.ndarray) -> None:
         """Put the robot into a state.

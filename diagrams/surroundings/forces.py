@@ -14,11 +14,11 @@ from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.physics.decoupled_force import DecoupledForce
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
@@ -67,7 +67,7 @@ def add_surroundings(
     held: OutputPort | None = None
     if part.contact is not None:
         # the law's own pose is what encoders make of it, or that of the motors
-        view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
+        view = _add_view(builder, part, scenario)
         builder.Connect(ports["joint_state"], view.GetInputPort("joint_state"))
         builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
         acting.append(part.contact.GetOutputPort("wrench"))
@@ -82,7 +82,7 @@ def add_surroundings(
         acting.append(held)
     if spring is not None:
         # what is stiff follows the tool within a tick, too
-        touching = _add_spring(builder, part, spring, ports["joint_state"])
+        touching = _add_spring(builder, part, scenario, spring, ports["joint_state"])
         held = touching if held is None else _sum(builder, "tool_wrench", [touching, held])
         acting = [held]
     if pushes is not None and isinstance(part, Arm):
@@ -95,14 +95,24 @@ def add_surroundings(
 
 
 def _add_spring(
-    builder: DiagramBuilder, part: RobotPart, spring: SurfaceSpring, joint_state: OutputPort
+    builder: DiagramBuilder,
+    part: RobotPart,
+    scenario: Scenario,
+    spring: SurfaceSpring,
+    joint_state: OutputPort,
 ) -> OutputPort:
     """Add what the tool touches, and return its wrench on the tool."""
-    view = builder.AddNamedSystem("contact_view", ToolKinematics(part.robot))
+    view = _add_view(builder, part, scenario)
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.AddNamedSystem("surface_spring", spring)
     builder.Connect(view.GetOutputPort("tool_pose"), spring.GetInputPort("tool_pose"))
     return spring.GetOutputPort("wrench")
+
+
+def _add_view(builder: DiagramBuilder, part: RobotPart, scenario: Scenario) -> BlockSystem:
+    """Add what tells where the tool truly is."""
+    view = BlockSystem(ToolKinematics(part.robot), scenario.controller.sampling_time)
+    return builder.AddNamedSystem("contact_view", view)
 
 
 def _scripted(

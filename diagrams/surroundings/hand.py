@@ -6,13 +6,13 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 
 def add_hand(
@@ -78,7 +78,7 @@ def connect_hand(
     except InputError as error:
         raise InputError(f"hand.{error}") from None
     hand = builder.AddNamedSystem("operator_hand", BlockSystem(block, period))
-    view = builder.AddNamedSystem("hand_view", ToolKinematics(robot))
+    view = builder.AddNamedSystem("hand_view", BlockSystem(ToolKinematics(robot), period))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
     return hand

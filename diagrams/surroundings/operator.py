@@ -10,11 +10,11 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator_file import columns, read_controls
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, WISHES
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import ASKED, LiveHand
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 from pfsc_drake.systems.physics.recorded_controls import RecordedControls
 
@@ -149,7 +149,7 @@ def add_live_hand(
     hand = builder.AddNamedSystem(
         "live_hand", BlockSystem(LiveHand(scenario.operator.hand, period), period)
     )
-    view = builder.AddNamedSystem("live_hand_view", ToolKinematics(robot))
+    view = builder.AddNamedSystem("live_hand_view", BlockSystem(ToolKinematics(robot), period))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
     builder.Connect(operator.pull, hand.GetInputPort("asked"))

@@ -18,14 +18,13 @@ from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.controller import add_controller
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 # what guidance tells, for the log
 _GUIDANCE = {"guidance": "record", "mode": "mode"}
@@ -65,7 +64,7 @@ class PlaceOnManifold:
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
     """
 
-    projector: ManifoldProjector
+    projector: BlockSystem
     desired_reference: OutputPort | None
     signals: dict[str, OutputPort]
 
@@ -84,18 +83,18 @@ def add_place(
         InputError: If compliance and law do not go together.
     """
     task, linearization = following.task, following.law.linearization
+    period = following.scenario.controller.sampling_time
     kinematics = builder.AddNamedSystem(
-        "tool_kinematics", ToolKinematics(following.robot, following.on_motors)
+        "tool_kinematics",
+        BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     if not isinstance(task, SpaceTask):
         order = reference_order(following.scenario, linearization)
-        period = following.scenario.controller.sampling_time
         timed = TimedReference(task.motion, order, linearization.num_outputs, period)
         generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-    period = following.scenario.controller.sampling_time
     place = task.add_place(builder, tool_pose, desired, period)
     signals = {
         "joint_state": joint_state,

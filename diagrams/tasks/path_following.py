@@ -20,6 +20,8 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.trajectory_point import TrajectoryPoint
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     ProjectionStatus,
@@ -30,8 +32,7 @@ from pfsc_drake.geometry import (
 from pfsc_drake.geometry.paths.target import PathTarget
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.trajectory_point import TrajectoryPoint
+from pfsc_drake.systems.block_system import BlockSystem
 
 # m, between the points of the way along the path
 _SPACING = 2e-3
@@ -147,7 +148,8 @@ class PathTask(Task):
     ) -> PlaceFinder:
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
-            "path_projector", PathProjector(self.path, self.relative_degree, period)
+            "path_projector",
+            BlockSystem(Projector(self.path.evaluator(self.relative_degree)), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
@@ -217,9 +219,11 @@ class TrajectoryTask(PathTask):
     ) -> PlaceFinder:
         """See :class:`Task`; the law acts on the point that time prescribes."""
         projector = super().add_place(builder, tool_pose, reference, period).projector
+        num_outputs = len(self.manifold.coordinates)
+        point = TrajectoryPoint(self.path, self.relative_degree, num_outputs)
         leader = builder.AddNamedSystem(
             "trajectory_point",
-            TrajectoryPoint(self.path, self.relative_degree, len(self.manifold.coordinates)),
+            BlockSystem(point, period),
         )
         assert reference is not None  # time leads the point
         builder.Connect(reference, leader.GetInputPort("reference"))

@@ -18,13 +18,14 @@ from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 
 class SpaceTask(Task):
@@ -96,12 +97,7 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "tool_place",
-            ManifoldProjector(
-                self.place.layout,
-                lambda y_t, memory: self.place.point(y_t),
-                lambda y_t: y_t,
-                period,
-            ),
+            BlockSystem(Projector(self.place), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

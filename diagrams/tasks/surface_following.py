@@ -20,6 +20,7 @@ from diagrams.tasks.surface import (
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
@@ -29,7 +30,7 @@ from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
 from pfsc_drake.geometry.surfaces.target import SurfaceTarget
 from pfsc_drake.geometry.surfaces.way import way_on_surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 # s, between the places of the way along the surface
 _SPACING = 0.02
@@ -102,12 +103,7 @@ class SurfaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "surface_projector",
-            ManifoldProjector(
-                self.place.layout,
-                lambda y_t, place: self._evaluator(y_t, place[:2].tolist(), place[2:].tolist()),
-                lambda y_t: np.append(self._evaluator.project_globally(y_t).theta, np.zeros(2)),
-                period,
-            ),
+            BlockSystem(Projector(self._evaluator), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

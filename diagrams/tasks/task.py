@@ -15,7 +15,7 @@ from pfsc_drake.geometry.surfaces.report import SurfaceReport
 from pfsc_drake.geometry.surfaces.residuals import Residuals
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PlaceFinder:
         manifold_point: The point that the law acts on, laid out by the task's manifold.
     """
 
-    projector: ManifoldProjector
+    projector: BlockSystem
     manifold_point: OutputPort
 
 

@@ -27,7 +27,6 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     """
     controller, blocks = station.controller, station.blocks
     sensor, rest = _sensor(station, root), _guidance(station, root)
-    projector = station.projector.GetMyMutableContextFromRoot(root)
     names = [name if name in log else name.replace("M", "J") for name in _JOINT_STATE]
     states = np.hstack([log[name].values for name in names])
     finite = np.isfinite(states).all(axis=1) & np.isfinite(log["theta"].values[:, 0])
@@ -40,7 +39,7 @@ def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:
     elapsed = []
     for k, x in zip(chosen, plant_states, strict=True):
         root.SetTime(log.time[k])
-        station.projector.set_place(projector, places[k - 1])
+        station.set_place(root, places[k - 1])
         station.place_robot(root, x)
         rest(log["y_t"].values[k - 1])
         # the controller compares what it measures with what it measured before

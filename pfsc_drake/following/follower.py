@@ -15,6 +15,7 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.controller import add_controller
@@ -30,7 +31,6 @@ from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.fuse import fuse
 
 # 1/s, of poles that nobody chooses
@@ -192,9 +192,7 @@ class Follower(Diagram):
         linearization = law.linearization
         on_motors = chosen.law == "rigid" and not self.robot.is_rigid
         joint_state = self._measured(options)
-        kinematics = builder.AddNamedSystem(
-            "tool_kinematics", ToolKinematics(self.robot, on_motors)
-        )
+        kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
         builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
         pose = kinematics.GetOutputPort("tool_pose")
         ports = {

@@ -6,11 +6,12 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower, FollowerOptions
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 _VELOCITY, _ACCELERATION = 0.1, 0.5  # m/s, m/s^2
 
@@ -66,7 +67,8 @@ def add_path_following(
 
         def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
             projector = inside.AddNamedSystem(
-                "path_projector", PathProjector(path, relative_degree, period)
+                "path_projector",
+                BlockSystem(Projector(path.evaluator(relative_degree)), period),
             )
             inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
             return projector.GetOutputPort("manifold_point")

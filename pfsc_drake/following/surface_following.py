@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.followed import Followed
@@ -14,7 +15,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.control.manifold_projector import ManifoldProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 
 def add_surface_following(
@@ -54,6 +55,7 @@ def add_surface_following(
             out of reach.
     """
     chosen = options or FollowerOptions()
+    period = chosen.controller.sampling_time
     if motion.dimension != 2:
         raise InputError(f"motion: {motion.dimension} coordinates; a surface has 2")
     theta = [sum(ends) / 2.0 for ends in surface.domain] if start is None else list(start)
@@ -65,12 +67,7 @@ def add_surface_following(
         def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
             projector = inside.AddNamedSystem(
                 "surface_projector",
-                ManifoldProjector(
-                    manifold.layout,
-                    lambda y_t, place: evaluator(y_t, place[:2].tolist(), place[2:].tolist()),
-                    lambda y_t: np.append(evaluator.project_globally(y_t).theta, eta),
-                    chosen.controller.sampling_time,
-                ),
+                BlockSystem(Projector(evaluator, np.append([0.0, 0.0], eta)), period),
             )
             inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
             return projector.GetOutputPort("manifold_point")

@@ -26,6 +26,8 @@ from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,
@@ -37,8 +39,6 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
 THETA = 0.7
@@ -99,8 +99,8 @@ class Chain:
         builder = DiagramBuilder()
         rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
         measured = builder.AddSystem(MatrixGain(rows))
-        kinematics = builder.AddSystem(ToolKinematics(self.robot))
-        projector = builder.AddSystem(PathProjector(self.path, r, PERIOD))
+        kinematics = builder.AddSystem(BlockSystem(ToolKinematics(self.robot), PERIOD))
+        projector = builder.AddSystem(BlockSystem(Projector(self.path.evaluator(r)), PERIOD))
         controller = builder.AddSystem(
             FollowingController(self.law, PERIOD, SupervisionParameters())
         )

@@ -77,9 +77,13 @@ def test_velocity_servos_are_told_velocities(path):
     builder = DiagramBuilder()
     plant = load(builder, "comau_racer_1_4")
     follower = add_path_following(builder, plant, "tool_point", path, "velocity_servo")
-    context = follower.CreateDefaultContext()
-    follower.GetInputPort("plant_state").FixValue(context, follower.start_state)
-    told = follower.GetOutputPort("velocity_reference").Eval(context)
+    builder.Connect(plant.get_state_output_port(), follower.GetInputPort("plant_state"))
+    simulator = Simulator(builder.Build())
+    root = simulator.get_mutable_context()
+    plant.get_actuation_input_port().FixValue(plant.GetMyMutableContextFromRoot(root), np.zeros(6))
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(root), follower.start_state)
+    simulator.Initialize()
+    told = read(simulator, follower, "velocity_reference")
     np.testing.assert_allclose(told, 0.0, atol=1e-9)
     assert not follower.HasOutputPort("drive_torque")
 
@@ -95,6 +99,21 @@ def test_an_override_slows_the_progress_and_not_the_tool(path):
     plan = follower.followed.motion.derivatives(np.array([0.5]), 0)[0, 0, 0]
     assert eta == pytest.approx(plan, abs=1e-5)
     assert np.linalg.norm(xi) < 1e-6
+
+
+def test_it_starts_where_the_robot_is_with_a_transition(path):
+    options = FollowerOptions(transition=0.5, override=False)
+    simulator, follower = closed_loop(path, "comau_racer_1_4", "rigid", options)
+    plant = simulator.get_system().GetSystems()[0]
+    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositions(own, follower.start_posture + 0.02)
+    simulator.Initialize()
+    error = (
+        read(simulator, follower, "manifold_state")[:6] - read(simulator, follower, "reference")[:6]
+    )
+    np.testing.assert_allclose(error, 0.0, atol=1e-12)
+    simulator.AdvanceTo(0.8)
+    assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
 @pytest.mark.parametrize(

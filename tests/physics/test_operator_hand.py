@@ -8,13 +8,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 
 PERIOD = 1e-3
@@ -184,7 +184,7 @@ def test_a_robot_with_soft_joints_gives_way_to_the_target():
         MatrixGain(np.vstack([coordinates.link_rows, coordinates.motor_rows]))
     )
     damping = builder.AddSystem(MatrixGain(-30.0 * np.eye(4 * n)[n : 2 * n]))
-    kinematics = builder.AddSystem(ToolKinematics(chain))
+    kinematics = builder.AddSystem(BlockSystem(ToolKinematics(chain), PERIOD))
     context = plant.CreateDefaultContext()
     q = np.array([0.2, 1.6, -0.5])
     plant.SetPositions(context, q)

@@ -9,11 +9,11 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.geometry import FourierCurve, Path
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.path_projector import PathProjector
 
 PERIOD = 1e-3
 MANIFOLD = PathManifold(2, oriented=False)
@@ -28,7 +28,7 @@ def simulate(path, pulses, tool, duration):
     """Return times, wrenches and path points with the tool on a straight way."""
     builder = DiagramBuilder()
     way = builder.AddSystem(TrajectorySource(tool))
-    projector = builder.AddSystem(PathProjector(path, 2, PERIOD))
+    projector = builder.AddSystem(BlockSystem(Projector(path.evaluator(2)), PERIOD))
     script = builder.AddSystem(scripted(pulses))
     builder.Connect(way.get_output_port(), projector.get_input_port())
     builder.Connect(projector.get_output_port(), script.GetInputPort("manifold_point"))

@@ -22,6 +22,8 @@ from pfsc_drake.control.compliance.impedance import (
 from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.geometry import (
     Path,
     interpolate_orientation,
@@ -32,8 +34,6 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 PERIOD = 1e-3
 
@@ -102,8 +102,8 @@ def test_a_robot_yields_to_a_force(arm, path, request, start):
     rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
     parts = {
         "measured": builder.AddSystem(MatrixGain(rows)),
-        "kinematics": builder.AddSystem(ToolKinematics(chain)),
-        "projector": builder.AddSystem(PathProjector(path, 2, PERIOD)),
+        "kinematics": builder.AddSystem(BlockSystem(ToolKinematics(chain), PERIOD)),
+        "projector": builder.AddSystem(BlockSystem(Projector(path.evaluator(2)), PERIOD)),
         "controller": builder.AddSystem(controller),
         "filter": builder.AddSystem(BlockSystem(ImpedanceFilter(soft(), start=start), PERIOD)),
         "transform": builder.AddSystem(

@@ -19,7 +19,7 @@ class ManifoldForceTransform(Block):
         wrench (input): Force [N] and torque [Nm] on the tool at the tool point, world
             axes, shape (6,).
         manifold_point (input): Where on the manifold the tool is, e.g. from
-            :class:`PathProjector`.
+            :class:`Projector`.
         reference (input): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,); from
             :class:`ImpedanceFilter`. Only for manifolds with rotational coordinates.
         manifold_force (output): Forces along the coordinates, shape (m,) [N, Nm]; for a path

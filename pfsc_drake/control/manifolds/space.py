@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -126,6 +127,19 @@ class SpaceManifold:
     def is_oriented(self) -> bool:
         """Whether there is an orientation to keep."""
         return self.layout.oriented
+
+    @cached_property
+    def evaluate(self) -> ca.Function:
+        """``(y_t, memory) -> manifold_point``, see :class:`PlaceEvaluator`."""
+        y, memory = ca.SX.sym("y_t", 3), ca.SX.sym("memory", 3)
+        point = ca.vertcat(y, *self._point[3:].tolist())
+        return ca.Function("space_point", [y, memory], [point])
+
+    @cached_property
+    def find(self) -> ca.Function:
+        """``y_t -> memory``, see :class:`PlaceEvaluator`."""
+        y = ca.SX.sym("y_t", 3)
+        return ca.Function("space_place", [y], [y])
 
     def point(self, y_t: Sequence[float]) -> np.ndarray:
         """Return the manifold's point at a tool point [m], shape (layout.size,)."""

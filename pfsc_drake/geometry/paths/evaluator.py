@@ -28,6 +28,8 @@ _NO_TURN = 1e-14
 # For the first search.
 _FEWEST_SAMPLES, _SAMPLES_PER_SEGMENT = 256, 16
 _VALLEY = 1.0 / 16.0
+# of a lap
+_ROUNDING = 1e-9
 
 
 class PathEvaluator:
@@ -97,7 +99,8 @@ class PathEvaluator:
         nearest = self._finder.nearest(y, starts)
         if self._closed:
             (begin, _), period = self._domain, self._position.period
-            nearest -= period * ca.floor((nearest - begin) / period)
+            # the beginning is not the end of the lap before
+            nearest -= period * ca.floor((nearest - begin) / period + _ROUNDING)
         return ca.Function("path_place", [y], [nearest], ["y_t"], ["memory"])
 
     def __call__(self, point: Sequence[float], theta_guess: float) -> np.ndarray:

@@ -18,7 +18,7 @@ class PathVisualizer(LeafSystem):
     The frame's axes are red ``e_par``, green ``e_perp``, blue ``e_cross``.
 
     Ports:
-        path_point (input): From :class:`PathProjector`.
+        path_point (input): From :class:`Projector`.
 
     Args:
         path: The path.

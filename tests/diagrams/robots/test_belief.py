@@ -20,9 +20,9 @@ from experiments.catalog.scenario_catalog import find_scenario
 from pfsc_drake.blocks import wiring_blocks
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.safe_stop import SafeStop
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 
 WIRES = (Adder, ConstantVectorSource, Demultiplexer, MatrixGain, Multiplexer, ZeroOrderHold)
 # what a real machine gives: positions and velocities of the joints, and a sensor's reading

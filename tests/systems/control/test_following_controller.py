@@ -19,12 +19,13 @@ from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.path import PathManifold
+from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_access import BlockAccess
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import ControllerAccess, FollowingController
-from pfsc_drake.systems.control.path_projector import PathProjector
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
 from pfsc_drake.systems.fuse import fuse, fuse_blocks
 
 PERIOD = 1e-3
@@ -289,8 +290,8 @@ def closed_loop(arm, path, law, theta):
     reference = np.zeros(3 * (r + 1))
     reference[0] = path.arc_length.at(theta)
     measured = builder.AddSystem(MatrixGain(rows))
-    kinematics = builder.AddSystem(ToolKinematics(chain))
-    projector = builder.AddSystem(PathProjector(path, r, PERIOD))
+    kinematics = builder.AddSystem(BlockSystem(ToolKinematics(chain), PERIOD))
+    projector = builder.AddSystem(BlockSystem(Projector(path.evaluator(r)), PERIOD))
     controller = builder.AddSystem(FollowingController(law, PERIOD))
     source = builder.AddSystem(ConstantVectorSource(reference))
     builder.Connect(plant.get_state_output_port(), measured.get_input_port())

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
+from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, ProjectionStatus
-from pfsc_drake.systems.control.path_projector import PathProjector
+from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD = 1e-3
 
@@ -14,7 +15,8 @@ class Bench:
     """A projector in a context, with the tool at a given point."""
 
     def __init__(self, path, relative_degree=2):
-        self.system = PathProjector(path, relative_degree, PERIOD)
+        self.layout = path.evaluator(relative_degree).layout
+        self.system = BlockSystem(Projector(path.evaluator(relative_degree)), PERIOD)
         self.context = self.system.CreateDefaultContext()
 
     def move_to(self, y_t):
@@ -29,21 +31,20 @@ class Bench:
         self.simulator.AdvanceTo(self.context.get_time() + PERIOD)
 
     def point(self, field):
-        layout = self.system.layout
+        layout = self.layout
         return self.system.GetOutputPort("manifold_point").Eval(self.context)[
             getattr(layout, field)
         ]
 
     @property
     def memory(self):
-        return self.context.get_discrete_state_vector().value()
+        return self.system.state(self.context, "place")
 
 
 def test_the_start_is_found_on_the_whole_path(path):
     for theta in (0.1, 2.0, 4.0, 6.0):
         bench = Bench(path)
         bench.move_to(path.position.derivatives(theta, 0)[0])
-        assert np.isnan(bench.memory[0])
         bench.start()
         assert bench.memory == pytest.approx([theta], abs=1e-9)
         assert bench.point("theta") == pytest.approx([theta], abs=1e-9)
@@ -57,13 +58,13 @@ def test_the_output_is_the_paths_own(path):
     bench.start()
     expected = path.evaluator(3)(y_t.tolist(), 1.2)
     output = bench.system.GetOutputPort("manifold_point").Eval(bench.context)
-    assert output.shape == (bench.system.layout.size,)
+    assert output.shape == (bench.layout.size,)
     assert np.allclose(output, expected, rtol=1e-10, atol=1e-11)
 
 
 def test_the_parameter_is_the_only_memory(path):
     bench = Bench(path)
-    assert bench.context.num_total_states() == 1
+    assert list(bench.system.states) == ["place"]
     assert bench.memory.shape == (1,)
 
 
@@ -93,7 +94,7 @@ def test_a_given_parameter_chooses_the_branch_at_the_crossing(path, theta):
     crossing = path.position.derivatives(0.5 * np.pi, 0)[0]
     assert np.allclose(crossing, path.position.derivatives(1.5 * np.pi, 0)[0], atol=1e-12)
     bench.move_to(crossing)
-    bench.system.set_place(bench.context, np.array([theta + 0.02]))
+    bench.system.set_state(bench.context, "place", np.array([theta + 0.02]))
     bench.start()
     assert bench.point("theta") == pytest.approx([theta], abs=1e-9)
     tangent = bench.point("position")[3:6]

@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
-from pfsc_drake.systems.control.tool_kinematics import ToolKinematics
+from pfsc_drake.systems.block_system import BlockSystem
 
 
 def test_tool_pose_is_drakes(arm):
-    system = ToolKinematics(arm.chain)
+    system = BlockSystem(ToolKinematics(arm.chain), 1e-3)
     context = system.CreateDefaultContext()
     rng = np.random.default_rng(1)
     for _ in range(10):
@@ -31,18 +32,18 @@ def test_ports_and_state():
         np.zeros(3),
         np.eye(3),
     )
-    system = ToolKinematics(SerialChain((link,)))
+    system = BlockSystem(ToolKinematics(SerialChain((link,))), 1e-3)
     assert system.GetInputPort("joint_state").size() == 4
     assert system.GetOutputPort("tool_pose").size() == 12
     context = system.CreateDefaultContext()
-    assert context.num_total_states() == 0
+    assert not system.states
     system.get_input_port().FixValue(context, [0.7, 0.0, 0.0, 0.0])
     expected = [0.0, 0.0, 0.7, *np.eye(3).ravel()]
     assert np.allclose(system.get_output_port().Eval(context), expected, rtol=0, atol=1e-15)
 
 
 def test_two_contexts_of_one_system_do_not_share_results(arm):
-    system = ToolKinematics(arm.chain)
+    system = BlockSystem(ToolKinematics(arm.chain), 1e-3)
     contexts = [system.CreateDefaultContext() for _ in range(2)]
     states = np.random.default_rng(2).uniform(-1.0, 1.0, (2, 12))
     for context, state in zip(contexts, states, strict=True):
