@@ -36,7 +36,7 @@ def simulate(path, pulses, tool, duration):
     simulator = Simulator(builder.Build())
     simulator.AdvanceTo(duration)
     wrench, point = (log.FindLog(simulator.get_context()) for log in logs)
-    return wrench.sample_times(), wrench.data().T, point.data().T, projector.layout
+    return wrench.sample_times(), wrench.data().T, point.data().T, path.evaluator(2).layout
 
 
 def test_in_the_world_it_needs_no_path():
