@@ -123,12 +123,42 @@ class Program:
         if like is not None:
             numbers = range(len(like.stages))
             return [[n for n in order if like._stage_of[n.results[0]] == k] for k in numbers]
+        places = self._places(order)
         groups: dict[tuple[Needs, Needs], list[Node]] = {}
         for node in order:
-            needs, at_start = (self._needs_of(node, at_start=begin) for begin in (False, True))
-            groups.setdefault((needs, at_start), []).append(node)
+            groups.setdefault(places[node.results[0]], []).append(node)
         # what a node takes from another needs no more than itself
         return [groups[key] for key in sorted(groups, key=lambda key: (len(key[0]), len(key[1])))]
+
+    def _places(self, order: list[Node]) -> dict[str, tuple[Needs, Needs]]:
+        """Return what each node's stage needs, now and at the start, by the node's first result.
+
+        What is put out at the border waits for nothing that it does not need. Everything else is
+        evaluated as late as those that take it, so that there are few stages.
+        """
+        border = set(self.network.outputs.values())
+        takers: dict[str, list[tuple[Needs, Needs]]] = {}
+        places: dict[str, tuple[Needs, Needs]] = {}
+        last: list[tuple[Needs, Needs]] = []
+        for node in reversed(order):
+            own = self._needs_of(node, at_start=False), self._needs_of(node, at_start=True)
+            later = [place for name in node.results for place in takers.get(name, ())]
+            if border.intersection(node.results):
+                place = own
+                last.append(own)
+            elif later:
+                place = (
+                    frozenset.intersection(*(needs for needs, _ in later)),
+                    frozenset.intersection(*(at_start for _, at_start in later)),
+                )
+            else:  # only what is remembered depends on it
+                above = [p for p in last if own[0] <= p[0] and own[1] <= p[1]]
+                place = max(above, key=lambda p: (len(p[0]), len(p[1])), default=own)
+            places[node.results[0]] = place
+            for source in node.sources:
+                if source.kind == "wire":
+                    takers.setdefault(source.name, []).append(place)
+        return places
 
     def _stages(self, groups: list[list[Node]]) -> tuple[list[Stage], dict[str, int]]:
         """Return the stages of groups of nodes, and the stage of each wire."""

@@ -24,6 +24,7 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 
 _ROUNDING = 1e-6  # of a period
 _STARTED = 0
+_NOTHING: frozenset[str] = frozenset()
 
 
 class BlockSystem(LeafSystem):
@@ -158,7 +159,9 @@ class BlockSystem(LeafSystem):
 
     def _program(self, context: Context) -> "_Functions":
         """Return the functions for what is connected."""
-        left = frozenset(n for n in self._optional if not self._is_connected(context, n))
+        left = _NOTHING
+        if self._optional:
+            left = frozenset(n for n in self._optional if not self._is_connected(context, n))
         if left not in self._programs:
             program = self._declared
             if left:
