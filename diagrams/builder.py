@@ -117,6 +117,7 @@ def build_station(
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
+    measured = joint_state.get_system().get_name(), joint_state.get_name()
     if scenario.simulation.fused:
         fuse_blocks(builder)
     diagram = builder.Build()
@@ -132,6 +133,7 @@ def build_station(
         initial_state,
         start.place,
         on_motors,
+        measured,
         task.warnings
         + scenario.model_error.warnings
         + ([] if task.drive_plan is None else task.drive_plan.said)

@@ -60,6 +60,8 @@ class Station:
         initial_state: State of the robot's model at the start.
         initial_place: Place on the manifold at the start, as the projector remembers it.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
+        measured: System and port that the measured joint state comes from, by name, as they were
+            before blocks were fused.
         warnings: What may not go as well as hoped, one sentence each.
         workpiece: What the tool may touch, if anything.
         operator: Who guides the tool while the robot moves, if anybody does.
@@ -77,6 +79,7 @@ class Station:
     initial_state: np.ndarray
     initial_place: np.ndarray
     on_motors: bool
+    measured: tuple[str, str]
     warnings: list[str]
     workpiece: Workpiece | None = None
     operator: Operator | None = None

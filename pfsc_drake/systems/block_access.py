@@ -56,6 +56,19 @@ class BlockAccess:
         system, state = self._states[name]
         return system.state(system.GetMyContextFromRoot(root), state)
 
+    def presets(self, root: Context) -> dict[str, np.ndarray]:
+        """Return what has been set before the start, by ``block.state``.
+
+        Args:
+            root: Context of the diagram.
+        """
+        found = {}
+        for key, (system, name) in self._states.items():
+            context = system.GetMyContextFromRoot(root)
+            if system.is_set(context, name):
+                found[key] = system.state(context, name)
+        return found
+
     def set_state(self, root: Context, name: str, value: np.ndarray) -> None:
         """Set what a block remembers; see :meth:`BlockSystem.set_state`.
 

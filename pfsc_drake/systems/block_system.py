@@ -95,6 +95,16 @@ class BlockSystem(LeafSystem):
         """
         return context.get_discrete_state_vector().value()[self.states[name]].copy()
 
+    def is_set(self, context: Context, name: str) -> bool:
+        """Return whether a state has been set before the start.
+
+        Args:
+            context: The system's own.
+            name: Of the state.
+        """
+        flag = 1 + list(self.states).index(name)
+        return bool(context.get_discrete_state_vector().value()[flag])
+
     def set_state(self, context: Context, name: str, value: np.ndarray) -> None:
         """Set a state; before the start it stays when the simulation begins.
 

@@ -83,7 +83,7 @@ def fuse(diagram: Diagram) -> BlockSystem:
         raise InputError(
             f"diagram {diagram.get_name()}: must consist of blocks with one sampling time"
         )
-    return BlockSystem(_network(diagram), period)
+    return BlockSystem(network_of(diagram), period)
 
 
 def fuse_blocks(builder: DiagramBuilder, name: str = "blocks") -> list[BlockSystem]:
@@ -126,7 +126,7 @@ def _replace(
             for i in range(system.num_input_ports())
             if InputPortIndex(i) not in fed
         ]
-        wiring.networks[system.get_name()] = _network(system, left)
+        wiring.networks[system.get_name()] = network_of(system, left)
     for (target, i), (source, o) in connections.items():
         output, port = source.get_output_port(o), target.get_input_port(i)
         origin = source.get_name(), output.get_name()
@@ -163,7 +163,7 @@ def _period(system: System) -> float | None:
     return periods.pop() if len(periods) == 1 else None
 
 
-def _network(system: System, unconnected: Collection[str] = ()) -> Network:
+def network_of(system: System, unconnected: Collection[str] = ()) -> Network:
     """Return what a block or a diagram of blocks does.
 
     Args:
@@ -191,7 +191,7 @@ def _network(system: System, unconnected: Collection[str] = ()) -> Network:
     for part in system.GetSystems():
         names = [part.get_input_port(i).get_name() for i in range(part.num_input_ports())]
         left = [name for name in names if (part.get_name(), name) not in wiring.connections]
-        wiring.networks[part.get_name()] = _network(part, left)
+        wiring.networks[part.get_name()] = network_of(part, left)
     for o in range(system.num_output_ports()):
         part, index = system.get_output_port_locator(OutputPortIndex(o))
         output = part.get_output_port(index).get_name()

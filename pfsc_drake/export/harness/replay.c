@@ -1,0 +1,134 @@
+/* Feed a recorded log to the controller and compare what it puts out, bit by bit.
+
+   usage: replay [LOG]     LOG: replay.bin if omitted
+
+   The log holds doubles: for each tick the inputs, then the outputs, as in interface.json.
+   Prints one line of numbers for programs, too. Status 0: all bits the same; 1: not; 2: no log.
+*/
+#define _POSIX_C_SOURCE 199309L
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "controller.h"
+
+#define INPUTS (sizeof(controller_inputs) / sizeof(double))
+#define OUTPUTS (sizeof(controller_outputs) / sizeof(double))
+#define MEASURED 100000 /* ticks */
+
+typedef struct {
+    controller_inputs inputs;
+    controller_outputs outputs;
+} tick_record;
+
+static double now_us(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static tick_record *read_log(const char *name, size_t *ticks)
+{
+    FILE *file = fopen(name, "rb");
+    tick_record *records = NULL, *larger;
+    size_t room = 0;
+    *ticks = 0;
+    if (file == NULL) {
+        return NULL;
+    }
+    for (;;) {
+        if (*ticks == room) {
+            room = room ? 2 * room : 1024;
+            larger = realloc(records, room * sizeof *records);
+            if (larger == NULL) {
+                break;
+            }
+            records = larger;
+        }
+        if (fread(&records[*ticks], sizeof *records, 1, file) != 1) {
+            break;
+        }
+        ++*ticks;
+    }
+    fclose(file);
+    return records;
+}
+
+/* Return how many ticks differ, and print the first. */
+static size_t compare(const tick_record *log, size_t ticks)
+{
+    controller_state state;
+    controller_outputs outputs;
+    double found[OUTPUTS], expected[OUTPUTS];
+    size_t k, i, differing = 0;
+    controller_initialize(&state, &log[0].inputs);
+    for (k = 0; k < ticks; ++k) {
+        int same = 1;
+        controller_step(&state, &log[k].inputs, &outputs);
+        memcpy(found, &outputs, sizeof found);
+        memcpy(expected, &log[k].outputs, sizeof expected);
+        for (i = 0; i < OUTPUTS; ++i) {
+            if (memcmp(&found[i], &expected[i], sizeof(double)) == 0
+                || (isnan(found[i]) && isnan(expected[i]))) {
+                continue;
+            }
+            if (differing == 0 && same) {
+                printf("first difference: tick %lu, number %lu of the outputs: %.17g, logged %.17g\n",
+                       (unsigned long)k, (unsigned long)i, found[i], expected[i]);
+            }
+            same = 0;
+        }
+        differing += same ? 0u : 1u;
+    }
+    return differing;
+}
+
+/* Measure single ticks [us], in ascending order. */
+static void measure(const tick_record *log, size_t ticks, double *times, size_t count)
+{
+    controller_state state;
+    controller_outputs outputs;
+    size_t k;
+    for (k = 0; k < count; ++k) {
+        double begin;
+        if (k % ticks == 0) {
+            controller_initialize(&state, &log[0].inputs);
+        }
+        begin = now_us();
+        controller_step(&state, &log[k % ticks].inputs, &outputs);
+        times[k] = now_us() - begin;
+    }
+    qsort(times, count, sizeof *times, ascending);
+}
+
+int main(int argc, char **argv)
+{
+    const char *name = argc > 1 ? argv[1] : "replay.bin";
+    size_t ticks, differing;
+    tick_record *log = read_log(name, &ticks);
+    double *times = malloc(MEASURED * sizeof *times);
+    if (log == NULL || ticks == 0 || times == NULL) {
+        fprintf(stderr, "%s: no log, or an empty one\n", name);
+        free(log);
+        free(times);
+        return 2;
+    }
+    differing = compare(log, ticks);
+    measure(log, ticks, times, MEASURED);
+    printf("ticks %lu differing %lu median_us %.2f p99_us %.2f worst_us %.2f\n",
+           (unsigned long)ticks, (unsigned long)differing, times[MEASURED / 2],
+           times[MEASURED / 100 * 99], times[MEASURED - 1]);
+    free(log);
+    free(times);
+    return differing == 0 ? 0 : 1;
+}
