@@ -22,6 +22,7 @@ from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
 from experiments.outcomes import (
+    judge_export,
     judge_live,
     judge_run,
     judge_sweep,
@@ -375,6 +376,40 @@ def margins_command(
             console.print()
         console.print(summary(outcome.analysis), highlight=False)
         raise typer.Exit(show_page("margins", outcome.report))
+
+
+@app.command("export")
+def export_command(
+    scenario: ScenarioName,
+    out: Annotated[Path, typer.Option(help="Folder for the files.")],
+    overrides: Overrides = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Compile it, let it repeat a run and compare; needs gcc for that."
+        ),
+    ] = False,
+    duration: Annotated[
+        str, typer.Option(metavar="SECONDS", help="Simulated time of that run in s.")
+    ] = "1",
+) -> None:
+    """Write a scenario's controller as C99."""
+    from experiments.catalog.scenario_file import read_scenario
+    from experiments.export import check_export, export_scenario, record
+
+    seconds = _read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
+            export = export_scenario(loaded, folder, progress)
+            replay = None
+            if check:
+                progress(0.0, "recording a run, compiling and repeating it")
+                replay = check_export(folder, record(export, seconds))
+        raise typer.Exit(judge_export(console, export, folder, checked=check, replay=replay))
 
 
 @app.command("inverse-kinematics")

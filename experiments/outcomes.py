@@ -13,6 +13,7 @@ from reporting.interruption import INTERRUPTED
 from reporting.terminal import print_error
 
 if TYPE_CHECKING:
+    from experiments.export import Export, Replay
     from experiments.finished_run import RunOutcome
     from experiments.live.start import LiveOutcome
     from experiments.sweep.sweep import SweepOutcome
@@ -113,6 +114,29 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
     if ends:
         print_error("; ".join(ends), after_echo=outcome.interrupted)
     return status
+
+
+def judge_export(
+    console: Console, export: "Export", out: Path, *, checked: bool, replay: "Replay | None"
+) -> int:
+    """Tells what has been exported and what the check has found; returns the exit status."""
+    state = export.controller.interface()["state_bytes"]
+    said = f"{out}: {len(export.files)} files, state {state} bytes"
+    console.print(said, highlight=False, markup=False, soft_wrap=True)
+    if replay is None:
+        if checked:
+            console.print("not compiled: there is no gcc here", highlight=False)
+        return 0
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in ("Ticks", "differing", "median [us]", "p99 [us]", "worst [us]"):
+        table.add_column(title, justify="right")
+    times = [f"{time:.2f}" for time in (replay.median, replay.p99, replay.worst)]
+    table.add_row(str(replay.ticks), str(replay.differing), *times)
+    console.print(table)
+    if replay.differing:
+        print_error(f"error: {out}: {replay.text.splitlines()[0]}")
+        return WRONG_INPUT
+    return 0
 
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
