@@ -20,8 +20,8 @@ from pfsc_drake.following.options.posture import PostureParameters
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
+from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
-from pfsc_drake.systems.control.posture_reference import PostureReference
 
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs
@@ -122,16 +122,10 @@ def add_posture_reference(
         controller.period,
     )
     pulled = (parameters.task, parameters.stiffness) if parameters.is_pulled else ("", 0.0)
-    posture = builder.AddNamedSystem(
-        "posture_reference",
-        PostureReference(
-            YieldingPosture(robot, manifold, law.posture, impedance, *pulled),
-            robot.dimension,
-            manifold.layout.size,
-            controller.period,
-            _goal(parameters, robot),
-        ),
+    block = YieldingPosture(
+        robot, manifold, law.posture, impedance, *pulled, _goal(parameters, robot)
     )
+    posture = builder.AddNamedSystem("posture_reference", BlockSystem(block, controller.period))
     for name in ("joint_state", "manifold_point"):
         builder.Connect(ports[name], posture.GetInputPort(name))
     if "posture_torque" in ports:

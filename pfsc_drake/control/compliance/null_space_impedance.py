@@ -1,10 +1,13 @@
 """Compliance of joints beyond the number of outputs: a posture that yields and comes back."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy.linalg import companion, expm
 
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.errors import InputError
 
 
@@ -45,7 +48,7 @@ class NullSpaceImpedance:
     continuous up to its r-th derivative, which a law of relative degree r follows exactly.
     Torques are held over a sampling interval, over which the equation is solved exactly.
 
-    The state holds the derivatives 0..r of q_0 as rows, shape (r + 1, N).
+    The motion is the derivatives 0..r of q_0 by rows, shape ((r + 1) N,).
 
     Attributes:
         parameters: The impedance.
@@ -56,8 +59,8 @@ class NullSpaceImpedance:
     parameters: NullSpaceImpedanceParameters
     relative_degree: int
     period: float
-    _transition: np.ndarray = field(init=False, repr=False)
-    _response: np.ndarray = field(init=False, repr=False)
+    _transition: ca.DM = field(init=False, repr=False)
+    _response: ca.DM = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         p, order = self.parameters, self.relative_degree + 1
@@ -69,23 +72,25 @@ class NullSpaceImpedance:
         system[:order, :order] = companion(polynomial)[::-1, ::-1]
         system[order - 1, order] = 1.0 / polynomial[0]
         step = expm(system * self.period)
-        self._transition, self._response = step[:order, :order], step[:order, order]
+        self._transition = ca.DM(step[:order, :order])
+        self._response = ca.DM(step[:order, order])
 
-    def start(self, posture: np.ndarray) -> np.ndarray:
-        """Return the state at rest in a posture (N,), shape (r + 1, N)."""
-        state = np.zeros((self.relative_degree + 1, len(posture)))
-        state[0] = posture
-        return state
-
-    def update(self, state: np.ndarray, torque: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Return the state one period later, shape (r + 1, N).
+    def start(self, posture: Any) -> Any:
+        """Return the motion at rest in a posture as an expression, shape ((r + 1) N,).
 
         Args:
-            state: See the class.
+            posture: Shape (N,) [rad or m].
+        """
+        return ca.vertcat(posture, ca.DM.zeros(self.relative_degree * posture.numel()))
+
+    def update(self, motion: Any, torque: Any, goal: Any) -> Any:
+        """Return the motion one period later as an expression, shape ((r + 1) N,).
+
+        Args:
+            motion: See the class.
             torque: u, shape (N,) [Nm or N]; zero instead unless all of it is finite.
             goal: ``q_goal``, shape (N,).
         """
-        force = self.parameters.stiffness * goal
-        if np.isfinite(torque).all():
-            force = force + torque
-        return self._transition @ state + np.outer(self._response, force)
+        force = self.parameters.stiffness * goal + where(all_finite(torque), torque, 0.0)
+        derivatives = ca.reshape(motion, goal.numel(), self.relative_degree + 1)
+        return ca.vec(derivatives @ self._transition.T + force @ self._response.T)

@@ -1,9 +1,11 @@
 """The posture reference of joints beyond the number of outputs, as it yields and is pulled."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.compliance.null_space_impedance import NullSpaceImpedance
 from pfsc_drake.control.law.decoupling import free_torque, scale_of
@@ -17,15 +19,28 @@ from pfsc_drake.robot.robot_model import RobotModel
 _LARGEST_SPEED = 0.5
 
 
-class YieldingPosture:
+class YieldingPosture(Block):
     """A :class:`NullSpaceImpedance` under external torques and the pull of a potential.
 
-    With ``N'`` the projection on what leaves the outputs alone, the posture is driven by
+    With ``N'`` the projection on what leaves the outputs alone, the posture ``q_0`` is driven by
     ``u = N' (tau_ext + pull_stiffness (-dV/dq))``.
 
     What pulls, spring or potential, is scaled down as a whole where the damper alone would let
     it move a joint faster than half its velocity limit: far from its goal a posture must not
     take away what the drives need for the outputs.
+
+    It starts at rest where the joints are, and goes smoothly to its goal. Of torques, joints and
+    a manifold's point that are not all finite nothing drives it but the spring.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        manifold_point (input): Where on the manifold the tool is.
+        tau_ext (input, optional): External torques that the posture yields to, shape (N,)
+            [Nm or N].
+        posture_reference (output): Derivatives 0..r of ``q_0`` by rows, shape ((r + 1) N,).
+
+    State:
+        motion: The output. goal: Where the spring pulls, shape (N,).
 
     Args:
         robot: The robot, N joints.
@@ -34,6 +49,7 @@ class YieldingPosture:
         impedance: How the posture moves.
         potential: ``V``, one of ``POTENTIALS``, or empty for none.
         pull_stiffness: Of the potential [Nm/rad or N/m], not negative.
+        goal: Where the posture goes, shape (N,) [rad or m]; None for where it starts.
 
     Raises:
         InputError: If the potential is unknown, or its stiffness negative.
@@ -47,6 +63,7 @@ class YieldingPosture:
         impedance: NullSpaceImpedance,
         potential: str = "",
         pull_stiffness: float = 0.0,
+        goal: np.ndarray | None = None,
     ) -> None:
         if potential and potential not in POTENTIALS:
             raise InputError(f"potential: '{potential}'; must be one of {', '.join(POTENTIALS)}")
@@ -54,60 +71,41 @@ class YieldingPosture:
             raise InputError(
                 f"pull_stiffness: {pull_stiffness}; must be zero or positive, and finite"
             )
-        self.impedance, self._n = impedance, robot.dimension
-        self.size = (impedance.relative_degree + 1) * self._n
+        self._impedance, self._n, self._goal = impedance, robot.dimension, goal
         self._pulls = pull_stiffness if potential else 0.0
-        self._free = BoundFunction(
-            _free_torques_function(robot, manifold, posture, potential, self._pulls)
-        )
+        self._free = _free_torques_function(robot, manifold, posture, potential, self._pulls)
         speed = _LARGEST_SPEED * robot.gather("velocity_limit")
-        self._largest = impedance.parameters.damping * speed
+        self._largest = ca.DM(impedance.parameters.damping * speed)
+        n, size = robot.dimension, (impedance.relative_degree + 1) * robot.dimension
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "manifold_point": Port(manifold.layout.size),
+            "tau_ext": Port(n, "Nm or N", optional=True),
+        }
+        self.outputs = {"posture_reference": Port(size, "rad or m, per s, ..")}
+        self.states = {"motion": size, "goal": n}
 
-    def start(self, posture: np.ndarray) -> np.ndarray:
-        """Return the state at rest in a posture (N,), flat, shape ((r + 1) N,)."""
-        return self.impedance.start(posture).ravel()
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        q = u.joint_state[: self._n]
+        goal = q if self._goal is None else ca.DM(self._goal)
+        return {"motion": self._impedance.start(q), "goal": goal}
 
-    def update(
-        self,
-        state: np.ndarray,
-        q: np.ndarray,
-        point: np.ndarray,
-        torque: np.ndarray | None,
-        goal: np.ndarray,
-    ) -> np.ndarray:
-        """Return the state one period later, shape ((r + 1) N,).
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"posture_reference": x.motion}
 
-        Args:
-            state: Derivatives 0..r of ``q_0`` by rows, shape ((r + 1) N,).
-            q: Joint coordinates, shape (N,).
-            point: The manifold's point next to the tool.
-            torque: External torques, shape (N,) [Nm or N]; None for none.
-            goal: Where the spring pulls, shape (N,).
-        """
-        rows = state.reshape(-1, self._n)
-        free = np.zeros(self._n)
-        spring = self.impedance.parameters.stiffness * (goal - rows[0])
-        pull = spring
-        if torque is not None or self._pulls:
-            free, pulled = self._free_torques(q, point, torque)
-            free, pull = free + pulled, spring + pulled
-        excess = float(np.max(np.abs(pull) / self._largest))
-        if excess > 1.0:
-            free = free - (1.0 - 1.0 / excess) * pull
-        return self.impedance.update(rows, free, goal).ravel()
-
-    def _free_torques(
-        self, q: np.ndarray, point: np.ndarray, torque: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the parts of external torques and pull that do no work on the outputs.
-
-        NaN if not finite, each (N,).
-        """
-        arguments, results = self._free.arguments, self._free.results
-        arguments["q"][:], arguments["manifold_point"][:] = q, point
-        arguments["torque"][:] = 0.0 if torque is None else torque
-        self._free.evaluate()
-        return results["free"].copy(), results["pulled"].copy()
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        q_0 = x.motion[: self._n]
+        free, pull = 0.0, self._impedance.parameters.stiffness * (x.goal - q_0)
+        if u.tau_ext is not None or self._pulls:
+            torque = ca.DM.zeros(self._n) if u.tau_ext is None else u.tau_ext
+            yielded, pulled = self._free(u.joint_state[: self._n], u.manifold_point, torque)
+            free, pull = yielded + pulled, pull + pulled
+        excess = ca.fmax(ca.norm_inf(pull / self._largest), 1.0)
+        free = free - (1.0 - 1.0 / excess) * pull
+        return {"motion": self._impedance.update(x.motion, free, x.goal)}
 
 
 def _free_torques_function(
@@ -115,8 +113,8 @@ def _free_torques_function(
 ) -> ca.Function:
     """Return ``(q, manifold_point, torque) -> (free, pulled)``, the last three (N,).
 
-    They are the parts of external torques and pull that do no work on the outputs; the first is of
-    NaN, the second zero, if something is not finite.
+    They are the parts of external torques and pull that do no work on the outputs; zero if
+    something is not finite.
     """
     q, torque = ca.SX.sym("q", robot.dimension), ca.SX.sym("torque", robot.dimension)
     point = ca.SX.sym("manifold_point", manifold.layout.size)
@@ -124,7 +122,7 @@ def _free_torques_function(
     A, pull, weight = free_motion_function(robot, manifold, potential, inertial=inertial)(q, point)
     scale = scale_of(weight) if inertial else posture.scale
     finite = all_finite(A, pull, torque)
-    free = where(finite, free_torque(A, torque, scale), np.nan)
+    free = where(finite, free_torque(A, torque, scale), 0.0)
     pulled = where(finite, free_torque(A, stiffness * pull, scale), 0.0)
     return ca.Function(
         "free_torques",

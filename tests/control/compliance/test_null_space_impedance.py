@@ -1,5 +1,6 @@
 """The posture that yields: against its differential equation, integrated independently."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -14,6 +15,21 @@ PARAMETERS = NullSpaceImpedanceParameters(1.5, 12.0, 40.0, 70.0)
 PERIOD = 1e-3
 
 
+class Motion:
+    """The derivatives of a posture by rows, advanced with numbers."""
+
+    def __init__(self, impedance, q_start):
+        self._impedance, self._motion = impedance, impedance.start(ca.DM(q_start))
+
+    def advance(self, torque, goal):
+        self._motion = self._impedance.update(self._motion, ca.DM(torque), ca.DM(goal))
+        return self.rows
+
+    @property
+    def rows(self):
+        return self._motion.full().reshape(self._impedance.relative_degree + 1, -1)
+
+
 def pulse(t):
     return np.array([8.0, -3.0]) * (0.1 <= t < 0.3)
 
@@ -22,9 +38,9 @@ def pulse(t):
 def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
     impedance = NullSpaceImpedance(PARAMETERS, relative_degree, PERIOD)
     goal, q_start = np.array([0.3, -0.2]), np.array([0.1, 0.2])
-    state = impedance.start(q_start)
+    motion = Motion(impedance, q_start)
     for k in range(500):
-        state = impedance.update(state, pulse(k * PERIOD + 1e-9), goal)
+        state = motion.advance(pulse(k * PERIOD + 1e-9), goal)
 
     def rates(t, x):
         # first-order lags one after the other, then the mass; lags start at the spring's rest
@@ -48,10 +64,8 @@ def test_it_obeys_mass_damper_spring_behind_a_filter(relative_degree):
 def test_every_row_is_the_rate_of_the_row_above(relative_degree):
     fine = 1e-5
     impedance = NullSpaceImpedance(PARAMETERS, relative_degree, fine)
-    state, states = impedance.start(np.zeros(2)), []
-    for _ in range(3000):
-        state = impedance.update(state, np.array([8.0, -3.0]), np.zeros(2))
-        states.append(state)
+    motion = Motion(impedance, [0.0, 0.0])
+    states = [motion.advance([8.0, -3.0], [0.0, 0.0]) for _ in range(3000)]
     before, now, after = states[-3:]
     for k in range(relative_degree):
         rate = (after[k] - before[k]) / (2.0 * fine)
@@ -60,27 +74,27 @@ def test_every_row_is_the_rate_of_the_row_above(relative_degree):
 
 def test_a_constant_torque_bends_it_by_the_spring():
     impedance = NullSpaceImpedance(PARAMETERS, 4, PERIOD)
-    state = impedance.start(np.array([0.5]))
+    motion = Motion(impedance, [0.5])
     for _ in range(6000):
-        state = impedance.update(state, np.array([2.0]), np.array([0.5]))
+        state = motion.advance([2.0], [0.5])
     assert state[0] == pytest.approx(0.5 + 2.0 / 40.0, abs=1e-9)
     assert np.abs(state[1:]).max() < 1e-6
 
 
 def test_without_a_spring_it_stays_where_it_is_left():
     impedance = NullSpaceImpedance(NullSpaceImpedanceParameters(1.0, 20.0, 0.0, 70.0), 4, PERIOD)
-    state = impedance.start(np.array([0.5]))
+    motion = Motion(impedance, [0.5])
     for k in range(4000):
-        state = impedance.update(state, np.array([5.0 * (k < 1000)]), np.zeros(1))
+        state = motion.advance([5.0 * (k < 1000)], [0.0])
     # momentum 5 Nm s over the damping
     assert state[0] == pytest.approx(0.5 + 5.0 / 20.0, rel=1e-3)
 
 
-def test_torques_that_are_not_finite_are_none():
-    impedance = NullSpaceImpedance(PARAMETERS, 2, PERIOD)
-    state = impedance.start(np.array([0.5, 0.1]))
-    bad = impedance.update(state, np.array([np.nan, 1.0]), np.zeros(2))
-    assert np.array_equal(bad, impedance.update(state, np.zeros(2), np.zeros(2)))
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_torques_that_are_not_finite_are_none(bad):
+    impedance, goal = NullSpaceImpedance(PARAMETERS, 2, PERIOD), [0.0, 0.0]
+    spoiled = Motion(impedance, [0.5, 0.1]).advance([bad, 1.0], goal)
+    assert np.array_equal(spoiled, Motion(impedance, [0.5, 0.1]).advance([0.0, 0.0], goal))
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,13 @@
-"""What moves a posture: external torques and pulls, as far as they do no work on the outputs."""
+"""The posture reference: where it starts and goes, and what moves it beside the outputs."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
+from pfsc_drake.blocks.network import Network
+from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.null_space_impedance import (
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
@@ -16,7 +19,8 @@ from pfsc_drake.control.law.posture_potential import free_motion_function
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from tests.control.conftest import BENT_7
+from pfsc_drake.geometry import FourierCurve, Path
+from tests.control.conftest import BENT_7, Robot
 
 PERIOD = 1e-3
 
@@ -41,13 +45,23 @@ def yielding(arm, weight=None, **pull):
     return YieldingPosture(arm[0], arm[1], posture(weight), impedance, **pull)
 
 
+def at_rest(q):
+    return np.concatenate([q, 0 * q, q, 0 * q])
+
+
+def started(law, q, point, torque=None):
+    """Return a stepper of a law, and what it is given."""
+    given = {"joint_state": at_rest(q), "manifold_point": point}
+    stepper = Stepper(law, () if torque is None else ("tau_ext",))
+    return stepper, given | ({} if torque is None else {"tau_ext": torque})
+
+
 def drift(law, arm, torque, steps=5):
     """Return in which direction the posture starts to move, shape (7,)."""
-    _, _, q, point = arm
-    state = law.start(q)
+    stepper, given = started(law, *arm[2:], torque)
     for _ in range(steps):
-        state = law.update(state, q, point, torque, q)
-    return state[14:21]
+        stepper.step(**given)
+    return stepper.states["motion"][14:21]
 
 
 @pytest.mark.parametrize("weight", [np.ones(7), np.arange(1.0, 8.0), None])
@@ -157,3 +171,68 @@ def test_wrong_pulls_are_refused(arm):
         yielding(arm, np.ones(7), potential="gravity")
     with pytest.raises(InputError, match="pull_stiffness: -1"):
         yielding(arm, np.ones(7), potential="limits", pull_stiffness=-1.0)
+
+
+ELASTIC = 4
+
+
+@pytest.fixture(name="run", scope="module")
+def fixture_run():
+    """Return a function that runs a posture of elastic joints, and returns it: (samples, 5, 7)."""
+    chain, q = Robot("franka_emika_panda_elastic").chain, np.array(BENT_7)
+    path = Path(FourierCurve.circle([0.45, 0.0, 0.4], 0.1, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    poles = gains_from_poles([-10.0, -12.0, -15.0, -20.0])
+    gains = Stabilization([poles] * 7, ELASTIC, ["q"] * 7)
+    impedance = NullSpaceImpedance(NullSpaceImpedanceParameters(1.0, 20.0, 50.0), ELASTIC, PERIOD)
+    manifold = PathManifold(ELASTIC, oriented=False)
+    point = path.evaluator(ELASTIC).evaluate_at(0.3)
+
+    def run(duration, goal=None, torque=None):
+        law = YieldingPosture(chain, manifold, Posture(gains, None), impedance, goal=goal)
+        stepper, given = started(law, q, point, torque)
+        ticks = range(round(duration / PERIOD) + 1)
+        rows = [stepper.step(**given)["posture_reference"] for _ in ticks]
+        return np.reshape(rows, (-1, ELASTIC + 1, 7))
+
+    return run
+
+
+def test_it_starts_at_rest_where_the_joints_are_and_stays(run):
+    rows = run(0.2)
+    assert np.array_equal(rows[0, 0], BENT_7)
+    assert np.allclose(rows[:, 0], BENT_7, rtol=0, atol=1e-12)
+    assert np.abs(rows[:, 1]).max() < 1e-10
+
+
+def test_it_goes_smoothly_to_its_goal(run):
+    goal = np.array(BENT_7) + 0.3
+    rows = run(3.0, goal)
+    assert np.array_equal(rows[0, 1:], np.zeros((ELASTIC, 7)))
+    assert np.allclose(rows[-1, 0], goal, atol=2e-3)
+    # no derivative that the law follows jumps; the highest rises within some hundredths of a second
+    steps = np.abs(np.diff(rows, axis=0)).max(axis=(0, 2)) / np.abs(rows).max(axis=(0, 2))
+    assert np.all(steps[:ELASTIC] < 0.05)
+    assert steps[ELASTIC] < 0.2
+
+
+def test_no_joint_is_pulled_faster_than_half_its_speed(run):
+    """The first is let as fast as may be, but for the three lags of 1 / 30 s behind its spring."""
+    goal = np.array(BENT_7) + np.array([3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    half = Robot("franka_emika_panda_elastic").chain.gather("velocity_limit") / 2.0
+    velocity = run(1.0, goal)[:, 1]
+    assert velocity[-1, 0] == pytest.approx(half[0] * 20.0 / (20.0 + 50.0 * 3.0 / 30.0), rel=2e-3)
+    assert np.all(np.abs(velocity) < half)
+    spoiled = run(1.0, goal, np.full(7, np.nan))[:, 1]
+    assert np.allclose(spoiled, velocity, rtol=0, atol=1e-12)
+
+
+def test_it_yields_to_torques(run):
+    torque = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0])
+    assert run(1.0, None, torque)[-1, 0, 2] - BENT_7[2] > 0.01
+    assert np.array_equal(run(0.1, None, np.full(7, np.nan)), run(0.1))
+
+
+def test_its_output_depends_on_its_state_alone(arm):
+    program = Program(Network.of(yielding(arm, np.ones(7))))
+    stage, _ = program.output("posture_reference")
+    assert not any(source.kind == "input" for source in program.stages[stage].needs)
