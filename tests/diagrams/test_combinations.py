@@ -168,7 +168,7 @@ def test_the_contacts_torque_is_about_the_true_tool_point(arm_in_a_notch):
     # 2 mm are free
     station.place_robot(root, shifted(station, np.array([0.0023, 0.0, 0.0])))
     simulator.AdvanceTo(1e-3)
-    now, plant = station.log.now(root), station.part.plant
+    now, plant = station.log.now(station.blocks, root), station.part.plant
     context = plant.GetMyContextFromRoot(root)
     y_t = station.part.tool.CalcPoseInWorld(context).translation()
     assert np.linalg.norm(now["tool_pose"][:3] - y_t) > 1e-3
