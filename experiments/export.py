@@ -109,8 +109,16 @@ def record(export: Export, duration: float) -> np.ndarray:
 
     Returns:
         Of each tick, in the order of ``interface.json``, shape (ticks, inputs and outputs).
+
+    Raises:
+        InputError: If the plant is discrete.
     """
     station, part = export.station, export.part
+    if station.part.drives.step is not None:
+        raise InputError(
+            "export --check: the plant is discrete and steps at a tick before the controller; "
+            "what the controller is told then cannot be recorded"
+        )
     simulator = Simulator(station.diagram)
     how = export.simulation
     configure(simulator, how.integrator, how.max_step, how.accuracy)
