@@ -109,7 +109,8 @@ def build_station(
     controller, made = add_law(builder, following, place, forces | wishes)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    signals |= add_drives(builder, part, scenario, signals | drive, initial_state)
+    further, servo = add_drives(builder, part, scenario, signals | drive, initial_state)
+    signals |= further
     faults = [controller.GetOutputPort("fault")]
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
     signals |= add_friction(builder, part, true_state, scenario, folder, faults)
@@ -129,6 +130,7 @@ def build_station(
         law,
         place.projector.get_name(),
         access,
+        servo,
         log,
         initial_state,
         start.place,

@@ -22,10 +22,7 @@ from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import ControllerAccess
-
-_SERVO = "velocity_servo"
-# logged signals of faults, by system
-_FAULT_SIGNALS = {_SERVO: "servo_fault"}
+from pfsc_drake.systems.physics.velocity_servo import ServoAccess
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,8 @@ class Station:
         task: What it is to do.
         law: The law.
         projector: Name of the projector.
-        controller: Controller system.
+        controller: The controller in it.
+        servo: Its velocity servos, if there are any.
         log: Log of ``joint_state``, ``tool_pose``, ``manifold_point``, ``reference``, ``law``;
             of what acts on the tool ``wrench_ext``, of a sensor what :func:`add_sensor`
             returns, with compliance what :func:`add_compliance` returns, with servos
@@ -75,6 +73,7 @@ class Station:
     law: FollowingLaw
     projector: str
     controller: ControllerAccess
+    servo: ServoAccess | None
     log: SignalLog
     initial_state: np.ndarray
     initial_place: np.ndarray
@@ -169,21 +168,19 @@ class Station:
             suspects = self.controller.suspects(self.blocks, root)
             return self._describe(fault, root, "law", self.law.layout.status.start, suspects)
         for name, system in self._can_fail.items():
-            context = system.GetMyContextFromRoot(root)
-            fault = system.fault(context)
-            if fault is Fault.NONE:
-                continue
-            signal = _FAULT_SIGNALS.get(name)
-            if signal is None:
+            fault = system.fault(system.GetMyContextFromRoot(root))
+            if fault is not Fault.NONE:
                 return FoundFault(f"{name}: {fault.explanation}", root.get_time())
-            suspects = self.diagram.GetSubsystemByName(name).suspects(context)
-            found = self._describe(fault, root, signal, 0, suspects)
-            return FoundFault(f"{name}: {found.sentence}", found.time)
-        return None
+        servo = self.servo
+        if servo is None or (fault := servo.fault(self.blocks, root)) is Fault.NONE:
+            return None
+        suspects = servo.suspects(self.blocks, root)
+        found = self._describe(fault, root, "servo_fault", 0, suspects)
+        return FoundFault(f"{servo.name}: {found.sentence}", found.time)
 
     @cached_property
     def _can_fail(self) -> dict[str, FailingSystem]:
-        """The systems with a safe state, by name; to look for them takes longer than to ask."""
+        """Further systems with a safe state, by name; to look for them takes longer than to ask."""
         systems = {system.get_name(): system for system in self.diagram.GetSystems()}
         return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
 

@@ -24,7 +24,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
 from pfsc_drake.systems.physics.joint_friction import JointFriction
-from pfsc_drake.systems.physics.velocity_servo import VelocityServo
+from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
 
 # integration schemes of fixed step that the bristles of friction are made for
 FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
@@ -38,8 +38,8 @@ def add_drives(
     scenario: Scenario,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
-) -> dict[str, OutputPort]:
-    """Connect the law to the plant's actuation, and return further signals for the log.
+) -> tuple[dict[str, OutputPort], ServoAccess | None]:
+    """Connect the law to the plant's actuation.
 
     Args:
         builder: Builder of the diagram.
@@ -49,23 +49,24 @@ def add_drives(
         initial_state: State of the plant at the start, for which servos are designed.
 
     Returns:
-        With servos ``drive_torque``, within its limits [Nm or N], shape (N,), and
-        ``servo_fault``, shape (1,).
+        Further signals for the log, with servos ``drive_torque``, within its limits [Nm or N],
+        shape (N,), and ``servo_fault``, shape (1,); the servos, if there are any.
 
     Raises:
         InputError: If the servos do not suit the robot or the controller.
     """
     period, torque = scenario.controller.sampling_time, ports["drive"]
-    chain, signals = part.belief.robot, {}
+    chain, signals, access = part.belief.robot, {}, None
     if scenario.controller.law == "velocity_servo":
         q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
-        servo, period = _add_servo(builder, chain, scenario, ports, q_J)
+        servo = _add_servo(builder, chain, scenario, ports, q_J)
+        access, period = ServoAccess(servo), servo.period
         torque = servo.GetOutputPort("drive_torque")
         signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
     hold = builder.AddNamedSystem("hold", BlockSystem(Hold(chain.dimension), period))
     builder.Connect(torque, hold.GetInputPort("value"))
     part.connect_drives(builder, hold.GetOutputPort("held"))
-    return signals
+    return signals, access
 
 
 def _add_servo(
@@ -74,8 +75,8 @@ def _add_servo(
     scenario: Scenario,
     ports: dict[str, OutputPort],
     q_J: np.ndarray,
-) -> tuple[VelocityServo, float]:
-    """Add velocity servos, and return them and their sampling time."""
+) -> VelocityServo:
+    """Add velocity servos, and return them."""
     servo, tick = scenario.servo, scenario.controller.sampling_time
     period = servo.period or tick
     ratio = require_whole_fraction("servo.period", period, tick)
@@ -111,7 +112,7 @@ def _add_servo(
         velocity = keep.GetOutputPort("held")
     builder.Connect(velocity, system.GetInputPort("velocity_reference"))
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
-    return system, period
+    return system
 
 
 def add_friction(

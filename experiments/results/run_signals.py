@@ -278,10 +278,9 @@ def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add the torques that a velocity servo gives, and what friction takes."""
     effort = _joint_units(station)[2]
-    if "drive_torque" in raw:
-        limits = station.diagram.GetSubsystemByName("velocity_servo").limits
+    if station.servo is not None:
         labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("tau_d", raw["drive_torque"], effort, labels, limits)
+        log.add("tau_d", raw["drive_torque"], effort, labels, station.servo.limits)
         names = [fault.name.lower() for fault in Fault]
         log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
     add_friction(log, station, raw, effort)

@@ -1,13 +1,17 @@
-"""Joint velocity control: pure formulas."""
+"""Joint velocity control: its gains, its law, and the law from tick to tick."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.checks import checked_vector
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,19 +147,86 @@ class VelocityServoLaw:
             )
         self.limits = limits
 
-    def torque(
-        self, v: np.ndarray, v_ref: np.ndarray, load: np.ndarray, x: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def torque(self, v: Any, v_ref: Any, load: Any, x: Any) -> tuple[Any, Any]:
         """Return the drive torque and the next integral part, each (N,) [Nm].
 
         Args:
-            v: Velocity of the motors [rad/s], shape (N,).
+            v: Velocity of the motors [rad/s], numbers or expressions, shape (N,).
             v_ref: Reference velocity [rad/s], shape (N,).
             load: ``g``, the known load [Nm], shape (N,).
             x: Integral part [Nm], shape (N,).
         """
-        gains = self.gains
-        u = load + gains.reference * v_ref - gains.proportional * v + x
-        tau_d = np.clip(u, -self.limits, self.limits)
-        realizable = v_ref + (tau_d - u) / gains.reference
-        return tau_d, x + gains.integral * gains.period * (realizable - v)
+        gains, limits = self.gains, ca.DM(self.limits)
+        K_p, K_w = ca.DM(gains.proportional), ca.DM(gains.reference)
+        u = load + K_w * v_ref - K_p * v + x
+        tau_d = ca.fmin(ca.fmax(u, -limits), limits)
+        realizable = v_ref + (tau_d - u) / K_w
+        return tau_d, x + ca.DM(gains.integral * gains.period) * (realizable - v)
+
+
+class SampledServo(Block):
+    """A :class:`VelocityServoLaw` with what it remembers.
+
+    The gravity torque is that of the links, the controlled velocity that of the motors. After a
+    fault nothing is remembered any more.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        velocity_reference (input): ``q'_ref``, shape (N,).
+        silence (input, optional): For how long no new reference has come [s], shape (1,).
+        stopping (input): Nonzero from a fault on, shape (1,); acts on what is remembered.
+        drive_torque (output): ``tau_d`` within its limits, shape (N,).
+        input_fault (output): INPUT_NOT_FINITE or NONE, shape (1,).
+        bus_fault (output): BUS_LOST if the bus has been silent for too long, or NONE, shape (1,).
+
+    State:
+        ``integral`` part ``x`` of the law, shape (N,), 0 at the start.
+
+    Args:
+        robot: The robot as it is believed, N joints; its gravity torque and the viscous damping
+            of its drives are fed forward.
+        law: The law; its gains' period is the sampling time.
+        longest_silence: How long a reference may be missing [s]; for ever if infinite.
+
+    Raises:
+        InputError: If the law is for another number of joints.
+    """
+
+    def __init__(self, robot: RobotModel, law: VelocityServoLaw, longest_silence: float) -> None:
+        n = robot.dimension
+        if law.gains.dimension != n:
+            raise InputError(
+                f"servo: gains for {law.gains.dimension} joints; the robot has {n} joints"
+            )
+        self._law, self._longest_silence = law, longest_silence
+        self._gravity, self._viscous = gravity_function(robot), ca.DM(robot.viscous_damping)
+        self.inputs = {
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+            "velocity_reference": Port(n, "rad/s or m/s"),
+            "silence": Port(1, "s", optional=True),
+            "stopping": Port(1),
+        }
+        self.outputs = {
+            "drive_torque": Port(n, "Nm or N"),
+            "input_fault": Port(1),
+            "bus_fault": Port(1),
+        }
+        self.inner, self.states = {"integral": n}, {"integral": n}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        q_J, _, _, v_M = ca.vertsplit(u.joint_state, x.integral.shape[0])
+        load = self._gravity(q_J) + self._viscous * u.velocity_reference
+        torque, integral = self._law.torque(v_M, u.velocity_reference, load, x.integral)
+        finite = all_finite(u.joint_state, u.velocity_reference)
+        lost = ca.DM(0) if u.silence is None else u.silence > self._longest_silence
+        return {
+            "drive_torque": torque,
+            "input_fault": where(finite, Fault.NONE, Fault.INPUT_NOT_FINITE),
+            "bus_fault": where(lost, Fault.BUS_LOST, Fault.NONE),
+            "integral": integral,
+        }
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"integral": where(u.stopping, x.integral, y.integral)}

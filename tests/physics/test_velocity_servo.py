@@ -20,10 +20,10 @@ def simulate(law, reference, load=0.0, steps=2000):
     """Return velocities and torques of an inertia under the law and a load torque."""
     v, x, velocities, torques = np.zeros(1), np.zeros(1), [], []
     for k in range(steps):
-        tau, x = law.torque(v, np.array([reference(k * T)]), np.zeros(1), x)
+        tau, x = law.torque(v, reference(k * T), 0.0, x)
         velocities.append(v[0])
-        torques.append(tau[0])
-        v = v + T / J * (tau - load)
+        torques.append(float(tau))
+        v = v + T / J * (tau.full()[0] - load)
     return np.array(velocities), np.array(torques)
 
 

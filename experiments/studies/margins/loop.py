@@ -74,7 +74,8 @@ class StationLoop:
         Args:
             root: Context of the diagram at a tick that is not made yet.
         """
-        faults = [self.station.controller.fault(self.station.blocks, root)]
+        accesses = [self.station.controller, self.station.servo]
+        faults = [a.fault(self.station.blocks, root) for a in accesses if a is not None]
         faults += [s.fault(s.GetMyContextFromRoot(root)) for s in self._can_fail]
         return any(fault is not Fault.NONE for fault in faults)
 

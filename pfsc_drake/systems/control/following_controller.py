@@ -8,7 +8,6 @@ from pfsc_drake.blocks.wiring_blocks import Constant, Rows
 from pfsc_drake.control.compliance.alarms import Alarms
 from pfsc_drake.control.law.drive_watch import DriveWatch
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
-from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.fault_latch import FaultLatch, FaultSwitch
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
@@ -16,7 +15,7 @@ from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.can_fail import is_tick
+from pfsc_drake.systems.fault_access import FaultAccess
 
 
 class FollowingController(Diagram):
@@ -129,21 +128,19 @@ class FollowingController(Diagram):
         builder.BuildInto(self)
 
 
-class ControllerAccess:
+class ControllerAccess(FaultAccess):
     """What a diagram's controller is told, found and remembers, fused with other blocks or not.
 
     Args:
         controller: The controller, in a builder under its name.
 
     Attributes:
-        period: Sampling time [s].
         drive_port: Name of the port that leads to the drives.
     """
 
     def __init__(self, controller: FollowingController) -> None:
-        self.period, self.drive_port = controller.period, controller.drive_port
-        self._name = controller.get_name()
-        self._is_supervised = controller.HasSubsystemNamed("supervision")
+        super().__init__(controller, controller.period)
+        self.drive_port = controller.drive_port
 
     def drive(self, blocks: BlockAccess, root: Context) -> np.ndarray:
         """Return what the drives are told, shape (N,).
@@ -152,30 +149,7 @@ class ControllerAccess:
             blocks: Of the diagram.
             root: Context of the diagram.
         """
-        return blocks.output(root, f"{self._name}.switch.told")
-
-    def fault(self, blocks: BlockAccess, root: Context) -> Fault:
-        """Return the fault that holds since the last tick, the present instant if it is one.
-
-        Args:
-            blocks: Of the diagram.
-            root: Context of the diagram.
-        """
-        latch = f"{self._name}.fault_latch.fault"
-        read = blocks.output if is_tick(root, self.period) else blocks.state
-        return Fault(int(read(root, latch)[0]))
-
-    def suspects(self, blocks: BlockAccess, root: Context) -> np.ndarray:
-        """Return which measured values are not believed, nonzero if so, shape (4N,).
-
-        Args:
-            blocks: Of the diagram.
-            root: Context of the diagram.
-        """
-        ignored = blocks.state(root, f"{self._name}.safe_stop.ignored")
-        if not (self._is_supervised and is_tick(root, self.period)):
-            return ignored
-        return np.maximum(ignored, blocks.output(root, f"{self._name}.supervision.suspects"))
+        return blocks.output(root, f"{self.name}.switch.told")
 
     def set_last_state(self, blocks: BlockAccess, root: Context, joint_state: np.ndarray) -> None:
         """Let a state be that of the last tick, before which nothing has been compared.
@@ -185,9 +159,9 @@ class ControllerAccess:
             root: Context of the diagram.
             joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         """
-        blocks.set_state(root, f"{self._name}.safe_stop.last", joint_state)
+        blocks.set_state(root, f"{self.name}.safe_stop.last", joint_state)
         if self._is_supervised:
-            watch = f"{self._name}.supervision"
+            watch = f"{self.name}.supervision"
             blocks.set_state(root, f"{watch}.last", joint_state)
             for name in ("sums", "unchanged"):
                 blocks.set_state(root, f"{watch}.{name}", np.zeros(len(joint_state)))

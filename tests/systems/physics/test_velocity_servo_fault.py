@@ -5,6 +5,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.fault import Fault
@@ -13,27 +14,48 @@ from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.can_fail import FailingSystem
-from pfsc_drake.systems.physics.velocity_servo import VelocityServo
+from pfsc_drake.systems.block_access import BlockAccess
+from pfsc_drake.systems.fuse import fuse
+from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
 
 POSTURE = np.deg2rad([0.0, 96.0, -32.3, 0.0, 71.4, -5.7])
 PERIOD = 1e-3
 VELOCITY = np.array([0.1, -0.2, 0.3, -0.1, 0.2, 0.4])
 
 
-class Bench:
-    """A servo with inputs that are set by hand."""
+def diagram_of(system, *, open_port=None):
+    """Return a diagram of a system alone, with the same ports but one that is left open."""
+    builder = DiagramBuilder()
+    builder.AddSystem(system)
+    for port in (system.get_input_port(i) for i in range(system.num_input_ports())):
+        if port.get_name() != open_port:
+            builder.ExportInput(port, port.get_name())
+    for port in (system.get_output_port(i) for i in range(system.num_output_ports())):
+        builder.ExportOutput(port, port.get_name())
+    return builder.Build()
 
-    def __init__(self, **options) -> None:
+
+class Bench:
+    """A servo, fused or not, with inputs that are set by hand."""
+
+    def __init__(self, fused=False, silence=None, **options) -> None:
         self.plant = MultibodyPlant(0.0)
         Parser(self.plant).AddModels(str(resolve_model("comau_racer_1_4")))
         self.plant.Finalize()
         self.chain, _ = chain_from_plant(self.plant, self.plant.GetFrameByName("tool_point"))
         self.gains = servo_gains(joint_inertia(self.chain, POSTURE), 100.0, PERIOD)
         self.limits = self.chain.gather("effort_limit")
-        self.servo = VelocityServo(self.chain, VelocityServoLaw(self.gains, self.limits), **options)
+        servo = VelocityServo(self.chain, VelocityServoLaw(self.gains, self.limits), **options)
+        servo.set_name("servo")
+        self.access = ServoAccess(servo)
+        self.servo = diagram_of(servo, open_port="silence" if silence is None else None)
+        if fused:
+            self.servo = diagram_of(fuse(self.servo))
+        self.blocks = BlockAccess(self.servo)
         self.simulator = Simulator(self.servo)
         self.context = self.simulator.get_mutable_context()
+        if silence is not None:
+            self.servo.GetInputPort("silence").FixValue(self.context, [silence])
         self.set()
         self.simulator.Initialize()
 
@@ -52,7 +74,7 @@ class Bench:
     @property
     def fault(self):
         flag = Fault(int(self.servo.GetOutputPort("fault").Eval(self.context)[0]))
-        assert flag == self.servo.fault(self.context)
+        assert flag == self.access.fault(self.blocks, self.context)
         return flag
 
     def weight(self, q=POSTURE):
@@ -62,9 +84,9 @@ class Bench:
         return -self.plant.CalcGravityGeneralizedForces(context)
 
 
-@pytest.fixture
-def bench():
-    return Bench()
+@pytest.fixture(params=[False, True], ids=["blocks", "fused"])
+def bench(request):
+    return Bench(fused=request.param)
 
 
 def spoiled(values, index, by=np.nan):
@@ -73,9 +95,19 @@ def spoiled(values, index, by=np.nan):
     return values
 
 
-def test_it_can_fail(bench):
-    assert isinstance(bench.servo, FailingSystem)
+def test_the_first_ticks(bench):
+    """``g + K_w v_ref - K_p v``, and the integral part from the second one on."""
+    gains = bench.gains
     assert bench.fault is Fault.NONE
+    reference = VELOCITY + 0.01
+    bench.set(reference=reference)
+    expected = bench.weight() + gains.reference * reference - gains.proportional * VELOCITY
+    np.testing.assert_allclose(bench.torque, expected, rtol=1e-12, atol=1e-9)
+    bench.tick()
+    integral = 0.01 * PERIOD * gains.integral
+    np.testing.assert_allclose(bench.torque, expected + integral, rtol=1e-12, atol=1e-9)
+    assert not bench.access.suspects(bench.blocks, bench.context).any()
+    np.testing.assert_array_equal(bench.access.limits, bench.limits)
 
 
 @pytest.mark.parametrize("by", [np.nan, np.inf])
@@ -103,15 +135,26 @@ def test_a_joint_that_is_not_seen_is_borne(bench):
     np.testing.assert_allclose(bench.torque, bench.weight(), atol=1e-9)
 
 
+@pytest.mark.parametrize("fused", [False, True])
 @pytest.mark.parametrize(("silence", "fault"), [(0.004, Fault.NONE), (0.006, Fault.BUS_LOST)])
-def test_a_silent_bus(silence, fault):
-    bench = Bench(longest_silence=0.005)
-    bench.servo.GetInputPort("silence").FixValue(bench.context, [silence])
+def test_a_silent_bus(silence, fault, fused):
+    bench = Bench(fused, silence, longest_silence=0.005)
     assert bench.fault is fault
 
 
-def test_a_measurement_that_contradicts_itself():
-    bench = Bench(supervision=SupervisionParameters())
+def test_the_root_cause_comes_first():
+    """No reference, a joint beyond its limits, a silent bus: each at once with the later ones."""
+    bench = Bench(silence=1.0, supervision=SupervisionParameters(), longest_silence=0.005)
+    assert bench.fault is Fault.BUS_LOST
+    bench.set(q=np.full(6, 10.0))
+    assert bench.fault is Fault.JOINT_LIMIT
+    bench.set(q=np.full(6, 10.0), reference=np.full(6, np.nan))
+    assert bench.fault is Fault.INPUT_NOT_FINITE
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_a_measurement_that_contradicts_itself(fused):
+    bench = Bench(fused, supervision=SupervisionParameters())
     bench.set(v=0.0 * VELOCITY, reference=0.0 * VELOCITY)
     bench.tick()
     bench.tick()
@@ -121,7 +164,7 @@ def test_a_measurement_that_contradicts_itself():
     bench.servo.GetInputPort("joint_state").FixValue(bench.context, state)
     assert bench.fault is Fault.MEASUREMENT_IMPLAUSIBLE
     bench.tick()
-    assert np.flatnonzero(bench.servo.suspects(bench.context)).tolist() == [14]
+    assert np.flatnonzero(bench.access.suspects(bench.blocks, bench.context)).tolist() == [14]
 
 
 def test_it_stays_in_its_safe_state(bench):
