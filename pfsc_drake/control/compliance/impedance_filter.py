@@ -150,7 +150,7 @@ class ImpedanceFilter(Block):
         size = 2 * self._law.num_outputs
         if not self._at_actual:
             return u.desired_reference[:size]
-        measured = u.manifold_state[:size]
+        measured = u.manifold_state[: min(size, self.inputs["manifold_state"].size)]
         return ca.vertcat(measured, u.desired_reference[measured.numel() : size])
 
     def _begun(self, x: Values, u: Values) -> tuple[ImpedanceState, Any, dict[str, Any]]:

@@ -122,6 +122,20 @@ def test_it_can_start_at_the_measured_motion():
         Bench(start="now")
 
 
+def test_without_a_measured_velocity_it_starts_with_the_desired_one():
+    """So it is where the drives are velocity servos, r = 1."""
+    law = ImpedanceOnNumbers(*arguments(r=1)).law
+    system = BlockSystem(ImpedanceFilter(law, start="actual"), PERIOD)
+    context = system.CreateDefaultContext()
+    given = {"desired_reference": DESIRED, "manifold_force": TAU, "manifold_state": MEASURED[:3]}
+    for name, value in given.items():
+        size = system.GetInputPort(name).size()
+        system.GetInputPort(name).FixValue(context, value[:size])
+    system.start(context)
+    np.testing.assert_array_equal(system.state(context, "position"), MEASURED[:3])
+    np.testing.assert_array_equal(system.state(context, "velocity"), DESIRED[3:6])
+
+
 def test_what_is_not_measured_yet_is_awaited():
     """A projector finds its place at the same initialization."""
     bench = Bench(start="actual")
