@@ -116,6 +116,22 @@ def test_it_starts_where_the_robot_is_with_a_transition(path):
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
 
 
+def test_it_steps_without_drake(path):
+    """The same torques as the diagram's, from what the diagram measured."""
+    simulator, follower = closed_loop(path, "comau_racer_1_4_elastic", "elastic")
+    plant = simulator.get_system().GetSystems()[0]
+    own = plant.GetMyContextFromRoot(simulator.get_context())
+    stepper = follower.stepper()
+    simulator.Initialize()
+    for k in range(20):
+        told = stepper.step(plant_state=plant.get_state_output_port().Eval(own))
+        np.testing.assert_array_equal(
+            told["drive_torque"], read(simulator, follower, "drive_torque")
+        )
+        simulator.AdvanceTo((k + 1) * follower.period)
+    assert np.abs(told["drive_torque"]).max() > 10.0
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
