@@ -1,7 +1,7 @@
 """Everything that acts on the robot."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, ZeroOrderHold
+from pydrake.systems.primitives import Adder
 
 from diagrams.robots.arm import Arm
 from diagrams.robots.part import RobotPart
@@ -13,6 +13,7 @@ from diagrams.surroundings.mounting_parts import add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
+from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.physics.decoupled_force import DecoupledForce
@@ -74,11 +75,10 @@ def add_surroundings(
     if sources:
         total = _sum(builder, "wrench", sources)
         # held over a tick, so that it is computed once and not in every stage of the integrator
-        hold = builder.AddNamedSystem(
-            "wrench_hold", ZeroOrderHold(scenario.controller.sampling_time, 6)
-        )
-        builder.Connect(total, hold.get_input_port())
-        held = hold.get_output_port()
+        period = scenario.controller.sampling_time
+        hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
+        builder.Connect(total, hold.GetInputPort("value"))
+        held = hold.GetOutputPort("held")
         acting.append(held)
     if spring is not None:
         # what is stiff follows the tool within a tick, too

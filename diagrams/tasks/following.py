@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import ConstantVectorSource, Multiplexer
 
 from diagrams.believed import believed_robot
 from diagrams.scenario import Scenario
@@ -13,6 +12,7 @@ from diagrams.tasks.compliance import add_compliance, has_impedance, reference_o
 from diagrams.tasks.guidance import add_guidance
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
+from pfsc_drake.blocks.wiring_blocks import Collect, Constant
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
@@ -243,9 +243,12 @@ def _connect_alarms(
     ports += [made.pop(name, None) for name in ("compliance_status", "press_lost")]
     if ports == [None] * len(ports):
         return
-    alarms = builder.AddNamedSystem("alarms", Multiplexer([1] * len(ports)))
-    for i, port in enumerate(ports):
+    names = ("sensor_fault", "tared", "compliance_status", "press_lost")
+    collect, period = Collect(dict.fromkeys(names, 1)), controller.period
+    alarms = builder.AddNamedSystem("alarms", BlockSystem(collect, period))
+    for name, port in zip(names, ports, strict=True):
         if port is None:
-            port = builder.AddSystem(ConstantVectorSource([0.0])).get_output_port()
-        builder.Connect(port, alarms.get_input_port(i))
-    builder.Connect(alarms.get_output_port(), controller.GetInputPort("alarms"))
+            none = builder.AddNamedSystem(f"no_{name}", BlockSystem(Constant([0.0]), period))
+            port = none.GetOutputPort("value")
+        builder.Connect(port, alarms.GetInputPort(name))
+    builder.Connect(alarms.GetOutputPort("all"), controller.GetInputPort("alarms"))

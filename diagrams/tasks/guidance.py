@@ -3,11 +3,11 @@
 import casadi as ca
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import MatrixGain
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.space_guidance import SpaceTask, free_motion, make_lead
+from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
@@ -79,9 +79,10 @@ def add_guidance(
         picked = np.zeros((1, WISHES))
         _, place = wishes_of(Kind.TANGENTIAL)
         picked[0, place] = 1.0
-        damping = builder.AddNamedSystem("free_damping", MatrixGain(picked))
-        builder.Connect(ports["impedance_wish"], damping.get_input_port())
-        builder.Connect(damping.get_output_port(), system.GetInputPort("damping"))
+        period = scenario.controller.sampling_time
+        damping = builder.AddNamedSystem("free_damping", BlockSystem(Linear(picked), period))
+        builder.Connect(ports["impedance_wish"], damping.GetInputPort("vector"))
+        builder.Connect(damping.GetOutputPort("product"), system.GetInputPort("damping"))
     return system
 
 

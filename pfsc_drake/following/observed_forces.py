@@ -1,9 +1,8 @@
 """Forces on the tool without a sensor, from how the links move."""
 
-import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer
 
+from pfsc_drake.blocks.wiring_blocks import Constant, Rows
 from pfsc_drake.control.estimation.generalized_momentum import link_momentum
 from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.control.estimation.tool_wrench import ToolWrench
@@ -61,7 +60,7 @@ def add_observed_forces(
             builder, "external_torque_observer", believed, options, inputs, told.bandwidth, order
         )
         builder.Connect(torque, controller.GetInputPort("tau_ext"))
-        made["tau_ext_observed"] = _first(builder, torque, robot.dimension)
+        made["tau_ext_observed"] = _first(builder, torque, robot.dimension, options.sampling_time)
     if posture.yields == "observed":
         made["posture_torque"] = _add_observer(
             builder, "posture_torque_observer", believed, options, inputs, posture.observer_rate, 0
@@ -77,9 +76,9 @@ def add_observed_forces(
         wrench = builder.AddNamedSystem("tool_wrench", BlockSystem(fit, period))
         builder.Connect(torque, wrench.GetInputPort("tau_ext"))
         builder.Connect(ports["joint_state"], wrench.GetInputPort("joint_state"))
-        ready = builder.AddNamedSystem("no_taring", ConstantVectorSource(np.ones(1)))
+        ready = builder.AddNamedSystem("no_taring", BlockSystem(Constant([1.0]), period))
         made |= {"wrench_observed": wrench.GetOutputPort("wrench")}
-        made |= {"ready": ready.get_output_port()}
+        made |= {"ready": ready.GetOutputPort("value")}
         made.setdefault("tau_ext_observed", torque)
     return made
 
@@ -122,12 +121,11 @@ def _add_observer(
     return observer.GetOutputPort("estimate")
 
 
-def _first(builder: DiagramBuilder, torque: OutputPort, size: int) -> OutputPort:
+def _first(builder: DiagramBuilder, torque: OutputPort, size: int, period: float) -> OutputPort:
     """Return the torques without their derivatives."""
     if torque.size() == size:
         return torque
-    split = builder.AddNamedSystem(
-        "external_torque_rows", Demultiplexer([size, torque.size() - size])
-    )
-    builder.Connect(torque, split.get_input_port())
-    return split.get_output_port(0)
+    rows = Rows(torque.size(), range(size))
+    first = builder.AddNamedSystem("external_torque_rows", BlockSystem(rows, period))
+    builder.Connect(torque, first.GetInputPort("whole"))
+    return first.GetOutputPort("part")

@@ -20,6 +20,7 @@ from diagrams.tasks.surface import make_surface
 from experiments.catalog.scenario_catalog import scenario_names
 from experiments.catalog.scenario_file import read_scenario
 from experiments.sweep.sweep import define_sweep
+from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
 from pfsc_drake.yaml.typed import load_typed
 from tests.docs.documents import DOCUMENTS, ONE_OF, ROOT, Block, Command, blocks, commands
@@ -132,10 +133,12 @@ def test_a_controller_in_a_diagram_of_ones_own(desk: Path, monkeypatch: pytest.M
     (block,) = (block for block in blocks("python") if block.place.startswith("README"))
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    read_model(plant, Path("my_arm.urdf"), ModelOptions(fixed_joints={"finger": 0.02}))
     names: dict[str, Any] = {"builder": builder, "plant": plant}
     exec(compile(block.text, block.place, "exec"), names)
-    assert names["names"] == ["eta", *["xi"] * 2, *["phi"] * 3]
-    assert builder.HasSubsystemNamed(names["controller"].get_name())
+    kinds = [c.kind.value for c in names["follower"].followed.manifold.coordinates]
+    assert kinds == ["eta", *["xi"] * 2, *["phi"] * 3]
+    assert builder.Build().num_output_ports() == 0
 
 
 def test_edges_and_corners() -> None:
