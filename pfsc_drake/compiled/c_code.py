@@ -123,6 +123,7 @@ class CCode(Code):
     """
 
     nowhere = "NULL"
+    most_instructions = 1_000_000
 
     def __init__(self, tables: Tables) -> None:
         super().__init__(tables)

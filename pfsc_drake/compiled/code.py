@@ -20,8 +20,6 @@ which stand for 1.0 and 0.0, with c, of whole numbers with i.
 
 Values = list[Value]
 _ZERO = literal(0.0)
-# of one function; machine code without optimizations keeps every value on the stack
-_MOST_INSTRUCTIONS = 50_000
 
 
 class Table(list[Value]):
@@ -64,9 +62,12 @@ class Code(ABC):
 
     Attributes:
         nowhere: The pointer to nothing, for what has no elements.
+        most_instructions: Of one function; machine code without optimizations keeps every value
+            on the stack.
     """
 
     nowhere: ClassVar[str]
+    most_instructions: ClassVar[int] = 50_000
 
     def __init__(self, tables: Tables) -> None:
         self._tables = tables
@@ -175,8 +176,8 @@ class Code(ABC):
         return name
 
     def _emit(self, line: str) -> None:
-        if len(self._lines) >= _MOST_INSTRUCTIONS:
-            raise Untranslatable(f"a function of more than {_MOST_INSTRUCTIONS} instructions")
+        if len(self._lines) >= self.most_instructions:
+            raise Untranslatable(f"a function of more than {self.most_instructions} instructions")
         self._lines.append(line)
 
     @abstractmethod

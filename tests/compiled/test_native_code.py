@@ -69,7 +69,7 @@ def test_unknown_operation_is_left_to_the_interpreter():
 
 @pytest.mark.parametrize("symbol", [ca.SX, ca.MX])
 def test_huge_functions_are_left_to_the_interpreter(monkeypatch, afresh, symbol):
-    monkeypatch.setattr("pfsc_drake.compiled.code._MOST_INSTRUCTIONS", 1000)
+    monkeypatch.setattr("pfsc_drake.compiled.code.Code.most_instructions", 1000)
     x = symbol.sym("x", 20, 20)
     reason = why_not(ca.Function("f", [x], [x @ x]))
     assert reason == "a function of more than 1000 instructions"
