@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.checks import require
+from pfsc_drake.checks import require_positive
 from pfsc_drake.control.cases import where
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.piece_table import PieceTable
@@ -50,7 +50,7 @@ class TimedReference(Block):
         bandwidth: Of the override's filter [1/s].
 
     Raises:
-        InputError: If the bandwidth is not positive, or above a third of what the samples resolve.
+        InputError: If the bandwidth is not positive.
     """
 
     def __init__(
@@ -61,9 +61,7 @@ class TimedReference(Block):
         period: float,
         bandwidth: float = 20.0,
     ) -> None:
-        fastest = 1.0 / (3.0 * period)
-        allowed = f"a positive number up to {fastest:.4g} 1/s"
-        require(0.0 < bandwidth <= fastest, "bandwidth of the override", bandwidth, allowed)
+        require_positive("bandwidth of the override", bandwidth)
         self._order, self._m, self._period = order, num_outputs, period
         self._begin, self._end = (float(limit) for limit in eta_p.domain)
         self._dimension = eta_p.coefficients.shape[2]

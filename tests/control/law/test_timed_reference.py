@@ -118,6 +118,19 @@ def test_too_much_is_limited_and_no_number_stops(motion):
     assert abs(lost[-1, 1, 0]) < 1e-9
 
 
-def test_a_bandwidth_beyond_the_samples_is_refused(motion):
-    with pytest.raises(InputError, match="bandwidth of the override = 500"):
-        TimedReference(motion, 2, 3, PERIOD, bandwidth=500.0)
+def test_a_bandwidth_that_is_none_is_refused(motion):
+    for bandwidth in (0.0, -3.0, np.inf):
+        with pytest.raises(InputError, match="bandwidth of the override = "):
+            TimedReference(motion, 2, 3, PERIOD, bandwidth=bandwidth)
+
+
+def test_slow_samples_are_filtered_exactly(motion):
+    """At 50 ms the filter's samples are those at 1 ms, every fiftieth."""
+    fine = Stepper(TimedReference(motion, 3, 3, PERIOD), ("override",))
+    coarse = Stepper(TimedReference(motion, 3, 3, 50 * PERIOD), ("override",))
+    for k in range(20):
+        override = 1.5 if k < 10 else 0.25
+        rows = [fine.step(override=override)["reference"] for _ in range(50)]
+        np.testing.assert_allclose(
+            coarse.step(override=override)["reference"], rows[0], rtol=1e-8, atol=1e-8
+        )
