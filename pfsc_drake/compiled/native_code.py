@@ -68,14 +68,17 @@ class NativeCode:
         return call
 
 
-# the code, or why there is none
+# the code, or why there is none, what was asked for last at the end; what is bound lives on without
 _compiled: dict[str, NativeCode | str] = {}
+# of many stations in a process, those whose functions differ need not all be kept
+_MOST_KEPT = 300
 
 
 def native_code(function: ca.Function) -> NativeCode | None:
     """Return the machine code of a function, or None if there can be none.
 
-    Functions of the same content are made once per process. It takes 10 to 20 microseconds per
+    Functions of the same content are made once per process, as long as not too many others are
+    made in between. It takes 10 to 20 microseconds per
     instruction the first time, as long as the interpreter takes for some thousand evaluations, and
     a few milliseconds in every process after that.
 
@@ -99,15 +102,23 @@ def why_not(function: ca.Function) -> str | None:
 
 def _made(function: ca.Function) -> NativeCode | str:
     key = hashlib.sha256(function.serialize().encode()).hexdigest()
-    if key not in _compiled:
-        try:
-            _compiled[key] = NativeCode(_object_code(function, key))
-        except Untranslatable as reason:
-            _compiled[key] = str(reason)
-        except Exception as error:
-            # whatever is missing or new in llvmlite: it is no reason to stop a controller
-            _compiled[key] = f"{type(error).__name__}: {error}"
-    return _compiled[key]
+    made = _compiled.pop(key, None)
+    if made is None:
+        made = _new(function, key)
+    _compiled[key] = made
+    while len(_compiled) > _MOST_KEPT:
+        del _compiled[next(iter(_compiled))]
+    return made
+
+
+def _new(function: ca.Function, key: str) -> NativeCode | str:
+    try:
+        return NativeCode(_object_code(function, key))
+    except Untranslatable as reason:
+        return str(reason)
+    except Exception as error:
+        # whatever is missing or new in llvmlite: it is no reason to stop a controller
+        return f"{type(error).__name__}: {error}"
 
 
 def _object_code(function: ca.Function, key: str) -> bytes:

@@ -41,6 +41,7 @@ class Loop:
     def __init__(self):
         file = SCENARIOS / "pfc_compliant_6r.yaml"
         self.scenario = load_file(Scenario, file)
+        self.scenario.simulation.fused = False
         for pulse in self.scenario.forces:
             pulse.begin, pulse.end = 0.1, 10.0
         self.station = build_station(self.scenario, SCENARIOS)

@@ -142,3 +142,19 @@ def test_nothing_on_disk_is_needed(monkeypatch, afresh):
     afresh.parent.mkdir()
     afresh.write_text("a file where the folder should be")
     assert_same_bits(*both(FUNCTION, [0.3, -2.0]))
+
+
+def test_what_is_bound_outlives_what_is_kept(monkeypatch):
+    """Of many functions the last ones are kept; code that is in use stays."""
+    monkeypatch.setattr("pfsc_drake.compiled.native_code._MOST_KEPT", 3)
+    x = ca.SX.sym("x")
+    functions = [ca.Function("f", [x], [(k + 0.5) * x]) for k in range(6)]
+    results = [np.zeros(1) for _ in functions]
+    calls = [
+        native_code(f).bind([np.ones(1)], [y]) for f, y in zip(functions, results, strict=True)
+    ]
+    assert native_code(functions[5]) is native_code(functions[5])
+    gc.collect()
+    for call in calls:
+        call()
+    np.testing.assert_array_equal(np.ravel(results), np.arange(6) + 0.5)

@@ -243,4 +243,4 @@ def test_kinematics_that_are_believed_wrongly(load_scenario):
     station = _build(settings)
     assert not station.part.belief.sees_truth
     kinematics = station.diagram.GetSubsystemByName("tool_kinematics")
-    assert isinstance(kinematics, ToolKinematics)
+    assert isinstance(kinematics.block, ToolKinematics)

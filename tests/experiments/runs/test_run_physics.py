@@ -9,6 +9,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import expm
+from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
@@ -78,6 +79,12 @@ def six_axes_rigid(run_scenario, tmp_path_factory):
     return run_scenario(out, "pfc_elastic_6r", "--duration", "0.05", *changes)
 
 
+def _along(theta, y):
+    """Return how far a point is from the path's normal plane, zero at its projection (3.6)."""
+    sigma, slope = LEMNISCATE.position.derivatives(float(theta), 1)
+    return slope @ (y - sigma)
+
+
 def off_the_path(y_t, theta):
     """Return the transversal coordinates of tool points beside the lemniscate.
 
@@ -85,7 +92,7 @@ def off_the_path(y_t, theta):
     """
     coordinates = []
     for point, guess in zip(y_t, theta, strict=True):
-        on_path = LEMNISCATE.projector.project(point.tolist(), guess).theta
+        on_path = newton(lambda theta, y=point: _along(theta, y), guess, tol=1e-14)
         sigma, slope = LEMNISCATE.position.derivatives(on_path, 1)
         assert abs(slope @ (point - sigma)) < 1e-10
         normals = np.array(LEMNISCATE.frame.normals(on_path))
