@@ -137,7 +137,7 @@ class Chain:
         self._value = self.diagram.get_input_port().FixValue(self.context, self.states[0])
         self._drive = self.diagram.get_output_port()
         inner = projector.GetMyMutableContextFromRoot(self.context)
-        projector.set_place(inner, np.array([THETA]))
+        projector.set_state(inner, "place", np.array([THETA]))
         self.diagram.ExecuteInitializationEvents(self.context)
         self._start, self._tick = self.context.Clone(), 0
 

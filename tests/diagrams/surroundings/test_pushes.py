@@ -110,9 +110,9 @@ def test_pushes_reach_a_plant_with_coupled_rotors(six_axes):
     root = station.diagram.CreateDefaultContext()
     station.set_start(root)
     root.SetTime(0.05)
-    for name, value in (("push_hold", PULSE.at(0.05)), ("wrench_hold", [20.0, 0, 0, 0, 0, 0])):
-        hold = station.diagram.GetSubsystemByName(name)
-        hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), np.array(value))
+    hold = station.diagram.GetSubsystemByName("push_hold")
+    hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), np.ravel(PULSE.at(0.05)))
+    station.blocks.set_state(root, "wrench_hold.held", np.array([20.0, 0, 0, 0, 0, 0]))
     pushes, tool, plant = (
         station.diagram.GetSubsystemByName(name)
         for name in ("link_pushes", "external_wrench", "plant")
