@@ -18,6 +18,8 @@ from pfsc_drake.robot.robot_model import RobotModel
 
 # of the inertia below the sensor at which the loop becomes unstable, up to which it is robust
 _ROBUST = 0.5
+# of that share; a mass may be chosen that bears it exactly
+_ROUNDING = 1e-6
 # sampling intervals that a loop over the sensor loses: the hold and the filter of the impedance
 _LOST_TICKS = 1.5
 
@@ -67,7 +69,7 @@ def _heavy_load(
         mass = sensor.unknown_mass
     share, worst = carried_share(felt, slope_at_rest(law, rest), masses)
     bearable = bearable_share(*_lag(scenario))
-    if share <= _ROBUST * bearable:
+    if share <= (_ROBUST + _ROUNDING) * bearable:
         return []
     unit = "kg m^2" if coordinates[worst].kind is Kind.ROTATIONAL else "kg"
     needed = masses[worst] * share / (_ROBUST * bearable)
