@@ -73,8 +73,7 @@ class _Search:
         self._station, self._begin, self._duration = station, begin, 0.0
         self._pose = pose_function(station.robot)
         coordinates, n = station.part.coordinates, station.robot.dimension
-        rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-        joint_state = rows @ station.initial_state
+        joint_state = coordinates.rows @ station.initial_state
         joint_state.reshape(4, n)[[1, 3]] = _SPEED
         self._state = coordinates.plant_state(joint_state)
         systems = station.diagram.GetSystems()

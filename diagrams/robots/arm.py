@@ -34,9 +34,8 @@ from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.models.parameters import load_parameters
-from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, state_at_rest
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
@@ -115,11 +114,7 @@ class Arm(RobotPart):
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
         """See :class:`RobotPart`."""
-        weight = np.array(gravity_function(self.robot)(q_J)).ravel()
-        rest = np.zeros(self.robot.dimension)
-        return self.coordinates.plant_state(
-            np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
-        )
+        return state_at_rest(self.robot, self.coordinates, q_J)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
@@ -190,7 +185,7 @@ class MultibodyArm(Arm):
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
         """See :class:`RobotPart`."""
-        connect_actuation(builder, self.model, self.coordinates.actuators, torque)
+        connect_actuation(builder, self.model, self.coordinates, torque)
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
         """See :class:`RobotPart`."""
@@ -257,8 +252,7 @@ class CoupledArm(Arm):
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """See :class:`RobotPart`."""
-        rows = np.vstack([self.coordinates.link_rows, self.coordinates.motor_rows])
-        self.full.set_joint_state(context, rows @ state)
+        self.full.set_joint_state(context, self.coordinates.rows @ state)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """See :class:`RobotPart`."""

@@ -202,8 +202,7 @@ class ConstrainedDelta(DeltaPart):
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
         """See :class:`RobotPart`."""
-        actuators = np.array([int(actuator) for actuator in self.model.actuators])
-        connect_actuation(builder, self.multibody, actuators, torque)
+        connect_actuation(builder, self.multibody, self.coordinates, torque)
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
         """See :class:`RobotPart`."""

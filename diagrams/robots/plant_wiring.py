@@ -16,19 +16,21 @@ from pfsc_drake.systems.plants.tool_reaction import ToolReaction
 
 
 def connect_actuation(
-    builder: DiagramBuilder, plant: MultibodyPlant, actuators: np.ndarray, torque: OutputPort
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    coordinates: PlantCoordinates,
+    torque: OutputPort,
 ) -> None:
     """Let drive torques or forces act.
 
     Args:
         builder: Builder of the diagram.
         plant: The plant.
-        actuators: Index of each drive's actuator in the plant, shape (N,).
+        coordinates: Where the robot's drives stand in the plant's actuation.
         torque: Shape (N,) [Nm or N].
     """
-    order = np.zeros((plant.num_actuators(), len(actuators)))
-    order[actuators, np.arange(len(actuators))] = 1.0
-    drives = builder.AddNamedSystem("drives", MatrixGain(order))
+    rows = coordinates.actuation_rows(plant.num_actuators())
+    drives = builder.AddNamedSystem("drives", MatrixGain(rows))
     builder.Connect(torque, drives.get_input_port())
     builder.Connect(drives.get_output_port(), plant.get_actuation_input_port())
 
@@ -144,7 +146,6 @@ def joint_state_of(
         plant_state: State of the plant.
         coordinates: Where the robot's coordinates stand in it.
     """
-    rows = np.vstack([coordinates.link_rows, coordinates.motor_rows])
-    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(rows))
+    encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(coordinates.rows))
     builder.Connect(plant_state, encoders.get_input_port())
     return encoders.get_output_port()

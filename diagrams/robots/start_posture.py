@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.inverse_kinematics import UNLIMITED, ToolTarget, solve_pose
+from pfsc_drake.robot.inverse_kinematics import ToolTarget, middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain import SerialChain
 
@@ -136,9 +136,7 @@ def posture_near(posture_deg: list[float], chain: SerialChain) -> np.ndarray:
         InputError: If there are more or fewer joints.
     """
     if not posture_deg:
-        lower, upper = np.clip(chain.gather("position_limits"), -UNLIMITED, UNLIMITED).T
-        limited = np.maximum(-lower, upper) < UNLIMITED
-        return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
+        return middle_posture(chain)
     if len(posture_deg) != chain.dimension:
         raise InputError(
             f"start.posture_deg: {len(posture_deg)} values; the robot has {chain.dimension} joints"

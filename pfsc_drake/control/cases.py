@@ -4,6 +4,7 @@ All branches are evaluated, and one is selected: what the others are, NaN or inf
 matter. Conditions are 1 or 0. A comparison with NaN is 0, so write it such that 0 is the safe side.
 """
 
+from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
@@ -103,3 +104,14 @@ def unit(which: Any, size: int) -> Any:
         size: k.
     """
     return ca.vertcat(*[which == i for i in range(size)])
+
+
+def kept_if_finite(after: Mapping[str, Any], before: Any) -> tuple[dict[str, Any], Any]:
+    """Return what is remembered of a sample, and whether that is the sample, shape (1,).
+
+    Args:
+        after: What would be remembered, by name.
+        before: What is remembered now, as attributes; it stays if a number is not finite.
+    """
+    good = all_finite(*after.values())
+    return {name: where(good, value, getattr(before, name)) for name, value in after.items()}, good

@@ -27,9 +27,8 @@ from pfsc_drake.following.options.controller import (
     LawGains,
 )
 from pfsc_drake.following.options.faults import FaultParameters
-from pfsc_drake.robot.inverse_kinematics import UNLIMITED, solve_pose
-from pfsc_drake.robot.robot_model import gravity_function
-from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
@@ -127,6 +126,7 @@ class Follower(Diagram):
         if not plant.HasFrameNamed(tool):
             raise InputError(f"tool = {tool}: the plant has no frame of this name")
         self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
+        self._actuation = self._coordinates.actuation_rows(plant.num_actuators())
         self.followed = followed = make(RELATIVE_DEGREE[law])
         self.start_posture = solve_pose(
             self.robot, followed.start, self._near(options.posture), "start"
@@ -143,12 +143,7 @@ class Follower(Diagram):
     @property
     def start_state(self) -> np.ndarray:
         """State ``[q, v]`` of the plant at rest at the start; elastic joints carry the weight."""
-        q_J = self.start_posture
-        weight = np.array(gravity_function(self.robot)(q_J)).ravel()
-        rest = np.zeros(self.robot.dimension)
-        return self._coordinates.plant_state(
-            np.concatenate([q_J, rest, q_J + weight / self.robot.K_s, rest])
-        )
+        return state_at_rest(self.robot, self._coordinates, self.start_posture)
 
     def stepper(self, connected: tuple[str, ...] = ()) -> Stepper:
         """Return the controller as something to call at every tick, without Drake.
@@ -162,16 +157,13 @@ class Follower(Diagram):
 
     def _near(self, posture: np.ndarray | None) -> np.ndarray:
         """Return from where the posture at the start is looked for, shape (N,)."""
-        if posture is not None:
-            if np.shape(posture) != (self.robot.dimension,):
-                raise InputError(
-                    f"posture: {np.size(posture)} values; the robot has {self.robot.dimension} "
-                    "joints"
-                )
-            return np.asarray(posture, dtype=float)
-        lower, upper = np.clip(self.robot.gather("position_limits"), -UNLIMITED, UNLIMITED).T
-        limited = np.maximum(-lower, upper) < UNLIMITED
-        return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
+        if posture is None:
+            return middle_posture(self.robot)
+        if np.shape(posture) != (self.robot.dimension,):
+            raise InputError(
+                f"posture: {np.size(posture)} values; the robot has {self.robot.dimension} joints"
+            )
+        return np.asarray(posture, dtype=float)
 
     def _add(self, name: str, block: Block) -> BlockSystem:
         return self._builder.AddNamedSystem(name, BlockSystem(block, self.period))
@@ -179,8 +171,7 @@ class Follower(Diagram):
     def _measured(self, options: FollowerOptions) -> OutputPort:
         """Export what is measured, and return the joint state."""
         if options.measures == "plant_state":
-            rows = np.vstack([self._coordinates.link_rows, self._coordinates.motor_rows])
-            measured = self._add("joint_state", Linear(rows))
+            measured = self._add("joint_state", Linear(self._coordinates.rows))
             self._builder.ExportInput(measured.GetInputPort("vector"), "plant_state")
             return measured.GetOutputPort("product")
         measured = self._add("joint_state", Collect({"measured": 4 * self.robot.dimension}))
@@ -194,10 +185,11 @@ class Follower(Diagram):
         joint_state = self._measured(options)
         kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
         builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
-        pose = kinematics.GetOutputPort("tool_pose")
+        projector = self._add("projector", self.followed.projector)
+        builder.Connect(kinematics.GetOutputPort("tool_pose"), projector.GetInputPort("tool_pose"))
         ports = {
             "joint_state": joint_state,
-            "manifold_point": self.followed.add_projector(builder, pose),
+            "manifold_point": projector.GetOutputPort("manifold_point"),
         }
         source = chosen.external_torque.source
         if source in ("known", "measured"):
@@ -222,10 +214,9 @@ class Follower(Diagram):
             told = smooth.GetOutputPort("reference")
         builder.Connect(told, controller.GetInputPort("reference"))
         drive = controller.GetOutputPort(controller.drive_port)
-        order = np.eye(self.robot.dimension)[np.argsort(self._coordinates.actuators)]
         hold = self._add("hold", Hold(self.robot.dimension))
         builder.Connect(drive, hold.GetInputPort("value"))
-        actuation = self._add("actuation", Linear(order))
+        actuation = self._add("actuation", Linear(self._actuation))
         builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
         builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")

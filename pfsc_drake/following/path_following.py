@@ -2,7 +2,7 @@
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.path import PathManifold
@@ -11,7 +11,6 @@ from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower, FollowerOptions
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 _VELOCITY, _ACCELERATION = 0.1, 0.5  # m/s, m/s^2
 
@@ -59,27 +58,19 @@ def add_path_following(
     along = motion or rest_to_rest(
         [0.0, path.length], velocity=_VELOCITY, acceleration=_ACCELERATION
     )
-    period = chosen.controller.sampling_time
 
     def followed(relative_degree: int) -> Followed:
         oriented = path.orientation is not None
         manifold = PathManifold(relative_degree, oriented=oriented, turning=path.frame.turns)
 
-        def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
-            projector = inside.AddNamedSystem(
-                "path_projector",
-                BlockSystem(Projector(path.evaluator(relative_degree)), period),
-            )
-            inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-            return projector.GetOutputPort("manifold_point")
-
+        evaluator = path.evaluator(relative_degree)
         eta = float(along.derivatives(np.array([along.domain[0]]), 0)[0, 0, 0])
-        point = path.evaluator(relative_degree).evaluate_at(path.arc_length.parameter(eta))
+        point = evaluator.evaluate_at(path.arc_length.parameter(eta))
         R_e = None
         if oriented:
             R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
         start = ToolTarget(point[manifold.layout.position][:3], R_e)
-        return Followed(manifold, along, start, point, add_projector)
+        return Followed(manifold, Projector(evaluator), along, start, point)
 
     follower = Follower(plant, tool, law, followed, chosen)
     builder.AddSystem(follower)

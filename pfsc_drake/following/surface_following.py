@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
@@ -15,7 +15,6 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 
 def add_surface_following(
@@ -55,7 +54,6 @@ def add_surface_following(
             out of reach.
     """
     chosen = options or FollowerOptions()
-    period = chosen.controller.sampling_time
     if motion.dimension != 2:
         raise InputError(f"motion: {motion.dimension} coordinates; a surface has 2")
     theta = [sum(ends) / 2.0 for ends in surface.domain] if start is None else list(start)
@@ -64,19 +62,12 @@ def add_surface_following(
         manifold = SurfaceManifold(relative_degree, orientation=orientation, offset=offset)
         evaluator = SurfaceEvaluator(surface, relative_degree)
 
-        def add_projector(inside: DiagramBuilder, tool_pose: OutputPort) -> OutputPort:
-            projector = inside.AddNamedSystem(
-                "surface_projector",
-                BlockSystem(Projector(evaluator, np.append([0.0, 0.0], eta)), period),
-            )
-            inside.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-            return projector.GetOutputPort("manifold_point")
-
         eta = motion.derivatives(np.array([motion.domain[0]]), 0)[0, 0]
         y_t = evaluator.evaluate_at(theta)[manifold.layout.position][:3]
         point = evaluator(y_t.tolist(), list(theta), eta.tolist())
         R_e = manifold.orientation(point[None])[0] if manifold.is_oriented else None
-        return Followed(manifold, motion, ToolTarget(y_t, R_e), point, add_projector)
+        projector = Projector(evaluator, np.append([0.0, 0.0], eta))
+        return Followed(manifold, projector, motion, ToolTarget(y_t, R_e), point)
 
     follower = Follower(plant, tool, law, followed, chosen)
     builder.AddSystem(follower)

@@ -22,6 +22,13 @@ _STEPS = 100  # of one attempt; one that succeeds needs about ten
 _PULL = 1e-3
 
 
+def middle_posture(robot: RobotModel) -> np.ndarray:
+    """Return joints in the middle of their limits, those without next to zero, shape (N,)."""
+    lower, upper = np.clip(robot.gather("position_limits"), -UNLIMITED, UNLIMITED).T
+    limited = np.maximum(-lower, upper) < UNLIMITED
+    return np.where(limited, (lower + upper) / 2.0, np.clip(0.0, lower, upper))
+
+
 @dataclass(frozen=True)
 class ToolTarget:
     """Where a tool is to be, as far as it matters.

@@ -28,14 +28,6 @@ class BlockAccess:
             elif isinstance(system, Diagram):
                 self._collect(system, inner)
 
-    def has_output(self, name: str) -> bool:
-        """Return whether there is an output.
-
-        Args:
-            name: ``block.output``.
-        """
-        return name in self._wires
-
     def output(self, root: Context, name: str) -> np.ndarray:
         """Return what a block puts out.
 

@@ -176,7 +176,7 @@ class BlockSystem(LeafSystem):
             program = self._declared
             if left:
                 assert self.block is not None  # a network leaves no input open
-                program = Program(Network.of(self.block, left), self._declared)
+                program = Program(Network.of(self.block, left, self.network), self._declared)
             self._programs[left] = _Functions(program)
         return self._programs[left]
 

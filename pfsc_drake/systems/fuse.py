@@ -171,9 +171,9 @@ def network_of(system: System, unconnected: Collection[str] = ()) -> Network:
         unconnected: Names of its input ports that nothing is connected to.
     """
     if isinstance(system, BlockSystem):
-        if system.block is None:
+        if system.block is None or not unconnected:
             return system.network
-        return Network.of(system.block, unconnected)
+        return Network.of(system.block, unconnected, system.network)
     assert isinstance(system, Diagram)
     wiring = Wiring()
     connections: Connections = system.connection_map()

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.control.cases import kept_if_finite, where
 from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.control.estimation.friction_model import friction_torque, require_smoothing
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
@@ -170,20 +170,16 @@ class FrictionKalmanFilter(Block):
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
-        acting = ca.DM(self._model.drive_weight) * u.drive_torque
-        if u.known_torque is not None:
-            acting += ca.DM(self._model.known_weight) * u.known_torque
         sampled = {
             "estimate": y.corrected,
             "covariance": y.covariance,
             "position": y.position,
             "velocity": y.velocity,
             "forces": y.forces,
-            "acting": acting,
+            "acting": self._model.acting(u.drive_torque, u.known_torque),
             "acted": x.acting,
         }
-        good = all_finite(*sampled.values())
-        kept = {name: where(good, value, getattr(x, name)) for name, value in sampled.items()}
+        kept, good = kept_if_finite(sampled, x)
         return kept | {"seen": good}
 
     def _filtered(
@@ -193,7 +189,7 @@ class FrictionKalmanFilter(Block):
         T, model, noise = self._period, self._model, self._noise
         p, f_c, f_v = ca.vertsplit(x.estimate, model.dimension)
         pp, pc, pv, cc, cv, vv = ca.vertsplit(x.covariance, model.dimension)
-        tau = x.acting + model.delay / T * (x.acted - x.acting)
+        tau = model.acting_when_measured(x.acting, x.acted, T)
         v_0 = x.velocity
         if self._mean:
             turns = v * v_0 < 0.0

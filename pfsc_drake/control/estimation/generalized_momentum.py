@@ -7,6 +7,7 @@ no acceleration, and a difference of momenta tells the mean of all that acted in
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -58,6 +59,26 @@ class MomentumModel:
         then = ca.vertcat(q_J - delay * v_J, v_J, q_M - delay * v_M, v_M)
         momentum, forces = ca.substitute([self.momentum, self.forces], [self.state], [then])
         return replace(self, momentum=momentum, forces=forces, delay=delay)
+
+    def acting(self, drive_torque: Any, known_torque: Any | None) -> Any:
+        """Return the torques that are known to change the momenta, shape (N, 1).
+
+        Args:
+            drive_torque: What the drives are told, shape (N, 1).
+            known_torque: What else is known to act, shape (N, 1); None for nothing.
+        """
+        acting = ca.DM(self.drive_weight) * drive_torque
+        return acting if known_torque is None else acting + ca.DM(self.known_weight) * known_torque
+
+    def acting_when_measured(self, acting: Any, acted: Any, period: float) -> Any:
+        """Return the mean of what acted over an interval of the age of the velocities, (N, 1).
+
+        Args:
+            acting: What acts since the last sample, shape (N, 1).
+            acted: What did in the interval before, shape (N, 1).
+            period: Sampling time [s].
+        """
+        return acting + self.delay / period * (acted - acting)
 
     def function(self) -> ca.Function:
         """Return ``state -> (p, f)``, shapes (4N,), (N,), (N,)."""

@@ -2,10 +2,8 @@
 
 from typing import Any
 
-import casadi as ca
-
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.control.cases import kept_if_finite, where
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
 from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
 
@@ -76,7 +74,7 @@ class MomentumObserver(Block):
         """See :class:`Block`."""
         model, T = self._model, self._period
         p, f = self._momentum(u.joint_state)
-        tau = x.acting + model.delay / T * (x.acted - x.acting)
+        tau = model.acting_when_measured(x.acting, x.acted, T)
         z_mean = model.sign * ((p - x.momentum) / T - (f + x.forces) / 2.0 - tau)
         predicted = x.estimate[: model.dimension]
         sample = where(x.seen > 0.0, z_mean, predicted)
@@ -85,16 +83,12 @@ class MomentumObserver(Block):
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
-        acting = ca.DM(self._model.drive_weight) * u.drive_torque
-        if u.known_torque is not None:
-            acting += ca.DM(self._model.known_weight) * u.known_torque
         sampled = {
             "estimate": self._filter.predict(y.estimate),
             "momentum": y.momentum,
             "forces": y.forces,
-            "acting": acting,
+            "acting": self._model.acting(u.drive_torque, u.known_torque),
             "acted": x.acting,
         }
-        good = all_finite(*sampled.values())
-        kept = {name: where(good, value, getattr(x, name)) for name, value in sampled.items()}
+        kept, good = kept_if_finite(sampled, x)
         return kept | {"seen": good}

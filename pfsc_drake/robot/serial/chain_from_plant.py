@@ -23,6 +23,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 
@@ -58,8 +59,35 @@ class PlantCoordinates:
         return self._inverse @ joint_state
 
     @cached_property
+    def rows(self) -> np.ndarray:
+        """Matrix with ``[q_J, v_J, q_M, v_M] = rows x``, shape (4N, num_states)."""
+        return np.vstack([self.link_rows, self.motor_rows])
+
+    def actuation_rows(self, num_actuators: int) -> np.ndarray:
+        """Return the matrix from drives to the plant's actuation, shape (num_actuators, N).
+
+        Args:
+            num_actuators: Of the plant, which may have others besides.
+        """
+        rows = np.zeros((num_actuators, len(self.actuators)))
+        rows[self.actuators, np.arange(len(self.actuators))] = 1.0
+        return rows
+
+    @cached_property
     def _inverse(self) -> np.ndarray:
-        return np.linalg.pinv(np.vstack([self.link_rows, self.motor_rows]))
+        return np.linalg.pinv(self.rows)
+
+
+def state_at_rest(chain: SerialChain, coordinates: PlantCoordinates, q_J: np.ndarray) -> np.ndarray:
+    """Return the plant's state ``[q, v]`` at rest, elastic joints carrying the links' weight.
+
+    Args:
+        chain: The chain.
+        coordinates: Where its coordinates stand in the plant's state.
+        q_J: Joint coordinates, shape (N,) [rad or m].
+    """
+    weight, rest = np.array(gravity_function(chain)(q_J)).ravel(), np.zeros(chain.dimension)
+    return coordinates.plant_state(np.concatenate([q_J, rest, q_J + weight / chain.K_s, rest]))
 
 
 def chain_from_plant(
