@@ -1,12 +1,20 @@
 """Coulomb and viscous friction of the joints."""
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
+from pydrake.systems.primitives import Adder, FirstOrderLowPassFilter, Gain, Saturation
 
 from pfsc_drake.physics.friction import BristleFriction, FrictionDrift
 
 
-class JointFriction(LeafSystem):
+class JointFriction(Diagram):
     """Friction torques (2.34), (2.41) beside the drive torques.
 
     ``tau_f = f_c sat(s + tau v / delta) + f_v v`` with the
@@ -40,17 +48,32 @@ class JointFriction(LeafSystem):
         super().__init__()
         self._friction, self._drift = friction, drift
         n = friction.dimension
-        self.DeclareContinuousState(n)
-        self._velocity = self.DeclareVectorInputPort("velocity", n)
-        sources = {self._velocity.ticket(), self.xc_ticket()}
+        builder = DiagramBuilder()
+
+        def added(name: str, system: LeafSystem, *sources: OutputPort) -> OutputPort:
+            builder.AddNamedSystem(name, system)
+            for k, source in enumerate(sources):
+                builder.Connect(source, system.get_input_port(k))
+            return system.get_output_port()
+
+        # (sat(s + tau v / delta) - s) / tau is what a low pass does with sat(s + tau v / delta)
+        bristles = FirstOrderLowPassFilter(time_constants=friction.relaxation)
+        tips = Gain(k=friction.relaxation / friction.presliding)
+        viscous = Gain(k=friction.viscous)
+        s = added("deflection", bristles)
+        sum_ = added("undeflected", Adder(2, n), s, added("tips", tips))
+        bent = added("limit", Saturation(np.full(n, -1.0), np.ones(n)), sum_)
+        builder.Connect(bent, bristles.get_input_port())
+        dry = added("dry", Gain(k=friction.coulomb), bent)
+        torque = added("sum", Adder(2, n), dry, added("viscous", viscous))
         if drift is not None:
-            sources.add(self.time_ticket())
-        self._torque = self.DeclareVectorOutputPort(
-            "friction_torque", n, self._calc_torque, prerequisites_of_calc=sources
-        )
-        self.DeclareVectorOutputPort(
-            "resistance", n, self._calc_resistance, prerequisites_of_calc=sources
-        )
+            torque = added("drift", _Drifting(n, drift), torque)
+        resistance = added("sign", Gain(k=np.full(n, -1.0)), torque)
+        builder.ExportInput(tips.get_input_port(), "velocity")
+        builder.ConnectInput("velocity", viscous.get_input_port())
+        builder.ExportOutput(torque, "friction_torque")
+        builder.ExportOutput(resistance, "resistance")
+        builder.BuildInto(self)
 
     def coefficients(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return f_c [Nm or N] and f_v [Nm s/rad or N s/m] over time, each (samples, N).
@@ -70,18 +93,20 @@ class JointFriction(LeafSystem):
         """
         context.SetContinuousState(self._friction.deflection(torque))
 
-    def _calc_torque(self, context: Context, output: BasicVector) -> None:
-        s = context.get_continuous_state_vector().CopyToVector()
-        torque = self._friction.torque(s, self._velocity.Eval(context))
-        if self._drift is not None:
-            torque = self._drift.scale(context.get_time()) * torque
-        output.SetFromVector(torque)
 
-    def _calc_resistance(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(-self._torque.Eval(context))
+class _Drifting(LeafSystem):
+    """A torque times what friction is in units of that at the start."""
 
-    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Calculate ``s'``; the framework calls this."""
-        s = context.get_continuous_state_vector().CopyToVector()
-        rate = self._friction.rate(s, self._velocity.Eval(context))
-        derivatives.get_mutable_vector().SetFromVector(rate)
+    def __init__(self, size: int, drift: FrictionDrift) -> None:
+        super().__init__()
+        self._drift = drift
+        self._torque = self.DeclareVectorInputPort("torque", size)
+        self.DeclareVectorOutputPort(
+            "scaled",
+            size,
+            self._calc,
+            prerequisites_of_calc={self._torque.ticket(), self.time_ticket()},
+        )
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._drift.scale(context.get_time()) * self._torque.Eval(context))

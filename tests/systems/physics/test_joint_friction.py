@@ -8,7 +8,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
-from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
+from pfsc_drake.physics.friction import BristleFriction, FrictionDrift, bristles_for_step
 from pfsc_drake.systems.physics.joint_friction import JointFriction
 
 STEP = 1e-3
@@ -264,3 +264,33 @@ def test_ports():
     torque = system.GetOutputPort("friction_torque").Eval(context)
     assert np.allclose(torque, [2.5, -3.0], rtol=0, atol=1e-15)
     assert np.array_equal(system.GetOutputPort("resistance").Eval(context), -torque)
+
+
+def test_it_is_the_law():
+    """Torque and rate of the system are those of the formulas, also of what is no number."""
+    rng = np.random.default_rng(5)
+    law = BristleFriction(
+        *rng.uniform([[1.0], [0.0], [1e-6], [1e-3]], [[9.0], [5.0], [1e-4], [3e-3]], (4, 6))
+    )
+    system = JointFriction(law)
+    context = system.CreateDefaultContext()
+    for scale in (0.0, 1e-4, 1e-2, 1.0, np.nan):
+        s, v = rng.uniform(-1.0, 1.0, (2, 6)) * [[1.0], [scale]]
+        context.SetContinuousState(s)
+        system.GetInputPort("velocity").FixValue(context, v)
+        torque = system.GetOutputPort("friction_torque").Eval(context)
+        assert np.array_equal(torque, law.torque(s, v), equal_nan=True)
+        rate = system.EvalTimeDerivatives(context).CopyToVector()
+        assert np.array_equal(rate, law.rate(s, v), equal_nan=True)
+
+
+def test_drift():
+    law = BristleFriction([2.0, 0.0], [1.0, 3.0], [1e-5, 1e-5], [2e-3, 2e-3])
+    system = JointFriction(law, FrictionDrift(1.5, 2.0, 4.0))
+    context = system.CreateDefaultContext()
+    system.GetInputPort("velocity").FixValue(context, [0.5, -1.0])
+    for time, factor in ((0.0, 1.0), (3.0, 1.25), (9.0, 1.5)):
+        context.SetTime(time)
+        torque = system.GetOutputPort("friction_torque").Eval(context)
+        assert np.allclose(torque, factor * np.array([2.5, -3.0]), rtol=0, atol=1e-15)
+        assert np.array_equal(system.GetOutputPort("resistance").Eval(context), -torque)
