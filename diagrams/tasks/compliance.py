@@ -29,7 +29,6 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.motion_limits import MotionLimits
 
 # up to which derivative the filter knows the external reference, see ImpedanceLaw
 _DESIRED_ORDER = 4
@@ -181,7 +180,7 @@ def _add_limits(
     ports: dict[str, OutputPort],
 ) -> OutputPort:
     """Let the filter move no faster than the robot can; return the forces that hold the hand."""
-    system = builder.AddNamedSystem("motion_limits", MotionLimits(limits, impedance.period))
+    system = builder.AddNamedSystem("motion_limits", BlockSystem(limits, impedance.period))
     sources = {"wanted_speed": impedance.GetOutputPort("wanted_speed")}
     sources |= {name: ports[name] for name in ("joint_state", "manifold_point")}
     for name, port in sources.items():

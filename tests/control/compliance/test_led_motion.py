@@ -3,9 +3,11 @@
 from types import SimpleNamespace
 
 import casadi as ca
+import daqp
 import numpy as np
 import pytest
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
     ImpedanceParameters,
@@ -13,15 +15,14 @@ from pfsc_drake.control.compliance.impedance import (
 )
 from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
-from pfsc_drake.control.fixtures.robot_limits import RobotLimits
+from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 from tests.control.conftest import Robot
 from tests.control.fixtures.arm_robot import START
 
-PERIOD, MODEL = 1e-3, "comau_racer_1_4"
-NOWHERE = np.zeros(1)
+PERIOD, MODEL, MASS = 1e-3, "comau_racer_1_4", 3.0
 
 
 @pytest.fixture(scope="module")
@@ -29,15 +30,32 @@ def robot():
     return Robot(MODEL)
 
 
-def led(robot, axes, count, **changes):
-    """Return the limits along the first axes, and joint velocities by Drake's Jacobian."""
-    given = RobotLimitParameters(speed_share=0.2, singular_floor=0.01, **changes)
-    limits = RobotLimits(robot.chain, given, np.array(START[MODEL]), oriented=True)
-    kind = PathManifold(1, oriented=True) if count == 1 else SurfaceManifold(1)
-    manifold = SimpleNamespace(
-        axes=lambda point: ca.DM(axes), layout=SimpleNamespace(size=1), coordinates=kind.coordinates
-    )
-    return LedMotion(limits, manifold, PERIOD)
+class Led:
+    """The block along the first of three axes, which are its manifold's point."""
+
+    def __init__(self, robot, count, **changes):
+        given = RobotLimitParameters(**{"speed_share": 0.2, "singular_floor": 0.01} | changes)
+        self.limits = RobotLimits(robot.chain, given, np.array(START[MODEL]), oriented=True)
+        kind = PathManifold(1, oriented=True) if count == 1 else SurfaceManifold(1)
+        manifold = SimpleNamespace(
+            axes=lambda point: ca.reshape(point, 3, 3),
+            layout=SimpleNamespace(size=9),
+            coordinates=kind.coordinates,
+        )
+        self.block = LedMotion(self.limits, manifold, PERIOD)
+        self._stepper = Stepper(self.block)
+
+    def allowed(self, q, v, axes, wanted):
+        """Return the allowed speed, and by what force of each kind of limit it is held."""
+        state = np.concatenate([q, v, q, v])
+        given = {"joint_state": state, "manifold_point": axes.T.ravel()}
+        given |= {"wanted_speed": [*wanted, MASS]}
+        speed = self._stepper.step(**given)["allowed_speed"]
+        return speed, self._stepper.step(**given)["limit_force"]
+
+
+def any_axes(random):
+    return np.linalg.qr(random.normal(size=(3, 3)))[0]
 
 
 def joints(robot, q, axes, speed):
@@ -50,29 +68,72 @@ def joints(robot, q, axes, speed):
 @pytest.mark.parametrize("count", [1, 2])
 def test_the_motion_that_is_allowed_takes_a_joint_to_its_share(robot, count):
     """However fast the tool moves now; and what is slower is left as it is."""
-    axes = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    motion, q = led(robot, axes, count), np.array(START[MODEL])
+    axes = any_axes(np.random.default_rng(1))
+    led, q = Led(robot, count), np.array(START[MODEL])
     speed = np.array([0.2, -0.1])[:count]
     v, share = joints(robot, q, axes, speed), 0.2 * robot.chain.gather("velocity_limit")
     assert np.all(np.abs(v) < share)
-    same, held = motion.allowed(q, v, NOWHERE, speed)
+    same, held = led.allowed(q, v, axes, speed)
     np.testing.assert_array_equal(same, speed)
     assert not held.any()
     wanted = np.array([3.0, -2.0])[:count]
-    allowed, held = motion.allowed(q, v, NOWHERE, wanted)
+    allowed, held = led.allowed(q, v, axes, wanted)
     ratio = np.abs(joints(robot, q, axes, allowed)) / share
     assert ratio.max() == pytest.approx(1.0, abs=1e-9)
     # each limit that holds is met, and no other is named
-    named = {kind for kind, force in zip(motion.kinds, held, strict=True) if force > 0.0}
+    named = {kind for kind, force in zip(led.block.kinds, held, strict=True) if force > 0.0}
     assert named == {f"speed_{j + 1}" for j in np.flatnonzero(ratio > 1.0 - 1e-9)}
     # the nearest one: what is missing is pushed by the limits that hold alone
     assert (wanted - allowed) @ (allowed - 0.5 * speed) > 0.0
 
 
-def test_a_motion_that_is_no_number_is_left_to_others(robot):
-    motion = led(robot, np.eye(3), 1)
-    allowed, held = motion.allowed(np.zeros(6), np.zeros(6), NOWHERE, np.array([np.nan]))
-    assert np.isnan(allowed[0])
+@pytest.mark.parametrize("count", [1, 2])
+def test_of_all_limits_the_motion_next_to_the_wanted_one_is_found(robot, count):
+    """Speeds, ends and singular postures, against a solver that is given all of them."""
+    random, held_by = np.random.default_rng(count), set()
+    led = Led(robot, count, singular_floor=0.3, speed_share=0.3, end_margin=0.5, settling=0.3)
+    low, high = robot.chain.gather("position_limits").T
+    for _ in range(60):
+        q = np.array(START[MODEL]) + random.uniform(-0.5, 0.5, 6)
+        joint = random.integers(6)
+        q[joint] = random.choice([low[joint] + 0.6, high[joint] - 0.6])
+        axes, v = any_axes(random), random.uniform(-0.3, 0.3, 6)
+        wanted = random.normal(size=count)
+        table = led.limits.function(q, v).full()
+        table = table[table[:, 0] >= 0.0]
+        A, lower = table[:, 1:4] @ axes[:, :count], -table[:, 4]
+        upper, kinds = np.full(len(A), 1e30), np.zeros(len(A), dtype=np.int32)
+        expected, _, flag, info = daqp.solve(np.eye(count), -wanted, A, upper, lower, kinds)
+        assert flag == 1
+        allowed, held = led.allowed(q, v, axes, wanted)
+        np.testing.assert_allclose(allowed, expected, atol=1e-8)
+        # a multiplier belongs to a row of A, which is shorter than a unit
+        forces, pushes = dict.fromkeys(led.block.kinds, 0.0), np.abs(info["lam"])
+        for number, push, row in zip(table[:, 0], pushes, A, strict=True):
+            forces[limit_kinds(6)[int(number)]] += MASS / PERIOD * push * np.linalg.norm(row)
+        np.testing.assert_allclose(held, list(forces.values()), rtol=1e-6, atol=1e-4)
+        held_by |= {kind.split("_")[0] for kind, force in forces.items() if force > 0.0}
+    assert held_by == {"speed", "end", "singular"}
+
+
+def test_a_limit_that_the_motion_does_not_change_does_not_hold_it(robot):
+    """Joint 1 turns the tool across the plane of the others; a motion within leaves it at rest."""
+    q = np.array(START[MODEL])
+    q[[0, 3, 5]] = 0.0
+    led, v = Led(robot, 1), np.zeros(6)
+    v[0] = 50.0
+    axes = np.eye(3)[:, [2, 0, 1]]
+    allowed, held = led.allowed(q, v, axes, [0.01])
+    np.testing.assert_array_equal(allowed, [0.01])
+    assert not held.any()
+
+
+@pytest.mark.parametrize("spoiled", ["wanted", "joint", "point"])
+def test_what_is_no_number_is_left_to_others(robot, spoiled):
+    q, axes, wanted = np.array(START[MODEL]), np.eye(3), np.array([0.3])
+    {"wanted": wanted, "joint": q, "point": axes[:, 0]}[spoiled][0] = np.nan
+    allowed, held = Led(robot, 1).allowed(q, np.zeros(6), axes, wanted)
+    np.testing.assert_array_equal(allowed, wanted)
     assert not held.any()
 
 
