@@ -20,7 +20,6 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_access import BlockAccess
-from pfsc_drake.systems.can_fail import FailingSystem
 from pfsc_drake.systems.control.following_controller import ControllerAccess
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess
 
@@ -167,22 +166,12 @@ class Station:
         if fault is not Fault.NONE:
             suspects = self.controller.suspects(self.blocks, root)
             return self._describe(fault, root, "law", self.law.layout.status.start, suspects)
-        for name, system in self._can_fail.items():
-            fault = system.fault(system.GetMyContextFromRoot(root))
-            if fault is not Fault.NONE:
-                return FoundFault(f"{name}: {fault.explanation}", root.get_time())
         servo = self.servo
         if servo is None or (fault := servo.fault(self.blocks, root)) is Fault.NONE:
             return None
         suspects = servo.suspects(self.blocks, root)
         found = self._describe(fault, root, "servo_fault", 0, suspects)
         return FoundFault(f"{servo.name}: {found.sentence}", found.time)
-
-    @cached_property
-    def _can_fail(self) -> dict[str, FailingSystem]:
-        """Further systems with a safe state, by name; to look for them takes longer than to ask."""
-        systems = {system.get_name(): system for system in self.diagram.GetSystems()}
-        return {name: s for name, s in systems.items() if isinstance(s, FailingSystem)}
 
     def _describe(
         self, fault: Fault, root: Context, signal: str, column: int, suspects: np.ndarray

@@ -40,10 +40,10 @@ from pfsc_drake.robot.delta.multibody import (
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
-from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 from pfsc_drake.systems.plants.joint_reaction import reaction_index
+from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 from pfsc_drake.yaml.reading import read_yaml
 
 TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"

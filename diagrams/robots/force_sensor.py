@@ -1,19 +1,16 @@
 """The force/torque sensor between robot and tool."""
 
-from collections.abc import Sequence
-
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import DiscreteTimeDelay
 
 from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from pfsc_drake.blocks.wiring_blocks import Rows
+from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor
 from pfsc_drake.physics.sensor_failure import SensorFailure
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.joint_reaction import JointReaction
 
@@ -45,23 +42,20 @@ def add_sensor(
     parameters, period = scenario.sensor, scenario.controller.sampling_time
     mount = part.sensor_mount(builder, parameters.joint, ports)
     sensor = _add_transducer(builder, mount, scenario)
-    compensation = builder.AddNamedSystem(
-        "tool_compensation",
-        ToolCompensation(
-            part.belief.robot,
-            mount.believed_load,
-            parameters.measurement_range,
-            parameters.compensation(),
-            period,
-        ),
+    block = ToolCompensation(
+        part.belief.robot,
+        mount.believed_load,
+        parameters.measurement_range,
+        parameters.compensation(),
+        period,
     )
+    compensation = builder.AddNamedSystem("tool_compensation", BlockSystem(block, period))
     reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), scenario)
     reading = _delay(builder, reading, scenario)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
-    whole = compensation.GetOutputPort("compensation")
-    parts = {"wrench_measured": range(6), "tared": [6], "sensor_fault": [7]}
-    return {name: _rows(builder, name, whole, rows, period) for name, rows in parts.items()}
+    signals = {"wrench_measured": "wrench", "tared": "tared", "sensor_fault": "fault"}
+    return {name: compensation.GetOutputPort(port) for name, port in signals.items()}
 
 
 def _add_transducer(builder: DiagramBuilder, mount: SensorMount, scenario: Scenario) -> BlockSystem:
@@ -117,15 +111,6 @@ def _delay(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> 
     )
     builder.Connect(reading, late.get_input_port())
     return late.get_output_port()
-
-
-def _rows(
-    builder: DiagramBuilder, name: str, port: OutputPort, rows: Sequence[int], period: float
-) -> OutputPort:
-    """Return some elements of a port."""
-    part = builder.AddNamedSystem(name, BlockSystem(Rows(port.size(), rows), period))
-    builder.Connect(port, part.GetInputPort("whole"))
-    return part.GetOutputPort("part")
 
 
 def sensor_warnings(scenario: Scenario) -> list[str]:

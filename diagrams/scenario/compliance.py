@@ -13,7 +13,7 @@ from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Impedan
 from pfsc_drake.control.compliance.press import PressParameters
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.compliance.still_components import STILL_TIME
-from pfsc_drake.control.compliance.tool_load import ToolCompensationParameters
+from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.following.options.compliance import ObservedForceParameters
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters

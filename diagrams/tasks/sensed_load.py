@@ -9,7 +9,8 @@ from pfsc_drake.control.compliance.carried_inertia import (
     carried_share,
     load_inertia,
 )
-from pfsc_drake.control.compliance.tool_load import TARING_BLOCK, ToolLoad
+from pfsc_drake.control.compliance.taring import TARING_BLOCK
+from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.manifold import Kind

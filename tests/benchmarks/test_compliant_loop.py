@@ -25,7 +25,7 @@ OUTPUTS = [
     ("reference_generator", "reference"),
     ("following_controller", "law"),
     ("force_torque_sensor", "measured_wrench"),
-    ("tool_compensation", "compensation"),
+    ("tool_compensation", "wrench"),
     ("manifold_force_transform", "manifold_force"),
     ("impedance_filter", "reference"),
     ("operator", "wrench"),

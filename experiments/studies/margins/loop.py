@@ -19,8 +19,6 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.margins.modes import in_loop
 from pfsc_drake.physics.bus_delay import BusDelay
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.can_fail import FailingSystem
-from pfsc_drake.systems.control.tool_compensation import ToolCompensation
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 Kind = TypeVar("Kind", bound=LeafSystem)
@@ -30,6 +28,7 @@ Kind = TypeVar("Kind", bound=LeafSystem)
 _SCHEME, _MOST_STEPS = "runge_kutta5", 100
 # times its stiffness, up to which a surface that is touched is looked at
 STIFFEST = 64.0
+_SENSOR = "tool_compensation"
 
 
 class StationLoop:
@@ -54,10 +53,9 @@ class StationLoop:
         self.station: Station = build_station(settings, folder, task=task, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
         self.spring = _only(diagram, SurfaceSpring)
-        self._sensor = _only(diagram, ToolCompensation)
+        self._has_sensor = settings.needs_sensor
         self._step = self._accurate_step()
         self.map = OnePeriodMap(diagram, period, self.configure)
-        self._can_fail = [s for s in diagram.GetSystems() if isinstance(s, FailingSystem)]
         self.drives, self.drives_are_servos = self._find_drives()
 
     def configure(self, simulator: Simulator) -> None:
@@ -76,7 +74,6 @@ class StationLoop:
         """
         accesses = [self.station.controller, self.station.servo]
         faults = [a.fault(self.station.blocks, root) for a in accesses if a is not None]
-        faults += [s.fault(s.GetMyContextFromRoot(root)) for s in self._can_fail]
         return any(fault is not Fault.NONE for fault in faults)
 
     def external_load(self, section: Context) -> np.ndarray | None:
@@ -88,10 +85,14 @@ class StationLoop:
         Returns:
             In the sensor's frame; None without a sensor, or as long as it is not tared.
         """
-        if self._sensor is None:
+        if not self._has_sensor:
             return None
         self.map.approach(section)
-        return self._sensor.external_load(self._sensor.GetMyContextFromRoot(self.map.context))
+        blocks, root = self.station.blocks, self.map.context
+        if not blocks.output(root, f"{_SENSOR}.tared"):
+            return None
+        bias = blocks.state(root, f"{_SENSOR}.bias")
+        return blocks.output(root, f"{_SENSOR}.residual") - bias
 
     def tare(self, section: Context, load: np.ndarray) -> None:
         """Tare the force sensor at a section, as if nothing but a known load acted on the tool.
@@ -103,10 +104,11 @@ class StationLoop:
             section: Context right after a tick, whose sensor is tared.
             load: See :meth:`external_load`.
         """
-        assert self._sensor is not None
         self.map.approach(section)
-        reading = self._sensor.GetMyContextFromRoot(self.map.context)
-        self._sensor.tare_at(self._sensor.GetMyMutableContextFromRoot(section), reading, load)
+        blocks = self.station.blocks
+        residual = blocks.output(self.map.context, f"{_SENSOR}.residual")
+        blocks.set_state(section, f"{_SENSOR}.bias", residual - load)
+        blocks.set_state(section, f"{_SENSOR}.tared", np.ones(1))
 
     def needs_taring(self, section: Context) -> bool:
         """Return whether there is a force sensor that is not tared.
@@ -114,7 +116,7 @@ class StationLoop:
         Args:
             section: Context right after a tick.
         """
-        return self._sensor is not None and self.external_load(section) is None
+        return self._has_sensor and self.external_load(section) is None
 
     def hang(self, section: Context, joint: str, mass: float) -> None:
         """Let more hang below the force sensor than anybody knows of, at a section.

@@ -6,7 +6,7 @@ import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.cases import first_of
-from pfsc_drake.control.compliance.tool_load import SensorFault
+from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.control.law.fault import Fault
 
 
@@ -15,8 +15,8 @@ class Alarms(Block):
 
     Ports:
         alarms (input, optional): A
-            :class:`~pfsc_drake.control.compliance.tool_load.SensorFault`, whether the sensor is
-            tared, before which its range does not matter, an
+            :class:`~pfsc_drake.control.compliance.tool_compensation.SensorFault`, whether the
+            sensor is tared, before which its range does not matter, an
             :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`, and whether the
             force with which the robot presses is lost, shape (4,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).

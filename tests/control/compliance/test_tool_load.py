@@ -1,4 +1,4 @@
-"""Load of the tool, its compensation, taring and the filter, against Drake and closed forms."""
+"""Load of the tool, its compensation and the filter, against Drake and closed forms."""
 
 import casadi as ca
 import numpy as np
@@ -9,18 +9,13 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces, SpatialInertia
 
-from pfsc_drake.control.compliance.tool_load import (
-    Taring,
-    ToolCompensationParameters,
-    compensation_function,
-    dead_band,
-    joint_torque_function,
-)
+from pfsc_drake.control.compliance.tool_compensation import compensation_function
+from pfsc_drake.control.compliance.tool_load import dead_band, joint_torque_function
 from pfsc_drake.control.estimation.low_pass import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.control.tool_compensation import tool_load_from_plant
+from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 
 PERIOD = 1e-3
 
@@ -210,68 +205,3 @@ def test_low_pass_rests_on_a_sample():
 def test_bandwidth_out_of_range(bandwidth):
     with pytest.raises(InputError, match=r"bandwidth = .* below half the sampling rate, 500 Hz"):
         LowPass(bandwidth, PERIOD)
-
-
-def test_taring_takes_the_mean_of_a_quiet_stretch_after_a_restless_one():
-    taring = Taring(4, np.full(6, 1.0), np.full(6, 10.0))
-    window = taring.empty()
-    for value in (0.0, 0.5, 3.7):
-        window = taring.extend(window, np.full(6, value))
-        assert taring.bias(window) is None
-    for value in (2.0, 2.2, 2.4, 2.6):
-        assert taring.bias(window) is None
-        window = taring.extend(window, np.full(6, value))
-    assert taring.bias(window) == pytest.approx(np.full(6, 2.3))
-
-
-def test_what_fades_in_the_first_block_is_no_bias():
-    """A transient that one block's mean hardly shows."""
-    taring = Taring(20, np.full(6, 1.0), np.full(6, 10.0), block=10)
-    window = taring.empty()
-    for k in range(20):
-        assert taring.bias(window) is None
-        window = taring.extend(window, np.full(6, 2.0 + 5.0 * 0.3**k))
-    assert taring.bias(window) == pytest.approx(np.full(6, 2.0), abs=1e-4)
-
-
-def test_strokes_of_a_sample_do_not_keep_a_sensor_from_being_tared():
-    """What lasts does, though each sample differs from the next by less."""
-    taring = Taring(48, np.full(6, 1.0), np.full(6, 10.0), block=10)
-
-    def tared(values):
-        window = taring.empty()
-        for value in values:
-            window = taring.extend(window, np.full(6, value))
-            if taring.bias(window) is not None:
-                return taring.bias(window)
-        return None
-
-    strokes = 2.0 + np.resize([4.0, -4.0, 0.0, 0.0, 0.0], 50)
-    assert tared(strokes) == pytest.approx(np.full(6, 2.0))
-    assert tared(strokes[:49]) is None  # blocks are whole
-    assert tared(strokes + 0.05 * np.arange(50)) is None
-
-
-def test_a_bias_that_is_too_large_is_not_believed():
-    taring = Taring(1, np.full(6, 1.0), np.full(6, 10.0))
-    window = taring.extend(taring.empty(), np.array([0, 0, 10.1, 0, 0, 0]))
-    assert np.isnan(taring.bias(window)).all()
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("inertia", "full"),
-        ("bandwidth", 0.0),
-        ("taring_time", -1.0),
-        ("force_dead_band", -1.0),
-        ("torque_dead_band", np.inf),
-        ("taring_spread", np.ones(3)),
-        ("taring_bias", np.zeros(6)),
-        ("noise", np.full(6, -0.1)),
-        ("noise", np.array([0.1, 0.1, 0.1, 0.0, 0.0, np.inf])),
-    ],
-)
-def test_parameters_out_of_range(key, value):
-    with pytest.raises(InputError, match=f"^{key} = .*: must be "):
-        ToolCompensationParameters(**{key: value})

@@ -9,7 +9,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain, ZeroOrderHold
 
-from pfsc_drake.control.compliance.tool_load import SensorFault, ToolCompensationParameters
+from pfsc_drake.control.compliance.tool_compensation import (
+    SensorFault,
+    ToolCompensation,
+    ToolCompensationParameters,
+)
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
@@ -18,15 +22,14 @@ from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.tool_compensation import ToolCompensation, tool_load_from_plant
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.external_wrench import ExternalWrench
 from pfsc_drake.systems.plants.joint_reaction import JointReaction, reaction_index
+from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 
 PERIOD = 1e-3
 MODELS = ["comau_racer_1_4", "comau_racer_1_4_elastic"]
 REST = np.array([0.2, 1.4, -0.5, 0.3, 1.0, -0.4])
-RESTING = np.concatenate([REST, np.zeros(6), REST, np.zeros(6)])
 START = 0.1
 TARED = slice(100, None)
 RANGE = np.repeat([500.0, 20.0], 3)
@@ -59,19 +62,6 @@ class Mover(LeafSystem):
         output.SetFromVector(tau + self._D_M * (60.0**2 * (q - q_M) + 60.0 * (v - v_M)))
 
 
-class Prescribed(LeafSystem):
-    """A vector over time."""
-
-    def __init__(self, size, function):
-        super().__init__()
-        self.DeclareVectorOutputPort(
-            "value",
-            size,
-            lambda context, output: output.SetFromVector(function(context.get_time())),
-            prerequisites_of_calc={self.time_ticket()},
-        )
-
-
 def load_plant(model):
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(resolve_model(model)))
@@ -95,15 +85,14 @@ def run(
     ft = builder.AddSystem(BlockSystem(ForceTorqueSensor(sensor, PERIOD), PERIOD))
     noise = builder.AddSystem(SensorNoise(sensor.noise, sensor.seed, PERIOD))
     joint = builder.AddSystem(JointReaction(reaction_index(plant, weld)))
-    tool_compensation = builder.AddSystem(
-        ToolCompensation(
-            chain,
-            tool_load_from_plant(plant, weld, tool),
-            sensor.measurement_range,
-            compensation,
-            PERIOD,
-        )
+    block = ToolCompensation(
+        chain,
+        tool_load_from_plant(plant, weld, tool),
+        sensor.measurement_range,
+        compensation,
+        PERIOD,
     )
+    tool_compensation = builder.AddSystem(BlockSystem(block, PERIOD))
     force = ScriptedForce(ForceProfile(pulses), PathManifold(2, oriented=False), PERIOD)
     script = builder.AddSystem(BlockSystem(force, PERIOD))
     external = builder.AddSystem(ExternalWrench(tool, chain))
@@ -132,9 +121,8 @@ def run(
         )
     ports = {
         "raw": ft.GetOutputPort("measured_wrench"),
-        "compensation": tool_compensation.GetOutputPort("compensation"),
         "applied": script.GetOutputPort("wrench"),
-        **{key: tool_compensation.GetOutputPort(key) for key in ("wrench", "tared")},
+        **{key: tool_compensation.GetOutputPort(key) for key in ("wrench", "tared", "fault")},
     }
     logs = {name: LogVectorOutput(port, builder, PERIOD) for name, port in ports.items()}
     simulator = Simulator(builder.Build())
@@ -228,7 +216,7 @@ def test_a_saturated_or_loaded_sensor_is_not_tared(bias, fault):
     signals = run("comau_racer_1_4", sensor=sensor, duration=0.2)
     assert not np.any(signals["tared"])
     assert not np.any(signals["wrench"])
-    assert np.all(signals["compensation"][:, 7] == fault)
+    assert np.all(signals["fault"] == fault)
 
 
 def test_a_sensor_at_the_end_of_its_range_is_not_tared_though_its_reading_is_steady():
@@ -242,81 +230,3 @@ def test_a_sensor_at_the_end_of_its_range_is_not_tared_though_its_reading_is_ste
     assert ToolCompensationParameters().taring_bias[0] > 40.0
     assert not np.any(signals["tared"])
     assert not np.any(signals["wrench"])
-
-
-class Alone:
-    """The compensation of a resting robot with a prescribed measurement."""
-
-    def __init__(self, measured, parameters=None, state=None):
-        plant = load_plant("comau_racer_1_4")
-        tool = plant.GetFrameByName("tool_point")
-        chain, _ = chain_from_plant(plant, tool)
-        load = tool_load_from_plant(plant, plant.GetJointByName("weld_tool"), tool)
-        parameters = parameters or ToolCompensationParameters(taring_time=0.01)
-        builder = DiagramBuilder()
-        self.system = builder.AddSystem(ToolCompensation(chain, load, RANGE, parameters, PERIOD))
-        for port, size, function in (
-            ("measured_wrench", 6, measured),
-            ("joint_state", 24, state or (lambda t: RESTING)),
-        ):
-            source = builder.AddSystem(Prescribed(size, function))
-            builder.Connect(source.get_output_port(), self.system.GetInputPort(port))
-        self.log = LogVectorOutput(self.system.GetOutputPort("compensation"), builder, PERIOD)
-        self.simulator = Simulator(builder.Build())
-        self.context = self.system.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
-
-    def data(self, until):
-        self.simulator.AdvanceTo(until)
-        return self.log.FindLog(self.simulator.get_context()).data().T
-
-
-def test_a_sensor_that_fails_gives_zero_and_a_fault_until_it_is_tared_again():
-    def measured(t):
-        value = np.array([0.0, 0.0, -14.0 + 30.0 * (t > 0.02), 0.0, 0.0, 0.0])
-        return value if not 0.0295 < t < 0.0305 else np.append(value[:5], np.nan)
-
-    alone = Alone(measured)
-    data = alone.data(0.05)
-    assert np.linalg.norm(data[25, :3]) == pytest.approx(30.0)
-    assert np.all(data[30:, 7] == SensorFault.LOST)
-    assert not np.any(data[30:, :6])
-    assert np.all(np.isfinite(data)) and data[29, 7] == SensorFault.NONE
-    alone.system.tare(alone.context)
-    data = alone.data(0.08)
-    assert not np.any(data[52:59, :8])
-    assert data[-1, 6] == 1.0 and data[-1, 7] == SensorFault.NONE
-    assert np.linalg.norm(data[-1, :6]) < 1e-9
-
-
-def test_a_joint_state_that_is_not_finite_is_a_fault_too():
-    def state(t):
-        return np.where((np.arange(24) == 2) & (t > 0.0205), np.nan, RESTING)
-
-    data = Alone(lambda t: np.zeros(6), state=state).data(0.03)
-    assert np.all(data[21:, 7] == SensorFault.LOST)
-    assert not np.any(data[21:, :6])
-
-
-def test_saturation_while_working_is_reported_as_long_as_it_lasts():
-    def measured(t):
-        return np.array([510.0 if 0.0195 < t < 0.0245 else 0.0, 0, 0, 0, 0, 0])
-
-    data = Alone(measured).data(0.04)
-    assert np.array_equal(
-        data[:, 7] == SensorFault.SATURATED, np.isin(np.arange(41), range(20, 25))
-    )
-    assert np.linalg.norm(data[22, :3]) == pytest.approx(510.0)
-
-
-def test_dead_bands_swallow_what_is_small():
-    def measured(t):
-        return np.array([3.0, 0, 0, 0, 0, 0]) * (1.0 + 3.0 * (t > 0.0305)) * (t > 0.0205)
-
-    parameters = ToolCompensationParameters(
-        taring_time=0.01, force_dead_band=4.0, torque_dead_band=0.5
-    )
-    data = Alone(measured, parameters).data(0.04)
-    assert not np.any(data[:31, :6])
-    assert np.linalg.norm(data[35, :3]) == pytest.approx(8.0)
-    # 12 N at a lever of 0.12 m
-    assert np.linalg.norm(data[35, 3:6]) == pytest.approx(0.94)

@@ -1,0 +1,97 @@
+"""The bias of a force/torque sensor, found while nothing pushes on it."""
+
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Values
+from pfsc_drake.control.cases import all_of, any_of, where
+
+# s, over whose means a sensor is judged to be quiet
+TARING_BLOCK = 0.01
+
+
+class Taring:
+    """The sensor's bias as the mean of a quiet stretch of residuals.
+
+    Quiet is judged by means over blocks of samples. Noise does not matter then, and neither do the
+    strokes of drives that creep against their friction: an arm that holds a load which nobody
+    told it of does so for seconds, at rest but for the last increments of its encoders, and what
+    the tool's inertia is believed to do at every one of them is a spike of a sample or two. What
+    pushes or moves the tool lasts longer than a block. The first block is judged, but does not
+    count for the bias: what came before it, a start for instance, may still fade in it.
+
+    What is remembered of a stretch (:attr:`states`) is the number of its samples, their sum, the
+    lowest and the highest mean of a block, and the sum of the block that is not full; all zero is
+    the empty one. It starts anew, with the last block, whenever the means differ too much, so that
+    taring goes on until it is quiet.
+
+    Args:
+        samples: Number of samples in a stretch.
+        largest_spread: Largest difference of means in it, shape (6,) [N, Nm].
+        largest_bias: Largest mean that is believed, shape (6,) [N, Nm].
+        block: Number of samples in a block; a stretch is made of whole ones.
+    """
+
+    states: ClassVar = MappingProxyType(
+        {
+            "taring_count": 1,
+            "taring_sum": 6,
+            "taring_lowest": 6,
+            "taring_highest": 6,
+            "taring_block": 6,
+        }
+    )
+
+    def __init__(
+        self,
+        samples: int,
+        largest_spread: np.ndarray,
+        largest_bias: np.ndarray,
+        block: int = 1,
+    ) -> None:
+        self._block = min(block, samples)
+        self._samples = -(-samples // self._block) * self._block
+        self._only_judged = self._block if 1 < self._block < self._samples else 0
+        self._largest_spread = ca.DM(np.asarray(largest_spread, dtype=float))
+        self._largest_bias = ca.DM(np.asarray(largest_bias, dtype=float))
+
+    def extended(self, x: Values, residual: Any) -> Values:
+        """Return a stretch with one more residual; only its last block if that differs.
+
+        Args:
+            x: The stretch.
+            residual: Shape (6,) [N, Nm].
+        """
+        count, block = x.taring_count + 1.0, x.taring_block + residual
+        total = where(x.taring_count >= self._only_judged, x.taring_sum + residual, x.taring_sum)
+        mean, is_first = block / self._block, count <= self._block
+        lowest = where(is_first, mean, ca.fmin(x.taring_lowest, mean))
+        highest = where(is_first, mean, ca.fmax(x.taring_highest, mean))
+        is_full = ca.fmod(count, self._block) == 0.0
+        differs = all_of(is_full, any_of(highest - lowest > self._largest_spread))
+        anew = ca.DM.zeros(6) if self._only_judged else block
+        return Values(
+            taring_count=where(differs, self._block, count),
+            taring_sum=where(differs, anew, total),
+            taring_lowest=where(is_full, where(differs, mean, lowest), x.taring_lowest),
+            taring_highest=where(is_full, where(differs, mean, highest), x.taring_highest),
+            taring_block=where(is_full, 0.0, block),
+        )
+
+    def bias(self, x: Values) -> tuple[Any, Any, Any]:
+        """Return the bias, whether the stretch is long enough, and whether it is believed.
+
+        Args:
+            x: The stretch.
+
+        Returns:
+            The mean, shape (6,) [N, Nm], and two conditions, shape (1,): where the first does not
+            hold, the others mean nothing; where the second does not, the stretch is to be thrown
+            away.
+        """
+        mean = x.taring_sum / (x.taring_count - self._only_judged)
+        is_believed = all_of(ca.fabs(mean) <= self._largest_bias)
+        return mean, x.taring_count >= self._samples, is_believed

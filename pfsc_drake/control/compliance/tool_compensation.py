@@ -1,0 +1,281 @@
+"""Taking weight and inertia of the tool off a force/torque measurement, and taring it."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.control.compliance.still_components import (
+    STILL_TIME,
+    memory_size,
+    stands_still,
+)
+from pfsc_drake.control.compliance.taring import TARING_BLOCK, Taring
+from pfsc_drake.control.compliance.tool_load import ToolLoad, dead_band, predicted_load
+from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.errors import InputError
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.robot_model import RobotModel
+
+_INERTIA = ("none", "differentiated", "given")
+
+
+class SensorFault(IntEnum):
+    """Why a compensated wrench is not to be trusted."""
+
+    NONE = 0
+    LOST = 1  # no finite number, or a component that stands still
+    SATURATED = 2
+
+
+@dataclass
+class ToolCompensationParameters:
+    """How the tool's load is taken off a measurement.
+
+    Attributes:
+        inertia: ``differentiated``: inertial load from filtered differences of the joint
+            velocities; ``given``: from accelerations that another component knows;
+            ``none``: only the weight.
+        bandwidth: Of the filter for the joints' motion [Hz]; that of the sensor.
+        taring_time: Length of the window whose mean becomes the bias [s].
+        taring_spread: Largest difference of means over 10 ms within the window, shape (6,)
+            [N, Nm].
+        taring_bias: Largest bias that is believed, shape (6,) [N, Nm]; a hand that rests
+            on the tool, or another tool, must not become a bias.
+        force_dead_band: [N].
+        torque_dead_band: [Nm].
+        noise: Standard deviation of a sample as it is believed, shape (6,) [N, Nm]: a sensor that
+            has some and repeats itself to the last bit is lost. 0 where steps are larger.
+    """
+
+    inertia: str = "differentiated"
+    bandwidth: float = 200.0
+    taring_time: float = 0.05
+    taring_spread: np.ndarray = field(default_factory=lambda: np.repeat([1.0, 0.05], 3))
+    taring_bias: np.ndarray = field(default_factory=lambda: np.repeat([50.0, 2.0], 3))
+    force_dead_band: float = 0.0
+    torque_dead_band: float = 0.0
+    noise: np.ndarray = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        if self.inertia not in _INERTIA:
+            raise InputError(f"inertia = {self.inertia!r}: must be one of {', '.join(_INERTIA)}")
+        for key in ("bandwidth", "taring_time"):
+            _require_sign(key, getattr(self, key), zero_allowed=False)
+        for key in ("force_dead_band", "torque_dead_band"):
+            _require_sign(key, getattr(self, key), zero_allowed=True)
+        for key in ("taring_spread", "taring_bias"):
+            value = np.asarray(getattr(self, key), dtype=float)
+            if value.shape != (6,) or not np.all(value > 0.0):
+                raise InputError(f"{key} = {value.tolist()}: must be 6 positive numbers")
+        noise = np.asarray(self.noise, dtype=float)
+        if noise.shape != (6,) or not np.all((noise >= 0.0) & np.isfinite(noise)):
+            raise InputError(f"noise = {noise.tolist()}: must be 6 numbers, zero or positive")
+
+
+def _require_sign(key: str, value: float, *, zero_allowed: bool) -> None:
+    if not (np.isfinite(value) and (value > 0.0 or (zero_allowed and value == 0.0))):
+        allowed = "zero or positive" if zero_allowed else "positive"
+        raise InputError(f"{key} = {value}: must be {allowed} and finite")
+
+
+def compensation_function(
+    robot: RobotModel,
+    load: ToolLoad,
+    low_pass: LowPass,
+    inertia: str = "differentiated",
+    dead_bands: tuple[float, float] = (0.0, 0.0),
+) -> ca.Function:
+    """Return the function from a measurement to the external wrench at the tool point.
+
+    ``r = measured - predicted``; with ``[f, tau] = r - bias`` the external wrench is
+    ``R_WS f`` and ``R_WS (tau - p_ST x f)``, both shortened by a dead band. The motion goes
+    through the low-pass, so that load and measurement are of the same age.
+
+    Args:
+        robot: The robot.
+        load: The tool.
+        low_pass: Filter of the joints' motion.
+        inertia: See :class:`ToolCompensationParameters`.
+        dead_bands: Widths for force [N] and torque [Nm].
+
+    Returns:
+        ``(motion, state, known, measured, bias) -> (wrench at the tool point in W, residual
+        r in S, next state)``. ``motion`` is ``[q, v]``, shape (2N,), with given inertia
+        ``[q, v, a]``; ``state`` that of the filter, which rests on the motion if not
+        ``known``: as long as ``motion``, and N longer for rigid joints with
+        differentiated inertia.
+    """
+    n = robot.dimension
+    size = 3 * n if inertia == "given" else 2 * n
+    differentiated = inertia == "differentiated"
+    # rigid joints accelerate in steps, as the drives are held, and their acceleration is the
+    # difference of the velocity over the last interval; the trapezoidal rule would ring
+    stepwise = differentiated and not robot.is_elastic
+    memory = ca.SX.sym("state", size + n * stepwise)
+    motion, known = ca.SX.sym("motion", size), ca.SX.sym("known")
+    measured, bias = ca.SX.sym("measured", 6), ca.SX.sym("bias", 6)
+    state = ca.if_else(known, memory[:size], low_pass.rest(motion))
+    q, v, a = ca.vertsplit(ca.vertcat(low_pass.output(state, motion), ca.SX(3 * n - size, 1)), n)
+    next_state = low_pass.update(state, motion)
+    if differentiated:
+        a = low_pass.derivative(state[n:], motion[n:])
+        if stepwise:
+            # the mean of two trapezoidal derivatives is the filtered difference
+            next_state = ca.vertcat(next_state, a)
+            a = (a + ca.if_else(known, memory[size:], 0.0)) / 2.0
+    elif inertia == "none":
+        v = ca.SX(n, 1)
+    joints = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(n)]
+    predicted, R_WS = predicted_load(robot, load, joints)
+    residual = measured - predicted
+    external = residual - bias
+    force = R_WS @ external[:3]
+    torque = R_WS @ (external[3:] - ca.cross(ca.SX(load.p_ST), external[:3]))
+    wrench = ca.vertcat(dead_band(force, dead_bands[0]), dead_band(torque, dead_bands[1]))
+    results = [wrench, residual, next_state]
+    return ca.Function(
+        "tool_compensation",
+        [motion, memory, known, measured, bias],
+        ca.cse([ca.densify(result) for result in results]),
+        ["motion", "state", "known", "measured", "bias"],
+        ["wrench", "residual", "next_state"],
+    )
+
+
+class ToolCompensation(Block):
+    """Estimates what the environment applies to the tool.
+
+    With the load r = measured - predicted that the tool alone does not explain (see
+    :func:`compensation_function`), the output is ``r - b`` as a wrench at the tool point
+    in world axes: what is applied **to** the robot. The bias b is the mean of r over the
+    first quiet stretch (see :class:`Taring`). Until there is one the output is exactly
+    zero, so that an untared sensor moves nothing; a sensor that saturates or moves is
+    not tared, and taring goes on. A constant force that acts while taring is taken for
+    bias, as with any such sensor.
+
+    The joints' motion goes through the same filter as the sensor's signal, so that load
+    and measurement are of the same age.
+
+    A measurement or joint state that is not finite, or a component of the measurement that
+    stands still while others move (see :func:`stands_still`), makes the output zero, and a fault
+    that only a new initialization clears. A saturated sensor is reported while it lasts; its
+    output is the clipped one.
+
+    Ports:
+        measured_wrench (input): ``[force, torque]`` in the sensor frame, shape (6,) [N, Nm].
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        joint_acceleration (input): ``q_J''``, shape (N,); only with inertia ``given``. It
+            must not depend on this block's output in the same tick.
+        wrench (output): ``[force, torque]`` at the tool point, world axes, shape (6,) [N, Nm].
+        tared (output): 1 once the bias is known, else 0; no direct feedthrough.
+        fault (output): A :class:`SensorFault`.
+        residual (output): r, in the sensor frame, zero while the sensor is lost, shape (6,)
+            [N, Nm].
+
+    State:
+        The ``bias``, shape (6,); whether it is ``tared``; the ``fault`` that stays, LOST or none;
+        the stretch of taring (``taring_..``); the ``filter`` of the joints' motion, shape (2N,) or
+        (3N,), which rests on the first motion as long as it is not ``known``; and what is
+        ``watched`` of the measurement, shape (18,).
+
+    Args:
+        robot: The robot with the tool.
+        load: Everything behind the sensor.
+        measurement_range: Of the sensor, shape (6,) [N, Nm].
+        parameters: How to compensate.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If the bandwidth does not suit the period.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        load: ToolLoad,
+        measurement_range: np.ndarray,
+        parameters: ToolCompensationParameters,
+        period: float,
+    ) -> None:
+        n = robot.dimension
+        self._function = compensation_function(
+            robot,
+            load,
+            LowPass(parameters.bandwidth, period),
+            parameters.inertia,
+            (parameters.force_dead_band, parameters.torque_dead_band),
+        )
+        self._taring = Taring(
+            max(1, round(parameters.taring_time / period)),
+            parameters.taring_spread,
+            parameters.taring_bias,
+            max(1, round(TARING_BLOCK / period)),
+        )
+        self._still_samples = max(10, round(STILL_TIME / period))
+        self._is_noisy = np.asarray(parameters.noise) > 0.0
+        self._range = ca.DM(np.asarray(measurement_range, dtype=float))
+        self._measured_motion = 2 * n
+        self.inputs = {"measured_wrench": Port(6, "N, Nm"), "joint_state": Port(4 * n)}
+        if parameters.inertia == "given":
+            self.inputs["joint_acceleration"] = Port(n)
+        self.outputs = {
+            "wrench": Port(6, "N, Nm"),
+            "tared": Port(1),
+            "fault": Port(1),
+            "residual": Port(6, "N, Nm"),
+        }
+        remembered = {"filter": self._function.numel_in("state"), "watched": memory_size(6)}
+        self.inner = {f"next_{name}": size for name, size in remembered.items()}
+        self.states = {"bias": 6, "tared": 1, "fault": 1, "known": 1} | remembered
+        self.states |= Taring.states
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        measured, motion = u.measured_wrench, u.joint_state[: self._measured_motion]
+        if "joint_acceleration" in self.inputs:
+            motion = ca.vertcat(motion, u.joint_acceleration)
+        at_range = ca.fabs(measured) >= self._range
+        still, watched = stands_still(
+            measured, x.watched, at_range, self._still_samples, self._is_noisy
+        )
+        wrench, residual, filtered = self._function(motion, x.filter, x.known, measured, x.bias)
+        good = all_of(
+            all_finite(wrench, residual, filtered), x.fault != SensorFault.LOST, ca.logic_not(still)
+        )
+        return {
+            "wrench": where(all_of(good, x.tared), wrench, 0.0),
+            "tared": x.tared,
+            "fault": first_of(
+                (ca.logic_not(good), SensorFault.LOST),
+                (any_of(at_range), SensorFault.SATURATED),
+                otherwise=SensorFault.NONE,
+            ),
+            "residual": where(good, residual, 0.0),
+            "next_filter": where(good, filtered, x.filter),
+            "next_watched": where(good, watched, x.watched),
+        }
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        lost = y.fault == SensorFault.LOST
+        stretch = self._taring.extended(x, y.residual)
+        bias, is_long, is_believed = self._taring.bias(stretch)
+        is_quiet, tares = y.fault == SensorFault.NONE, ca.logic_not(ca.logic_or(lost, x.tared))
+        found = all_of(tares, is_quiet, is_long, is_believed)
+        goes_on = ca.logic_and(is_quiet, ca.logic_not(is_long))
+        return {
+            "bias": where(found, bias, x.bias),
+            "tared": ca.logic_or(x.tared, found),
+            "fault": where(lost, SensorFault.LOST, x.fault),
+            "known": ca.logic_or(x.known, ca.logic_not(lost)),
+            "filter": y.next_filter,
+            "watched": y.next_watched,
+        } | {
+            name: where(tares, where(goes_on, getattr(stretch, name), 0.0), getattr(x, name))
+            for name in Taring.states
+        }
