@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from pfsc_drake.compiled.code import Code, Tables
 from pfsc_drake.compiled.operations import COMPARISONS, declarations, operation
 
@@ -11,6 +13,8 @@ __all__ = ["Assembly"]
 # A block's constants are kept for it as a whole: long ones are translated twice as slowly, into
 # code that takes half as long again.
 _BLOCK = 200
+
+_BYTES = np.array([f"\\{byte:02X}" for byte in range(256)], dtype="S3")
 
 _HELPERS = """\
 define internal i64 @index(double %x) nounwind alwaysinline {
@@ -154,9 +158,9 @@ class Assembly(Code):
             [*texts, "define void @evaluate(ptr %table) nounwind {", *entry, "ret void", "}"]
         )
         constants = [
-            f"@{table} = internal constant [{len(values)} x double] "
-            f"[{', '.join(f'double {value}' for value in values)}], align 8"
-            for values, table in tables.names.items()
+            f"@{table} = internal constant [{len(content)} x i8] "
+            f'c"{_written_out(content)}", align 8'
+            for content, table in tables.names.items()
         ]
         return "\n".join([declarations(text), *constants, _helpers(text), text])
 
@@ -273,6 +277,11 @@ class Assembly(Code):
 
     def _called(self, name: str, pointers: Sequence[str]) -> str:
         return f"call void @{name}({', '.join(f'ptr {_operand(p)}' for p in pointers)})"
+
+
+def _written_out(content: bytes) -> str:
+    # numbers one by one take LLVM ten times as long
+    return _BYTES[np.frombuffer(content, np.uint8)].tobytes().decode()
 
 
 def _function(name: str, parameters: Sequence[str], lines: Sequence[str]) -> str:

@@ -4,8 +4,10 @@ import re
 from collections.abc import Mapping
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake.compiled.c_code import CCode, helpers, table_text
+from pfsc_drake.compiled.code import Table
 from pfsc_drake.compiled.translation import Translation
 
 __all__ = ["c_source", "parameters"]
@@ -59,8 +61,8 @@ def c_source(functions: Mapping[str, ca.Function], prefix: str) -> dict[str, str
         definitions.append(f"{declared}\n{{\n    {inner}({', '.join(given)});\n}}\n")
     guard = f"{prefix}_h".upper()
     tables = [
-        table_text(name, [str(value) for value in values])
-        for values, name in translation.tables.names.items()
+        table_text(name, [str(value) for value in Table(np.frombuffer(content))])
+        for content, name in translation.tables.names.items()
     ]
     text = "\n".join([*translation.texts, *definitions])
     return {

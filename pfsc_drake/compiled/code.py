@@ -1,15 +1,15 @@
 """Straight code of one function, in whatever language: numbers by name, memory where it must be."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import ClassVar, overload
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, Untranslatable, literal
 
-__all__ = ["Code", "Tables", "Value", "Values", "elements", "literals"]
+__all__ = ["Code", "Table", "Tables", "Value", "Values", "elements"]
 
 Value = str | tuple[str, int]
 """A number: its name, its literal, or pointer and element where it still is in memory.
@@ -18,25 +18,52 @@ Memory that is named so does not change any more. Names of numbers begin with v,
 which stand for 1.0 and 0.0, with c, of whole numbers with i.
 """
 
-Values = list[Value]
+Values = Sequence[Value]
 _ZERO = literal(0.0)
 
 
-class Table(list[Value]):
-    """Literals, perhaps very many."""
+class Table(Sequence[Value]):
+    """Literals, perhaps very many: they are written when they are asked for.
+
+    Args:
+        numbers: What they stand for, shape (n,).
+
+    Attributes:
+        content: The numbers as they are in memory; of NaN there is one kind.
+    """
+
+    def __init__(self, numbers: np.ndarray) -> None:
+        numbers = np.asarray(numbers, dtype=float)
+        self._numbers = np.where(np.isnan(numbers), np.nan, numbers)
+        self.content = self._numbers.tobytes()
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, place: int) -> Value: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> Values: ...
+
+    def __getitem__(self, place: int | slice) -> Value | Values:
+        if isinstance(place, slice):
+            return Table(self._numbers[place])
+        return literal(self._numbers[place])
+
+    def __iter__(self) -> Iterator[Value]:
+        return map(literal, self._numbers.tolist())
 
 
 class Tables:
     """Constants that functions share, each content once.
 
     Attributes:
-        names: Their pointers by content.
+        names: Their pointers by content, which is doubles as they are in memory.
     """
 
     def __init__(self) -> None:
-        self.names: dict[tuple[Value, ...], str] = {}
-        # to look at 100,000 numbers again takes long
-        self._seen: dict[int, tuple[Table, str]] = {}
+        self.names: dict[bytes, str] = {}
 
     def pointer(self, values: Sequence[Value]) -> str:
         """Return the pointer to a table.
@@ -44,14 +71,10 @@ class Tables:
         Args:
             values: Literals.
         """
-        if id(values) in self._seen:
-            return self._seen[id(values)][1]
-        key = tuple(values)
-        if key not in self.names:
-            self.names[key] = f"table{len(self.names)}"
-        if isinstance(values, Table):
-            self._seen[id(values)] = values, self.names[key]
-        return self.names[key]
+        if not isinstance(values, Table):
+            bits = np.array([int(str(value), 16) for value in values], dtype=np.uint64)
+            values = Table(bits.view(np.float64))
+        return self.names.setdefault(values.content, f"table{len(self.names)}")
 
 
 class Code(ABC):
@@ -269,11 +292,6 @@ class Code(ABC):
 
     @abstractmethod
     def _called(self, name: str, pointers: Sequence[str]) -> str: ...
-
-
-def literals(values: np.ndarray) -> Table:
-    """Return constants, shape (n,)."""
-    return Table(map(literal, values.tolist()))
 
 
 def elements(pointer: str, size: int, first: int = 0) -> Values:

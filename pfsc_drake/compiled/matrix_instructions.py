@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.code import Code, Value, Values, literals
+from pfsc_drake.compiled.code import Code, Table, Value, Values
 from pfsc_drake.compiled.computed_indices import get_computed, indices, set_computed
 from pfsc_drake.compiled.operations import Untranslatable, is_known, literal, operation_name
 
@@ -49,12 +49,12 @@ def _elementwise(code: Code, operation: int, operands: Sequence[Values]) -> Valu
     size = max(len(values) for values in operands)
     if any(len(values) not in (1, size) for values in operands):
         raise Untranslatable(f"sizes of {operation_name(operation)}")
-    spread = [values * size if len(values) == 1 else values for values in operands]
+    spread = [[*values] * size if len(values) == 1 else values for values in operands]
     return [code.apply(operation, *values) for values in zip(*spread, strict=True)]
 
 
 def _constant(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return literals(np.array(node.to_DM().nonzeros(), dtype=float))
+    return Table(np.array(node.to_DM().nonzeros()))
 
 
 def _same(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
@@ -71,11 +71,11 @@ def _split(node: ca.MX, values: Values) -> list[Values]:
 
 
 def _repeated(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return operands[0] * (node.nnz() // max(len(operands[0]), 1))
+    return [*operands[0]] * (node.nnz() // max(len(operands[0]), 1))
 
 
 def _summed(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    result: Values = [literal(0.0)] * node.nnz()
+    result: list[Value] = [literal(0.0)] * node.nnz()
     for start in range(0, len(operands[0]), max(node.nnz(), 1)):
         block = operands[0][start : start + node.nnz()]
         result = [code.apply(ca.OP_ADD, x, r) for x, r in zip(block, result, strict=True)]
@@ -129,7 +129,7 @@ def _product(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
 
 def _rank_one(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
     matrix, (factor,), x, y = operands
-    result: Values = []
+    result: list[Value] = []
     for a, row, column in zip(matrix, *node.sparsity().get_triplet(), strict=True):
         term = code.apply(ca.OP_MUL, code.apply(ca.OP_MUL, factor, x[row]), y[column])
         result.append(code.apply(ca.OP_ADD, a, term))

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.assembly import Assembly
-from pfsc_drake.compiled.code import Code, Tables, Value, Values, elements, literals
+from pfsc_drake.compiled.code import Code, Table, Tables, Value, Values, elements
 from pfsc_drake.compiled.computed_indices import look_up
 from pfsc_drake.compiled.matrix_instructions import projected, translate_instruction
 from pfsc_drake.compiled.operations import Untranslatable, literal
@@ -51,9 +51,12 @@ class Translation:
         self._language = language
         self.tables = Tables()
         self.texts: list[str] = []
-        self._names: dict[bytes, str] = {}
+        self._count = 0
         # by address, so that they are kept: to read a function's content takes long
         self._seen: dict[int, tuple[ca.Function, str]] = {}
+        self._digests: dict[int, tuple[ca.Function, bytes]] = {}
+        # by name and shape, which functions of the same content share
+        self._alike: dict[str, list[tuple[ca.Function, str]]] = {}
 
     def function(self, function: ca.Function) -> str:
         """Translate a function where that has not been done, and return its name.
@@ -68,8 +71,8 @@ class Translation:
         """
         if function.__hash__() in self._seen:
             return self._seen[function.__hash__()][1]
-        key = hashlib.sha256(function.serialize().encode()).digest()
-        if key not in self._names:
+        name = self._name_of_same(function)
+        if name is None:
             kinds: dict[str, Callable[[ca.Function, str], str]] = {
                 "SXFunction": self._scalars,
                 "MXFunction": self._matrices,
@@ -79,10 +82,26 @@ class Translation:
             kind = function.class_name()
             if kind not in kinds:
                 raise Untranslatable(f"{function.name()}, a {kind}")
-            name = self._names[key] = f"f{len(self._names)}"
+            name = f"f{self._count}"
+            self._count += 1
+            self._alike.setdefault(str(function), []).append((function, name))
             self.texts.append(kinds[kind](function, name))
-        self._seen[function.__hash__()] = function, self._names[key]
-        return self._names[key]
+        self._seen[function.__hash__()] = function, name
+        return name
+
+    def _name_of_same(self, function: ca.Function) -> str | None:
+        """Return the name of a function of the same content that has been translated, if any."""
+        alike = self._alike.get(str(function), [])
+        return next(
+            (name for other, name in alike if self._digest(other) == self._digest(function)), None
+        )
+
+    def _digest(self, function: ca.Function) -> bytes:
+        key = function.__hash__()
+        if key not in self._digests:
+            content = hashlib.sha256(function.serialize().encode()).digest()
+            self._digests[key] = function, content
+        return self._digests[key][1]
 
     def _scalars(self, function: ca.Function, name: str) -> str:
         code = self._language(self.tables)
@@ -118,7 +137,7 @@ class Translation:
             else:
                 operands = [
                     # what is not there is zero
-                    places[place] if place >= 0 else literals(np.zeros(node.dep(i).nnz()))
+                    places[place] if place >= 0 else Table(np.zeros(node.dep(i).nnz()))
                     for i, place in enumerate(function.instruction_input(k))
                 ]
                 if what == ca.OP_OUTPUT:

@@ -6,7 +6,7 @@ import pytest
 
 from pfsc_drake.compiled.native_code import why_not
 from pfsc_drake.compiled.translation import translate
-from tests.compiled.interpreter import assert_agrees, compiled
+from tests.compiled.interpreter import SPECIAL, assert_agrees, compiled
 
 S, U = ca.SX.sym("s", 2), ca.SX.sym("u")
 X, Y = ca.MX.sym("x", 4), ca.MX.sym("y")
@@ -98,7 +98,24 @@ def test_a_table_is_there_once():
     table = ca.MX(ca.DM(np.arange(50.0)))
     one = ca.Function("one", [Y], [table[Y]])
     text = translate(ca.Function("f", [Y], [one(Y), table[2.0 * Y]]))
-    assert text.count("constant [50 x double]") == 1
+    assert text.count("constant [400 x i8]") == 1
+
+
+def test_a_table_of_all_kinds_of_numbers():
+    """To the last bit, also where its numbers are taken one by one, or changed."""
+    table = ca.MX(ca.DM(SPECIAL))
+    assert_agrees(ca.Function("f", [Y], [table[Y], table[5], table[3:9].T, 2.0 * table]))
+
+
+def test_functions_of_the_same_name_and_shape_are_told_apart():
+    up, down = (ca.Function("f", [Y], [Y + step]) for step in (1.0, -1.0))
+    assert_agrees(ca.Function("g", [Y], [up(Y), down(Y), up(2.0 * Y)]))
+
+
+def test_functions_of_the_same_content_are_translated_once():
+    one, two = (ca.Function("f", [Y], [Y + 1.0]) for _ in range(2))
+    text = translate(ca.Function("g", [Y], [one(Y) * two(2.0 * Y)]))
+    assert text.count("define") == 3
 
 
 def test_long_functions_are_split_into_blocks():
