@@ -2,20 +2,17 @@
 
 import errno
 import fcntl
-import hashlib
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pfsc_drake.errors import InputError
 from reporting.manifest import (
     FIGURES,
-    GROWING,
     MANIFEST,
     UNFINISHED,
-    earlier_results,
     find_obstacle,
     listed_results,
     manifest_text,
@@ -32,28 +29,28 @@ class ResultsFolder:
         path: The folder.
     """
 
-    def __init__(
-        self, path: Path, kind: str, handle: int, checksums: Mapping[str, str] | None = None
-    ) -> None:
-        """Takes over a folder.
+    def __init__(self, path: Path, kind: str, handle: int, files: Iterable[str] = ()) -> None:
+        """Take over a folder.
 
         Args:
             path: Of the folder.
             kind: Kind of results, e.g. ``run``.
             handle: Descriptor of the open folder.
-            checksums: Of the results in it, see :func:`reporting.manifest.manifest_text`.
+            files: Names of the results that are in it already.
         """
         self.path = path
         self._kind = kind
         self._handle = handle
-        self._checksums = dict(checksums or {})
+        self._files = list(files)
         self._elsewhere: Path | None = None
         self._reasons: dict[str, str] = {}  # why a file could not be written here
         self._lost: list[str] = []  # what could not be written elsewhere either
         self._write_manifest()
 
-    def write(self, name: str, content: str | bytes, growing: bool = False) -> Path | None:
-        """Writes one result, whole or not at all; one of this folder's own is replaced.
+    def write(self, name: str, content: str | bytes) -> Path | None:
+        """Write one result, whole or not at all; one of this folder's own is replaced.
+
+        One that is replaced is there at every moment, as it was or as it is now.
 
         What cannot be written here is written into a temporary folder instead, see
         :meth:`explain_problems`.
@@ -61,8 +58,6 @@ class ResultsFolder:
         Args:
             name: See :mod:`reporting.manifest`: a result's, or ``figures/NAME.png``.
             content: Of the file; text becomes UTF-8.
-            growing: Whether it is still added to: at every moment it is there as it was or as it
-                is now.
 
         Returns:
             The file; None if it could not be written anywhere.
@@ -70,7 +65,7 @@ class ResultsFolder:
         if isinstance(content, str):
             content = content.encode("utf-8", "backslashreplace")  # names of files may be no text
         try:
-            return self._write_here(name, content, growing)
+            return self._write_here(name, content)
         except OSError as error:
             self._reasons[name] = _reason(error)
         try:
@@ -82,7 +77,7 @@ class ResultsFolder:
             return None
 
     def explain_problems(self) -> str | None:
-        """Returns what could not be written, why, and where it is instead; None if all was."""
+        """Return what could not be written, why, and where it is instead; None if all was."""
         if not self._reasons:
             return None
         reasons = " and ".join(dict.fromkeys(self._reasons.values()))
@@ -91,29 +86,19 @@ class ResultsFolder:
             text += f"; kept in {self._elsewhere}"
         return f"{text}; lost: {_listed(self._lost)}" if self._lost else text
 
-    def _write_here(self, name: str, content: bytes, growing: bool) -> Path:
+    def _write_here(self, name: str, content: bytes) -> Path:
         if not os.path.samestat(os.fstat(self._handle), self.path.stat()):
             raise FileExistsError(errno.EEXIST, "another folder has taken its place")
-        target, before = self.path / name, self._checksums.get(name)
-        if before is None and _exists(target):
-            raise FileExistsError(errno.EEXIST, f"somebody else has made {name} meanwhile")
-        checksum = GROWING if growing else hashlib.sha256(content).hexdigest()
-        if before != GROWING:
-            if not growing:
-                target.unlink(missing_ok=True)  # nothing may stand under another's checksum
+        if name not in self._files:
+            if _exists(self.path / name):
+                raise FileExistsError(errno.EEXIST, f"somebody else has made {name} meanwhile")
             # listed first, so that a file is known as a result whenever the process ends
-            self._list(name, checksum)
-        file = _write_whole(self.path, name, content)
-        if checksum != self._checksums[name]:
-            self._list(name, checksum)
-        return file
-
-    def _list(self, name: str, checksum: str) -> None:
-        self._checksums[name] = checksum
-        self._write_manifest()
+            self._files.append(name)
+            self._write_manifest()
+        return _write_whole(self.path, name, content)
 
     def _write_manifest(self) -> None:
-        text = manifest_text(self._kind, self._checksums)
+        text = manifest_text(self._kind, self._files)
         _write_whole(self.path, MANIFEST, text.encode("utf-8"))
 
 
@@ -121,7 +106,7 @@ class ResultsFolder:
 def open_results(
     path: Path, kind: str, inputs: Sequence[Path] = (), resume: bool = False
 ) -> Iterator[ResultsFolder]:
-    """Takes a folder for results until the end of the context.
+    """Take a folder for results until the end of the context.
 
     The folder is created if it is missing and locked against other processes; the lock ends with
     the process, also if that crashes. Earlier results of the same kind are removed, unless they
@@ -156,14 +141,14 @@ def open_results(
 
 
 def _remove_results(path: Path) -> None:
-    for name in earlier_results(path):
+    for name in (*listed_results(path), UNFINISHED, MANIFEST):
         (path / name).unlink(missing_ok=True)
     with suppress(FileNotFoundError):
         (path / FIGURES).rmdir()
 
 
 def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
-    """Refuses a folder that results must not be written into; changes nothing.
+    """Refuse a folder that results must not be written into; changes nothing.
 
     Args:
         path: Of the folder, which may be missing.
@@ -184,7 +169,7 @@ def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Turns what the system says against a folder into one line that names it."""
+    """Turn what the system says against a folder into one line that names it."""
     try:
         yield
     except InputError:
@@ -209,7 +194,7 @@ def _lock(path: Path, handle: int) -> None:
 
 
 def _write_whole(folder: Path, name: str, content: bytes) -> Path:
-    """Writes a file under another name, which it changes for its own when it is complete."""
+    """Write a file under another name, which it changes for its own when it is complete."""
     target, unfinished = folder / name, folder / UNFINISHED
     try:
         unfinished.write_bytes(content)

@@ -120,7 +120,7 @@ class SweepRecord:
         self._written, self._pause = time.monotonic(), _OLDEST
         path = results.path / RECORD
         self.rows = _read(path, results.path, definition) if path.exists() else {}
-        self.save(growing=True)
+        self.save()
 
     def missing(self, count: int) -> list[int]:
         """Returns the numbers of the samples that have no final row yet, of ``count``."""
@@ -131,19 +131,15 @@ class SweepRecord:
         self.rows[number] = row
         begin = time.monotonic()
         if begin - self._written >= self._pause:
-            self.save(growing=True)
+            self.save()
             self._pause = max(_OLDEST, _SHARE * (time.monotonic() - begin))
 
-    def save(self, growing: bool) -> None:
-        """Writes all rows.
-
-        Args:
-            growing: Whether more are to come in this session.
-        """
+    def save(self) -> None:
+        """Write all rows."""
         rows = {str(i): self.rows[i].to_data() for i in sorted(self.rows)}
         content = {"sweep": self._definition.to_data(), "rows": rows}
         text = json.dumps(content, allow_nan=False, separators=(",", ":"))
-        self._results.write(RECORD, text + "\n", growing=growing)
+        self._results.write(RECORD, text + "\n")
         self._written = time.monotonic()
 
 

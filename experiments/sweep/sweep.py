@@ -183,7 +183,7 @@ def run_sweep(
                     idle=progress.processes,
                 )
             finally:
-                record.save(growing=False)
+                record.save()
         return _conclude(sweep, record.rows, results, metric, interrupted(), stopped)
 
 

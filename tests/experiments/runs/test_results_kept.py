@@ -125,9 +125,8 @@ def test_every_input_of_a_scenario_is_protected(tmp_path, capfd):
     out.mkdir()
     points = "\n".join(f"{0.5 + 0.01 * i},{0.001 * i * i},0.5" for i in range(20))
     (out / "metrics.json").write_text(f"x,y,z\n{points}\n")
-    checksum = "0" * 64
     (out / "manifest.json").write_text(
-        json.dumps({"program": "pfsc_drake", "results": "run", "files": {"metrics.json": checksum}})
+        json.dumps({"program": "pfsc_drake", "results": "run", "files": ["metrics.json"]})
     )
     change = f"path.shape=!Waypoints {{file: {out / 'metrics.json'}}}"
     assert main(["run", "pfc_elastic_3r", "--set", change, "--out", str(out)]) == 2

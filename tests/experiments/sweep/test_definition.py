@@ -22,7 +22,7 @@ def kept(tmp_path, rows):
         record = SweepRecord(results, DEFINITION)
         for number, row in rows.items():
             record.take(number, row)
-        record.save(growing=False)
+        record.save()
     return tmp_path / "out"
 
 
@@ -43,7 +43,7 @@ def test_rows_survive_a_process_that_is_killed(tmp_path, rows):
     with open_results(out, "sweep", resume=True) as results:
         record = SweepRecord(results, DEFINITION)
         record.take(0, rows[0])
-        record.save(growing=True)
+        record.save()
         written = (out / RECORD).read_text()
         record.rows[1] = rows[1]
     # nothing was finished, and the folder can still be used
@@ -78,7 +78,7 @@ def test_another_sweep_is_refused_and_nothing_changes(kept, change, named):
 def test_another_sweep_may_take_a_folder_without_rows(tmp_path):
     for definition in (DEFINITION, dataclasses.replace(DEFINITION, seed=9)):
         with open_results(tmp_path, "sweep", resume=True) as results:
-            SweepRecord(results, definition).save(growing=False)
+            SweepRecord(results, definition).save()
     assert json.loads((tmp_path / RECORD).read_text())["sweep"]["seed"] == 9
 
 
@@ -87,7 +87,7 @@ def test_another_sweep_may_take_a_folder_without_rows(tmp_path):
 )
 def test_a_record_that_cannot_be_read(tmp_path, text):
     with open_results(tmp_path, "sweep", resume=True) as results:
-        results.write(RECORD, text, growing=True)
+        results.write(RECORD, text)
     with (
         pytest.raises(InputError, match="not a readable record of a sweep"),
         open_results(tmp_path, "sweep", resume=True) as results,
