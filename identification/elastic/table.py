@@ -74,25 +74,3 @@ def write_table(path: str | Path, estimates: Sequence[JointEstimate]) -> None:
         numbers = (f"{value:.6g}", f"{deviation:.3g}", f"{relative:.3g}")
         writer.writerow((joint, name, *numbers, unit))
     write_text(Path(path), text.getvalue())
-
-
-def elasticity_block(estimates: Sequence[JointEstimate], source: str) -> dict[str, object]:
-    """Return the joints as an entry under ``elasticities:`` of a robot's ``parameters.yaml``.
-
-    Args:
-        estimates: Of all joints, base first.
-        source: Where they are from.
-    """
-    return {
-        "source": source,
-        "stiffness": [_rounded(e.stiffness, e.deviation("stiffness")) for e in estimates],
-        # such a file allows no negative damping, which an estimate of none may be
-        "damping": [max(_rounded(e.damping, e.deviation("damping")), 0.0) for e in estimates],
-    }
-
-
-def _rounded(value: float, deviation: float) -> float:
-    """Return a value with two digits of its standard deviation."""
-    if not 0.0 < deviation < np.inf:
-        return value
-    return round(value, 1 - int(np.floor(np.log10(deviation))))

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg import qr, svd
 from scipy.sparse.csgraph import connected_components
 
-from identification.model.base import combination
 from pfsc_drake.errors import InputError
 
 # of the largest singular value; those below are zero but for rounding
@@ -21,8 +20,6 @@ _ZERO = 1e-8
 # part that a parameter has in a direction, from which on it counts
 _TAKES_PART = 1e-4
 _MOST_NAMES = 12
-# of the largest part in a direction, from which on a parameter is told
-_TOLD = 0.25
 # relative standard deviation, above which Sec. C.2 calls a parameter badly identifiable
 BADLY = 0.15
 # correlation from which on parameters move together, and how many of them are told
@@ -61,20 +58,6 @@ class Factors:
         """Return ``(X' X)^-1``, shape (n_b, n_b)."""
         root = self.directions / self.values / self.scale[:, None]
         return root @ root.T
-
-    def weakest(self, names: Sequence[str], count: int = 3) -> list[str]:
-        """Return the directions that torques depend on least, in words, the weakest first.
-
-        Args:
-            names: Of the parameters.
-            count: How many.
-        """
-        told = []
-        for v in self.directions.T[::-1][:count]:
-            change = np.where(np.abs(v) >= _TOLD * np.abs(v).max(), v / self.scale, 0.0)
-            leading = int(np.argmax(np.abs(v)))
-            told.append(combination(change / change[leading], names, first=leading))
-        return told
 
 
 def factorize(X: np.ndarray, b: np.ndarray, names: Sequence[str], what: str) -> Factors:

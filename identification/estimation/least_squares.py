@@ -134,10 +134,6 @@ class Estimate:
             self.joint_names,
         )
 
-    def weak_directions(self, count: int = 3) -> list[str]:
-        """Return combinations that the torques depend on least, in words, the weakest first."""
-        return self.factors.weakest(self.short_names, count)
-
 
 def estimate(
     regressor: Regressor,

@@ -65,21 +65,6 @@ class BaseParameters:
         """Of the base parameters."""
         return [self.full_units[i] for i in self.indices]
 
-    @property
-    def unidentifiable(self) -> list[str]:
-        """Names of the parameters that have no effect at all."""
-        used = np.any(self.projection != 0.0, axis=0)
-        return [
-            name for name, has_effect in zip(self.full_names, used, strict=True) if not has_effect
-        ]
-
-    @property
-    def only_combined(self) -> list[str]:
-        """Names of the parameters that have an effect in combinations with others only."""
-        alone = {i for row, i in self._rows() if np.count_nonzero(row) == 1}
-        used = np.flatnonzero(np.any(self.projection != 0.0, axis=0))
-        return [self.full_names[i] for i in used if i not in alone]
-
     def values(self, parameters: np.ndarray) -> np.ndarray:
         """Return ``rho_b = K_b rho``, shape (n_b,).
 

@@ -26,11 +26,6 @@ _ROWS, _COLUMNS = [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]
 PER_LINK = len(LINK_PARAMETERS)
 
 
-def inertial_count(subject: Subject) -> int:
-    """Return how many parameters come before the friction: 11 N, for a DELTA robot 4."""
-    return NUM_ARMS + 1 if subject.chain is None else (PER_LINK + 1) * subject.dimension
-
-
 def parameter_names(subject: Subject, friction: bool = True) -> list[str]:
     """Return the names of the parameters, ``link_3.Ixy`` or ``joint_2.f_c``, joints from 1.
 

@@ -48,11 +48,6 @@ class FundamentalForms:
         mean, spread = mean_and_spread(self.E, self.F, self.G, self.L, self.M, self.N)
         return mean + spread, mean - spread
 
-    @property
-    def gaussian_curvature(self) -> np.ndarray:
-        """Product of the principal curvatures, 1/m^2."""
-        return np.asarray((self.L * self.N - self.M**2) / self.determinant)
-
 
 def fundamental_forms(surface: Surface, theta: ArrayLike) -> FundamentalForms:
     """Return the fundamental forms of a surface of class C^2.

@@ -2,21 +2,12 @@
 
 import numpy as np
 import pytest
-from pydrake.multibody.plant import MultibodyPlant
 
-from diagrams.robots.model import read_robot
-from diagrams.scenario import RobotParameters
 from identification.consistency.check import (
     inconsistencies,
-    least_eigenvalue,
-    link_mass_matrices,
     require_consistent,
 )
-from identification.model.base import random_motion
-from identification.model.comau_base import load_printed_identification
 from identification.model.parameters import parameter_names, true_parameters
-from identification.model.regressor import Regressor
-from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError
 
 
@@ -54,39 +45,3 @@ def test_says_how_much_is_wrong(comau, delta):
         require_consistent(comau, np.where(np.arange(78) == 1, np.nan, 1.0))
     with pytest.raises(InputError, match=r"parameters: shape .7,.; must be .78,"):
         require_consistent(comau, np.ones(7))
-
-
-def test_mass_matrices_are_drakes():
-    subject = load_subject("franka_emika_panda", tool=True)
-    regressor = Regressor(subject)
-    plant, _ = read_robot(RobotParameters(model="franka_emika_panda"), None)
-    q = random_motion(regressor)[0][:5]
-    D = link_mass_matrices(regressor, true_parameters(subject), q, rotors=True)
-    np.testing.assert_allclose(D, [mass_matrix(plant, posture) for posture in q], atol=1e-9)
-
-
-def mass_matrix(plant: MultibodyPlant, q):
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, q)
-    return plant.CalcMassMatrix(context)
-
-
-def test_mass_matrix_of_a_consistent_set_is_definite(comau_regressor, comau):
-    least = least_eigenvalue(comau_regressor, true_parameters(comau))
-    assert 0.0 < least.value < 1e-3
-    lower, upper = comau.position_limits.T
-    assert np.all((lower <= least.q) & (least.q <= upper))
-
-
-def test_mass_matrix_of_the_table_is_not(comau_regressor, comau_base):
-    parameters = np.zeros(78)
-    parameters[comau_base.indices] = load_printed_identification().base_parameters.mean
-    assert least_eigenvalue(comau_regressor, parameters).value < -0.01
-
-
-def test_delta_robot_within_its_stroke(delta):
-    """Its mass matrix is between those of slides alone and of all masses on them."""
-    least = least_eigenvalue(Regressor(delta), true_parameters(delta))
-    assert least.value >= delta.delta.parameters.masses.effective_slide
-    lower, upper = delta.position_limits.T
-    assert np.all((lower <= least.q) & (least.q <= upper))

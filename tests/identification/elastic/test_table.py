@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.elastic.joint_estimate import JointEstimate
-from identification.elastic.table import elasticity_block, table_rows, write_table
+from identification.elastic.table import table_rows, write_table
 from pfsc_drake.errors import InputError
 
 NAMES = ("stiffness", "damping", "inertia", "coulomb", "viscous", "offset")
@@ -39,8 +39,3 @@ def test_file(estimates, tmp_path):
     assert rows[5]["relative_percent"] == "inf"
     with pytest.raises(InputError, match="cannot be written: No such"):
         write_table(tmp_path / "none" / "joints.csv", estimates)
-
-
-def test_block_for_a_parameter_file(estimates):
-    block = elasticity_block(estimates, "measured")
-    assert block == {"source": "measured", "stiffness": [30_123.0, 5e5], "damping": [0.0, 12.346]}

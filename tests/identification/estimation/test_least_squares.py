@@ -155,8 +155,6 @@ def test_what_is_badly_identifiable(comau, measure):
     size = abs(result.base_parameters[result.short_names.index("link_6.Ixz")])
     assert worst.relative_deviation_alone == pytest.approx(alone / size)
     assert "times the noise (joint_" in worst.reason
-    direction = result.weak_directions(1)[0]
-    assert " + " in direction or " - " in direction
 
 
 def test_bad_input(comau, measure):
