@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -113,6 +114,19 @@ class Network:
             initials,
         )
 
+    @cached_property
+    def shown(self) -> dict[str, str]:
+        """Outputs at the border that are a state as it is, zero at the start, by port."""
+        begun = {name for node in self.initials for name in node.results}
+        wires: dict[str, str] = {}
+        for node in self.nodes:
+            wires |= _shown(node)
+        return {
+            port: wires[wire]
+            for port, wire in self.outputs.items()
+            if wire in wires and wires[wire] not in begun
+        }
+
 
 @dataclass
 class Wiring:
@@ -175,6 +189,21 @@ class Wiring:
             return Source("input", source)
         name, output = source
         return Source("wire", f"{name}.{self.networks[name].outputs[output]}")
+
+
+def _shown(node: Node) -> dict[str, str]:
+    """Return those of a node's results that are states as they are, by name."""
+    function = node.function
+    of_states = all(source.kind == "state" for source in node.sources)
+    if not of_states or function.class_name() != "SXFunction":
+        return {}
+    states = [ca.SX.sym("x", function.numel_in(i)) for i in range(function.n_in())]
+    return {
+        name: source.name
+        for name, result in zip(node.results, function.call(states), strict=True)
+        for source, state in zip(node.sources, states, strict=True)
+        if result.shape == state.shape and ca.is_equal(result, state)
+    }
 
 
 def _renamed(node: Node, prefix: str, fed: Mapping[str, Source]) -> Node:

@@ -18,6 +18,7 @@ class Stage:
     Attributes:
         function: Of ``sources``, then the results of earlier ``stages``; one vector out.
         inputs: Names of the inputs among its arguments.
+        states: Names of the states that it depends on.
         stages: Numbers of the earlier stages among its arguments.
         needs: What its results depend on at last: inputs and tick.
         needs_at_start: The same before the start, when states are what the inputs say.
@@ -26,6 +27,7 @@ class Stage:
 
     function: ca.Function
     inputs: tuple[str, ...]
+    states: frozenset[str]
     stages: tuple[int, ...]
     needs: Needs
     needs_at_start: Needs
@@ -44,11 +46,11 @@ class Program:
 
     Attributes:
         network: The same.
-        states: Where in ``x`` each state is.
+        states: Where in ``x`` each state is, those last that the network shows as they are.
         size: Of ``x``.
         stages: In an order in which they can be evaluated.
         update: ``x`` of the next tick, called ``x_next``.
-        update_inputs, update_stages: What it takes.
+        update_inputs, update_states, update_stages: What it takes.
         initial: ``x`` at the start, called ``x_start``, of ``x``, ``preset`` (a number for each
             state by name; where it is not 0 that of ``x`` stays), ``t`` and ``initial_inputs``.
 
@@ -58,13 +60,15 @@ class Program:
 
     def __init__(self, network: Network, like: "Program | None" = None) -> None:
         self.network = network
-        self.states = _slices(network.states)
-        self.size = sum(network.states.values())
+        shown = set(network.shown.values())
+        sizes = dict(sorted(network.states.items(), key=lambda item: item[0] in shown))
+        self.states = _slices(sizes)
+        self.size = sum(sizes.values())
         self._maker = {name: node for node in network.nodes for name in node.results}
         self._starter = {name: node for node in network.initials for name in node.results}
         self._x, self._t = ca.MX.sym("x", self.size), ca.MX.sym("t")
         self._u = {name: ca.MX.sym(name, port.size) for name, port in network.inputs.items()}
-        values = ca.vertsplit(self._x, _ends(network.states)) if self.size else []
+        values = ca.vertsplit(self._x, _ends(sizes)) if self.size else []
         self._states = dict(zip(self.states, values, strict=True))
         self._needs: dict[tuple[str, bool], Needs] = {}
         order = _ordered(network.nodes, self._maker)
@@ -136,7 +140,8 @@ class Program:
         What is put out at the border waits for nothing that it does not need. Everything else is
         evaluated as late as those that take it, so that there are few stages.
         """
-        border = set(self.network.outputs.values())
+        shown = self.network.shown
+        border = {wire for port, wire in self.network.outputs.items() if port not in shown}
         takers: dict[str, list[tuple[Needs, Needs]]] = {}
         places: dict[str, tuple[Needs, Needs]] = {}
         last: list[tuple[Needs, Needs]] = []
@@ -192,7 +197,8 @@ class Program:
                 for begin in (False, True)
             )
             parts = _slices({name: self.network.wires[name] for name in inside})
-            stages.append(Stage(function, inputs, tuple(earlier), needs, at_start, parts))
+            states = frozenset(s.name for s in sources if s.kind == "state")
+            stages.append(Stage(function, inputs, states, tuple(earlier), needs, at_start, parts))
             vectors.append(ca.MX.sym(f"stage_{k}", function.numel_out(0)))
             made |= {name: vectors[k][part] for name, part in parts.items()}
             stage_of |= dict.fromkeys(inside, k)
@@ -233,7 +239,9 @@ class Program:
         nodes = self.network.updates
         sources = [source for node in nodes for source in node.sources]
         wires = {s.name for s in sources if s.kind == "wire"}
+        changed = {name for node in nodes for name in node.results}
         self.update_inputs = _names(sources, "input")
+        self.update_states = frozenset(_names(sources, "state")) | (set(self.states) - changed)
         self.update_stages = tuple(sorted({self._stage_of[name] for name in wires}))
         made = {
             name: self._made[k][self.stages[k].parts[name]]

@@ -10,7 +10,7 @@ from pydrake.systems.framework import (
     BasicVector,
     CacheEntry,
     Context,
-    DependencyTicket,
+    DiscreteStateIndex,
     DiscreteValues,
     EventStatus,
     LeafSystem,
@@ -41,7 +41,8 @@ class BlockSystem(LeafSystem):
 
     State:
         Discrete: whether the system has started, which states were set before that, and the states
-        (:attr:`states` says where).
+        (:attr:`states` says where). States that are put out as they are make groups of their own,
+        so that whoever reads them between ticks does so without Python.
 
     Args:
         block: The block or network.
@@ -51,7 +52,7 @@ class BlockSystem(LeafSystem):
         block: The same; None of a network.
         network: What it does, all inputs connected.
         period: Sampling time [s].
-        states: Where in the discrete state each state is.
+        states: Where among the discrete variables each state is, all groups one after another.
     """
 
     def __init__(self, block: Block | Network, period: float) -> None:
@@ -62,24 +63,35 @@ class BlockSystem(LeafSystem):
         declared = Program(whole)
         self._programs: dict[frozenset[str], _Functions] = {}
         self._declared = declared
-        # [started, which are set, states]
+        # [started, which are set, states], of these in groups of their own what is shown
         first = 1 + len(declared.states)
         self._preset, self._x = slice(1, first), slice(first, first + declared.size)
         self.states = {
             name: slice(first + part.start, first + part.stop)
             for name, part in declared.states.items()
         }
-        memory = self.DeclareDiscreteState(first + declared.size)
+        shown = {name: declared.states[name] for name in whole.shown.values()}
+        self._hidden = declared.size - sum(part.stop - part.start for part in shown.values())
+        self._own = slice(first, first + self._hidden)
+        self._memory = self.DeclareDiscreteState(self._own.stop)
+        self._shown = {
+            name: (self.DeclareDiscreteState(part.stop - part.start), part)
+            for name, part in sorted(shown.items(), key=lambda item: item[1].start)
+        }
+        # shown states that the next ones depend on
+        self._kept = [p for name, p in self._shown.items() if name in declared.update_states]
+        self._groups = [slice(0, self._own.stop)]
+        self._groups += [self.states[name] for name in self._shown]
         self._inputs = {
             name: self.DeclareVectorInputPort(name, port.size)
             for name, port in whole.inputs.items()
         }
+        self._shown_wires = {whole.outputs[port]: name for port, name in whole.shown.items()}
         self._optional = [name for name, port in whole.inputs.items() if port.optional]
         self._asked: set[str] = set()
         self._stages: list[CacheEntry] = []
-        always = {self.discrete_state_ticket(memory)}
         for k, stage in enumerate(declared.stages):
-            self._stages.append(self._declare_stage(k, stage, always))
+            self._stages.append(self._declare_stage(k, stage))
         for port in whole.outputs:
             self._declare_output(port)
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
@@ -93,7 +105,10 @@ class BlockSystem(LeafSystem):
             context: The system's own.
             name: Of the state.
         """
-        return context.get_discrete_state_vector().value()[self.states[name]].copy()
+        if name in self._shown:
+            group, _ = self._shown[name]
+            return context.get_discrete_state(group).value().copy()
+        return context.get_discrete_state(self._memory).value()[self.states[name]].copy()
 
     def is_set(self, context: Context, name: str) -> bool:
         """Return whether a state has been set before the start.
@@ -103,7 +118,7 @@ class BlockSystem(LeafSystem):
             name: Of the state.
         """
         flag = 1 + list(self.states).index(name)
-        return bool(context.get_discrete_state_vector().value()[flag])
+        return bool(context.get_discrete_state(self._memory).value()[flag])
 
     def set_state(self, context: Context, name: str, value: np.ndarray) -> None:
         """Set a state; before the start it stays when the simulation begins.
@@ -113,10 +128,10 @@ class BlockSystem(LeafSystem):
             name: Of the state.
             value: Of the state.
         """
-        memory = context.get_discrete_state_vector().value().copy()
-        memory[self.states[name]] = value
-        memory[1 + list(self.states).index(name)] = 1.0
-        context.SetDiscreteState(memory)
+        variables = self._variables(context)
+        variables[self.states[name]] = value
+        variables[1 + list(self.states).index(name)] = 1.0
+        self._set(context, variables)
 
     def wire(self, context: Context, name: str) -> np.ndarray:
         """Return what a block puts out, at the border or inside.
@@ -125,6 +140,8 @@ class BlockSystem(LeafSystem):
             context: The system's own.
             name: Of the output; in a network ``block.output``.
         """
+        if name in self._shown_wires:
+            return self.state(context, self._shown_wires[name])
         k, part = self._declared.place(name)
         value: np.ndarray = self._stages[k].Eval(context)[part]
         return value
@@ -135,14 +152,25 @@ class BlockSystem(LeafSystem):
         Args:
             context: The system's own.
         """
-        context.SetDiscreteState(self._begun(context))
+        self._set(context, self._begun(context))
 
-    def _declare_stage(self, k: int, stage: Stage, always: set[DependencyTicket]) -> CacheEntry:
+    def _variables(self, context: Context) -> np.ndarray:
+        """Return all that is remembered, all groups one after another."""
+        numbers = range(len(self._groups))
+        return np.concatenate([context.get_discrete_state(k).value() for k in numbers])
+
+    def _set(self, context: Context, variables: np.ndarray) -> None:
+        for k, part in enumerate(self._groups):
+            context.SetDiscreteState(k, variables[part])
+
+    def _declare_stage(self, k: int, stage: Stage) -> CacheEntry:
+        shown = [place for name, place in self._shown.items() if name in stage.states]
+
         def calc(context: Context, value: Value) -> None:
             functions = self._program(context)
             stage = functions.program.stages[k]
             made = [(j, self._stages[j].Eval(context)) for j in stage.stages]
-            self._given(context, functions, stage.inputs, stage.needs_at_start)
+            self._given(context, functions, stage.inputs, shown, stage.needs_at_start)
             for j, values in made:
                 functions.made[j][:] = values
             functions.stages[k].evaluate()
@@ -150,13 +178,18 @@ class BlockSystem(LeafSystem):
 
         needs = stage.needs | stage.needs_at_start
         sources = {self._inputs[s.name].ticket() for s in needs if s.kind == "input"}
+        sources |= {self.discrete_state_ticket(group) for group in (self._memory, *dict(shown))}
         if TICK in needs:
             sources.add(self.time_ticket())
         size = stage.function.numel_out(0)
         producer = ValueProducer(allocate=lambda: Value(np.zeros(size)), calc=calc)
-        return self.DeclareCacheEntry(f"stage {k}", producer, always | sources)
+        return self.DeclareCacheEntry(f"stage {k}", producer, sources)
 
     def _declare_output(self, port: str) -> None:
+        if port in self.network.shown:
+            group, _ = self._shown[self.network.shown[port]]
+            self.DeclareStateOutputPort(port, group)
+            return
         k, part = self._declared.output(port)
         stage = self._stages[k]
 
@@ -196,13 +229,17 @@ class BlockSystem(LeafSystem):
         context: Context,
         functions: "_Functions",
         inputs: Iterable[str],
+        shown: Iterable[tuple[DiscreteStateIndex, slice]],
         needs_at_start: Needs | None = None,
     ) -> None:
         """Write states, tick and inputs into the functions' arguments."""
-        memory = context.get_discrete_state_vector().value()
-        if not memory[_STARTED]:
-            memory = self._begun(context, needs_at_start)
-        functions.x[:] = memory[self._x]
+        memory = context.get_discrete_state(self._memory).value()
+        if memory[_STARTED]:
+            functions.x[: self._hidden] = memory[self._own]
+            for group, part in shown:
+                functions.x[part] = context.get_discrete_state(group).value()
+        else:
+            functions.x[:] = self._begun(context, needs_at_start)[self._x]
         functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
         for name in inputs:
             functions.u[name][:] = self._inputs[name].Eval(context)
@@ -224,7 +261,7 @@ class BlockSystem(LeafSystem):
         ]
         for name, value in zip(functions.program.initial_inputs, given, strict=True):
             functions.u[name][:] = value
-        before = context.get_discrete_state_vector().value()
+        before = self._variables(context)
         functions.x[:], functions.preset[:] = before[self._x], before[self._preset]
         functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
         functions.initial.evaluate()
@@ -233,17 +270,22 @@ class BlockSystem(LeafSystem):
         return begun
 
     def _initialize(self, context: Context, state: DiscreteValues) -> EventStatus:
-        state.set_value(self._begun(context))
+        begun = self._begun(context)
+        for k, part in enumerate(self._groups):
+            state.set_value(k, begun[part])
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         functions = self._program(context)
         made = [(k, self._stages[k].Eval(context)) for k in functions.program.update_stages]
-        self._given(context, functions, functions.program.update_inputs)
+        self._given(context, functions, functions.program.update_inputs, self._kept)
         for k, values in made:
             functions.made[k][:] = values
         functions.update.evaluate()
-        state.get_mutable_value()[self._x] = functions.update.results["x_next"]
+        later = functions.update.results["x_next"]
+        state.get_mutable_value(self._memory)[self._own] = later[: self._hidden]
+        for group, part in self._shown.values():
+            state.get_mutable_value(group)[:] = later[part]
 
 
 class _Functions:

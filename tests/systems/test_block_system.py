@@ -139,3 +139,50 @@ def test_a_context_can_be_started_without_a_simulation():
     system.start(context)
     system.GetInputPort("value").FixValue(context, 5.0)
     assert system.GetOutputPort("lagged").Eval(context)[0] == 2.0
+
+
+class Shown(Block):
+    """Puts out states as they are: one that is zero at the start, and one that is not; counts."""
+
+    def __init__(self):
+        self.inputs = {"u": Port(2)}
+        self.outputs = {name: Port(2) for name in ("held", "begun", "twice")}
+        self.states = {"count": 1, "held": 2, "begun": 2}
+
+    def initial(self, u, t):
+        return {"begun": u.u}
+
+    def output(self, x, u, t):
+        return {"held": x.held, "begun": x.begun, "twice": 2.0 * x.held}
+
+    def update(self, x, u, y, t):
+        return {"held": x.held + u.u, "count": x.count + 1.0}
+
+
+def test_a_state_that_is_put_out_as_it_is():
+    """Its port is the state itself, before the start, when it is set, and after the ticks."""
+    system = BlockSystem(Shown(), PERIOD)
+    simulator = Simulator(system)
+    context = simulator.get_mutable_context()
+    system.GetInputPort("u").FixValue(context, [1.0, 2.0])
+    held, twice = (system.GetOutputPort(name) for name in ("held", "twice"))
+    assert context.num_discrete_state_groups() == 2
+    assert context.get_discrete_state(1).size() == 2
+    np.testing.assert_array_equal(held.Eval(context), [0.0, 0.0])
+    system.set_state(context, "held", np.array([5.0, 6.0]))
+    np.testing.assert_array_equal(held.Eval(context), [5.0, 6.0])
+    np.testing.assert_array_equal(twice.Eval(context), [10.0, 12.0])
+    assert system.is_set(context, "held") and not system.is_set(context, "begun")
+    np.testing.assert_array_equal(system.GetOutputPort("begun").Eval(context), [1.0, 2.0])
+    for k in range(1, 4):
+        simulator.AdvanceTo((k - 0.5) * PERIOD)
+        expected = np.array([5.0, 6.0]) + k * np.array([1.0, 2.0])
+        np.testing.assert_array_equal(held.Eval(context), expected)
+        np.testing.assert_array_equal(twice.Eval(context), 2.0 * expected)
+        np.testing.assert_array_equal(system.wire(context, "held"), expected)
+        np.testing.assert_array_equal(system.state(context, "held"), expected)
+        assert system.state(context, "count")[0] == k
+        np.testing.assert_array_equal(system.state(context, "begun"), [1.0, 2.0])
+    variables = np.concatenate([context.get_discrete_state(k).value() for k in range(2)])
+    for name, part in system.states.items():
+        np.testing.assert_array_equal(variables[part], system.state(context, name))
