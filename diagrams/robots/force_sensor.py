@@ -1,11 +1,11 @@
 """The force/torque sensor between robot and tool."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import DiscreteTimeDelay
 
 from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
+from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor
@@ -107,10 +107,10 @@ def _delay(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> 
     if ticks == 0:
         return reading
     late = builder.AddNamedSystem(
-        "force_sensor_delay", DiscreteTimeDelay(period, ticks, reading.size())
+        "force_sensor_delay", BlockSystem(Hold(reading.size(), ticks), period)
     )
-    builder.Connect(reading, late.get_input_port())
-    return late.get_output_port()
+    builder.Connect(reading, late.GetInputPort("value"))
+    return late.GetOutputPort("held")
 
 
 def sensor_warnings(scenario: Scenario) -> list[str]:

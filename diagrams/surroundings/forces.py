@@ -13,7 +13,7 @@ from diagrams.surroundings.mounting_parts import add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.blocks.wiring_blocks import Hold
+from pfsc_drake.blocks.wiring_blocks import Hold, Sum
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.physics.decoupled_force import DecoupledForce
@@ -64,6 +64,7 @@ def add_surroundings(
             builder, mounting, part.robot, task, scenario, start, ports["joint_state"]
         )
         sources, signals = sources + wrenches, signals | mounted
+    period = scenario.controller.sampling_time
     acting: list[OutputPort] = []
     held: OutputPort | None = None
     if part.contact is not None:
@@ -73,9 +74,8 @@ def add_surroundings(
         builder.Connect(view.GetOutputPort("tool_pose"), part.contact.GetInputPort("tool_pose"))
         acting.append(part.contact.GetOutputPort("wrench"))
     if sources:
-        total = _sum(builder, "wrench", sources)
+        total = _sum(builder, "wrench", sources, period)
         # held over a tick, so that it is computed once and not in every stage of the integrator
-        period = scenario.controller.sampling_time
         hold = builder.AddNamedSystem("wrench_hold", BlockSystem(Hold(6), period))
         builder.Connect(total, hold.GetInputPort("value"))
         held = hold.GetOutputPort("held")
@@ -83,14 +83,14 @@ def add_surroundings(
     if spring is not None:
         # what is stiff follows the tool within a tick, too
         touching = _add_spring(builder, part, scenario, spring, ports["joint_state"])
-        held = touching if held is None else _sum(builder, "tool_wrench", [touching, held])
+        held = touching if held is None else _sum_in_plant(builder, touching, held)
         acting = [held]
     if pushes is not None and isinstance(part, Arm):
         part.connect_pushes(builder, pushes, held, ports["joint_state"])
     elif held is not None:
         part.connect_wrench(builder, held, ports["joint_state"])
     if acting:
-        signals["wrench_ext"] = _sum(builder, "all_wrenches", acting)
+        signals["wrench_ext"] = _sum(builder, "all_wrenches", acting, period)
     return signals
 
 
@@ -151,17 +151,28 @@ def _scripted(
     return sources
 
 
-def _sum(builder: DiagramBuilder, name: str, sources: list[OutputPort]) -> OutputPort:
+def _sum(
+    builder: DiagramBuilder, name: str, sources: list[OutputPort], period: float
+) -> OutputPort:
     """Return the sum of one wrench or more, by a system of a name if there are several.
 
     Args:
         builder: Builder of the diagram.
         name: Of the system.
         sources: The wrenches, each (6,).
+        period: Sampling time [s].
     """
     if len(sources) == 1:
         return sources[0]
-    total = builder.AddNamedSystem(name, Adder(len(sources), 6))
+    total = builder.AddNamedSystem(name, BlockSystem(Sum(len(sources), 6), period))
     for i, source in enumerate(sources):
-        builder.Connect(source, total.get_input_port(i))
+        builder.Connect(source, total.GetInputPort(f"term_{i}"))
+    return total.GetOutputPort("sum")
+
+
+def _sum_in_plant(builder: DiagramBuilder, *wrenches: OutputPort) -> OutputPort:
+    """Return the sum of wrenches that a plant bears within a tick, without Python in between."""
+    total = builder.AddNamedSystem("tool_wrench", Adder(len(wrenches), 6))
+    for i, wrench in enumerate(wrenches):
+        builder.Connect(wrench, total.get_input_port(i))
     return total.get_output_port()

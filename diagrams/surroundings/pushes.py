@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Demultiplexer, Multiplexer, ZeroOrderHold
 
 from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, Scenario
 from diagrams.tasks.task import Task
+from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
@@ -58,20 +58,23 @@ def add_pushes(
     period = scenario.controller.sampling_time
     system = LinkPushes(part.robot, [push.place for push in found])
     builder.AddNamedSystem("link_pushes", system)
-    points = builder.AddNamedSystem("pushed_points", Demultiplexer(3 * len(found), 3))
-    wrenches = builder.AddNamedSystem("link_wrenches", Multiplexer([6] * len(found)))
+    points, size = system.GetOutputPort("points"), len(found)
+    collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
+    wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
     # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
-    hold = builder.AddNamedSystem("push_hold", ZeroOrderHold(period, 6 * len(found)))
+    hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
     builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
-    builder.Connect(system.GetOutputPort("points"), points.get_input_port())
-    builder.Connect(wrenches.get_output_port(), hold.get_input_port())
-    builder.Connect(hold.get_output_port(), system.GetInputPort("wrenches"))
+    builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
+    builder.Connect(hold.GetOutputPort("held"), system.GetInputPort("wrenches"))
     for k, push in enumerate(found):
         if push.hand is not None:
             source = builder.AddNamedSystem(
                 f"link_hand_{k + 1}", BlockSystem(LinkHand(push.hand, period), period)
             )
-            builder.Connect(points.get_output_port(k), source.GetInputPort("point"))
+            own = Rows(3 * size, range(3 * k, 3 * k + 3))
+            point = builder.AddNamedSystem(f"pushed_point_{k + 1}", BlockSystem(own, period))
+            builder.Connect(points, point.GetInputPort("whole"))
+            builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
         else:
             profile = ForceProfile(push.pulses)
             source = builder.AddNamedSystem(
@@ -80,10 +83,10 @@ def add_pushes(
             )
             if profile.needs_manifold:
                 builder.Connect(ports["manifold_point"], source.GetInputPort("manifold_point"))
-        builder.Connect(source.GetOutputPort("wrench"), wrenches.get_input_port(k))
+        builder.Connect(source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}"))
     return system, {
-        "push_wrench": hold.get_output_port(),
-        "push_point": system.GetOutputPort("points"),
+        "push_wrench": hold.GetOutputPort("held"),
+        "push_point": points,
         "push_torque": system.GetOutputPort("tau_ext"),
     }
 

@@ -123,27 +123,29 @@ class Constant(Block):
 
 
 class Hold(Block):
-    """A zero-order hold: what came in at the last tick.
+    """A zero-order hold: what came in at the last tick, or some ticks before.
 
     Ports:
         value (input): The vector.
-        held (output): That of the last tick, zero before; without direct feedthrough.
+        held (output): That of the last tick, or of ``ticks`` ago, zero before; without direct
+            feedthrough.
 
     State:
-        held
+        What is ``held``, the oldest first, shape (ticks size,).
 
     Args:
         size: Of the vector.
+        ticks: How old what is put out is at a tick.
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, ticks: int = 1) -> None:
         self.inputs, self.outputs = {"value": Port(size)}, {"held": Port(size)}
-        self.states = {"held": size}
+        self.states, self._size = {"held": ticks * size}, size
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
-        return {"held": x.held}
+        return {"held": x.held[: self._size]}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
-        return {"held": u.value}
+        return {"held": ca.vertcat(*ca.vertsplit(x.held, self._size)[1:], u.value)}

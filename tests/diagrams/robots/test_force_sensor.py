@@ -1,8 +1,12 @@
-"""What a station says beforehand of its force/torque sensor."""
+"""The force/torque sensor of a station: its delay, and what is said of it beforehand."""
 
+import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
 
+from diagrams.builder import build_station
 from diagrams.robots.force_sensor import sensor_warnings
+from experiments.catalog.scenario_catalog import find_scenario
 
 
 @pytest.mark.parametrize(("dwell", "late"), [(0.049, True), (0.05, False), (0.051, False)])
@@ -13,3 +17,22 @@ def test_the_reference_should_not_set_off_before_the_sensor_is_tared(load_scenar
     warnings = sensor_warnings(settings)
     assert len(warnings) == late
     assert all("sets off" in warning for warning in warnings)
+
+
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_the_controller_has_a_reading_exactly_its_delay_later(load_exact_scenario, ticks):
+    settings = load_exact_scenario("pfc_compliant_6r")
+    settings.sensor.delay = ticks * settings.controller.sampling_time
+    station = build_station(settings, find_scenario("pfc_compliant_6r").parent)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    simulator.Initialize()
+    readings, told = [], []
+    for tick in range(10):
+        if tick > 0:  # each time before the update of the tick
+            simulator.AdvanceTo(tick * station.controller.period)
+        readings.append(station.blocks.output(root, "force_torque_sensor.measured_wrench"))
+        told.append(station.blocks.output(root, "force_sensor_delay.held"))
+    assert np.ptp(readings, axis=0).min() > 0.0
+    np.testing.assert_array_equal(told[ticks:], readings[:-ticks])
