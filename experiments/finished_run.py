@@ -13,7 +13,6 @@ from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import Scenario
-from diagrams.tasks.space_guidance import free_motion
 from diagrams.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
@@ -39,6 +38,7 @@ from experiments.results.tick import measure_tick
 from experiments.simulation import SimulationResult
 from experiments.studies.margins.analysis import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
+from pfsc_drake.following.fixtures import free_motion
 from reporting.folder import ResultsFolder
 from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report
@@ -236,7 +236,8 @@ def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
     fixtures = settings.fixtures
     if fixtures is None or fixtures.guidance.rules != "program" or "near_regions" not in log:
         return Metrics()
-    motion, guidance = free_motion(settings), fixtures.guidance
+    motion = free_motion(settings.compliance, settings.controller.sampling_time)
+    guidance = fixtures.guidance
     damping = motion.damping if settings.operator is None else None
     return audit(log, Promise(motion.mass, damping, guidance.largest_speed, guidance.tank.capacity))
 

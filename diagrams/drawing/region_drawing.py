@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
 from diagrams.drawing.manifold_drawing import skin_and_lines
-from diagrams.tasks.fixtures import Fixture
+from diagrams.tasks.fixtures import DrawnFixture
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.systems.drawing.region_visualizer import RegionVisualizer
@@ -25,7 +25,7 @@ class SpaceDrawing:
         manifold: Space as the law sees it.
     """
 
-    fixtures: Sequence[Fixture]
+    fixtures: Sequence[DrawnFixture]
     manifold: SpaceManifold
 
     def outline(self) -> list[np.ndarray]:

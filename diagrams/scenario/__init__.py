@@ -1,7 +1,7 @@
 """What a scenario file says: its schema, one file per block."""
 
-from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.drives import ServoParameters
+from diagrams.scenario.force_sensor import SensorParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -20,6 +20,7 @@ from diagrams.scenario.robot import RobotParameters
 from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters, GainParameters, LawGains
 from pfsc_drake.following.options.faults import BrakeParameters, FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters

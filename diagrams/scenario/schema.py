@@ -10,9 +10,9 @@ from diagrams.scenario.checks import (
     require_not_negative,
     require_positive,
 )
-from diagrams.scenario.compliance import ComplianceParameters, SensorParameters
 from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.force_sensor import SensorParameters
 from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
@@ -25,6 +25,7 @@ from diagrams.scenario.simulation import SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
 from diagrams.scenario.workpiece import WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.faults import FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters

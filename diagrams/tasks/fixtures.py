@@ -12,6 +12,7 @@ from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.region import Box, RegionParameters
 from diagrams.tasks.region import make_region
 from diagrams.tasks.surface import surface_from_shape
+from pfsc_drake.control.fixtures.fixture import Fixture
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.checks import (
@@ -20,50 +21,24 @@ from pfsc_drake.geometry.regions.checks import (
     refuse_same_regions,
     tangent_regions,
 )
-from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.geometry.regions.region import Region
 from pfsc_drake.geometry.surfaces.shapes import plane
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 # class C^k of a surface that is drawn, the least there is
 _DRAWN = 2
-# m, around the start, within which the speed of what turns counts
-_WORKSPACE = 2.0
 
 
-@dataclass(frozen=True)
-class Fixture:
-    """A region that a tool may not enter.
+@dataclass(frozen=True, kw_only=True)
+class DrawnFixture(Fixture):
+    """A region that a tool may not enter, with a name and a look.
 
     Attributes:
         name: Kind of its shape and its number, from 1 on.
-        region: The admissible side.
-        stiffness: Of a soft one [N/m]; infinite if it is hard.
         surfaces: What of its boundary is drawn, where it is at rest.
     """
 
     name: str
-    region: Region | MovingRegion
-    stiffness: float
     surfaces: Sequence[Surface]
-
-    def distance(self, point: Sequence[float], clock: float) -> float:
-        """Return the signed distance of a point [m], positive where it may be.
-
-        Args:
-            point: Shape (3,) [m].
-            clock: Of moving regions [s].
-        """
-        x, y, z = point
-        if isinstance(self.region, MovingRegion):
-            return self.region.distance_at(x, y, z, clock)[0]
-        return self.region.distance(x, y, z)[0]
-
-    def largest_speed(self, start: np.ndarray) -> float:
-        """Return the largest speed of what moves within 2 m of a start [m/s]."""
-        if isinstance(self.region, MovingRegion):
-            return self.region.largest_speed(start, _WORKSPACE)
-        return 0.0
 
 
 def make_fixtures(
@@ -71,7 +46,7 @@ def make_fixtures(
     start: np.ndarray,
     folder: FilePath,
     progress: Progress | None = None,
-) -> tuple[list[Fixture], list[str]]:
+) -> tuple[list[DrawnFixture], list[str]]:
     """Return the regions of a scenario, and what is odd about them, one sentence each.
 
     Args:
@@ -104,13 +79,13 @@ def make_fixtures(
 
 def _make_fixture(
     name: str, said: RegionParameters, folder: FilePath, progress: Progress | None
-) -> Fixture:
+) -> DrawnFixture:
     region = make_region(said, folder, progress)
     stiffness = math.inf if said.stiffness is None else said.stiffness
     if isinstance(said.shape, Box):
-        return Fixture(name, region, stiffness, _faces(said.shape))
+        return DrawnFixture(region, stiffness, name=name, surfaces=_faces(said.shape))
     surface = surface_from_shape(said.shape, _DRAWN, folder).surface
-    return Fixture(name, region, stiffness, [surface])
+    return DrawnFixture(region, stiffness, name=name, surfaces=[surface])
 
 
 def _faces(box: Box) -> Sequence[Surface]:

@@ -8,20 +8,21 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.believed import believed_robot
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.tasks.compliance import add_compliance, has_impedance, reference_order
-from diagrams.tasks.guidance import add_guidance
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
-from pfsc_drake.blocks.wiring_blocks import Collect, Constant
+from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.believed import Coefficients
+from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller
+from pfsc_drake.following.fixtures import add_fixture_guidance
+from pfsc_drake.following.followed import Wanted
+from pfsc_drake.following.reference import add_reference
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.following_controller import FollowingController
@@ -90,7 +91,7 @@ def add_place(
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     if not isinstance(task, SpaceTask):
-        order = reference_order(following.scenario, linearization)
+        order = reference_order(following.scenario.compliance, linearization)
         timed = TimedReference(task.motion, order, linearization.num_outputs, period)
         generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
@@ -168,27 +169,22 @@ def add_law(
         guidance = _add_guidance(builder, following, signals)
         desired = guidance.GetOutputPort("reference")
         made |= {name: guidance.GetOutputPort(port) for name, port in _GUIDANCE.items()}
-    desired = _add_smooth_start(builder, following, controller, desired)
-    made = {"reference": desired} | made
-    if has_impedance(scenario):
-        inputs = signals | {
-            "desired_reference": desired,
-            "manifold_state": controller.GetOutputPort("manifold_state"),
-        }
-        task = following.task
-        made |= add_compliance(
-            builder,
-            scenario,
-            law.linearization,
-            following.robot,
-            following.start,
-            inputs,
-            task.lap,
-            task.motion.domain[1],
-            task.length,
-        )
-    _connect_alarms(builder, controller, forces, made)
-    builder.Connect(made["reference"], controller.GetInputPort("reference"))
+    task, operator, transition = following.task, scenario.operator, scenario.start.transition
+    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
+    steady = transition == 0.0 or not law.linearization.manifold.follows_time
+    require(steady, "start.transition", transition, allowed)
+    wanted = Wanted(
+        following.start,
+        transition,
+        task.lap,
+        task.length,
+        task.motion.domain[1],
+        TuningParameters() if operator is None else operator.tuning,
+    )
+    told = signals | {"desired_reference": desired}
+    made |= add_reference(
+        builder, controller, law.linearization, following.robot, scenario.compliance, wanted, told
+    )
     return controller, made
 
 
@@ -198,57 +194,8 @@ def _add_guidance(
     """Add what leads a tool that has no reference of its own."""
     task, scenario = following.task, following.scenario
     assert isinstance(task, SpaceTask)  # see add_place
-    order = reference_order(scenario, following.law.linearization)
-    return add_guidance(builder, scenario, following.robot, task, order, signals, following.start)
-
-
-def _add_smooth_start(
-    builder: DiagramBuilder,
-    following: Following,
-    controller: FollowingController,
-    desired: OutputPort,
-) -> OutputPort:
-    """Return the reference, which starts where the tool is if it is to."""
-    duration, linearization = following.scenario.start.transition, following.law.linearization
-    if duration == 0.0:
-        return desired
-    allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
-    require(not linearization.manifold.follows_time, "start.transition", duration, allowed)
-    smooth = SmoothStart(
-        duration,
-        reference_order(following.scenario, linearization),
-        linearization.num_outputs,
-        controller.GetOutputPort("manifold_state").size(),
-        controller.period,
+    compliance, robot = scenario.compliance, following.robot
+    order = reference_order(compliance, following.law.linearization)
+    return add_fixture_guidance(
+        builder, task.guided, compliance, robot, order, signals, following.start
     )
-    start = builder.AddNamedSystem("smooth_start", BlockSystem(smooth, controller.period))
-    builder.Connect(desired, start.GetInputPort("desired_reference"))
-    builder.Connect(
-        controller.GetOutputPort("manifold_state"), start.GetInputPort("manifold_state")
-    )
-    return start.GetOutputPort("reference")
-
-
-def _connect_alarms(
-    builder: DiagramBuilder,
-    controller: FollowingController,
-    forces: dict[str, OutputPort],
-    made: dict[str, OutputPort],
-) -> None:
-    """Let the robot stop for faults of the force sensor and of the compliance, if there are any.
-
-    What compliance alone tells is taken out of what is made.
-    """
-    ports = [forces.get("sensor_fault"), forces.get("tared")]
-    ports += [made.pop(name, None) for name in ("compliance_status", "press_lost")]
-    if ports == [None] * len(ports):
-        return
-    names = ("sensor_fault", "tared", "compliance_status", "press_lost")
-    collect, period = Collect(dict.fromkeys(names, 1)), controller.period
-    alarms = builder.AddNamedSystem("alarms", BlockSystem(collect, period))
-    for name, port in zip(names, ports, strict=True):
-        if port is None:
-            none = builder.AddNamedSystem(f"no_{name}", BlockSystem(Constant([0.0]), period))
-            port = none.GetOutputPort("value")
-        builder.Connect(port, alarms.GetInputPort(name))
-    builder.Connect(alarms.GetOutputPort("all"), controller.GetInputPort("alarms"))

@@ -14,13 +14,11 @@ from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
-from pfsc_drake.control.compliance.impedance import Profile
-from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
-from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.errors import InputError
+from pfsc_drake.following.fixtures import Guided, free_motion, make_lead
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.hand_way import Place
@@ -39,6 +37,7 @@ class SpaceTask(Task):
     Attributes:
         fixtures: The regions.
         lead: What is between the velocity that is asked for and the tool.
+        guided: All that it is led through.
 
     Raises:
         InputError: If a region cannot be made, or the start is missing or forbidden.
@@ -53,7 +52,7 @@ class SpaceTask(Task):
     ) -> None:
         self._scenario = scenario
         parameters = scenario.fixtures or FixtureParameters()
-        free_motion(scenario)  # refuses what a hand could not move
+        motion = free_motion(scenario.compliance, scenario.controller.sampling_time)
         said = parameters.orientation
         self.place = SpaceManifold(
             RELATIVE_DEGREE[scenario.controller.law],
@@ -64,10 +63,12 @@ class SpaceTask(Task):
         given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
         require(bool(given), "start.position", given, allowed)
         self._start = np.array(given, dtype=float)
-        self.lead = make_lead(scenario)
+        self.lead = lead_of(scenario)
         require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
         self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
+        speeds = [fixture.largest_speed(self._start) for fixture in self.fixtures]
+        self.guided = Guided(self.place, self.fixtures, speeds, motion, self.lead, parameters)
         if self.place.is_oriented:
             R_d = self.place.orientation(self.place.point(given)[None])
             self.warnings += euler_warnings(
@@ -124,11 +125,6 @@ class SpaceTask(Task):
         """See :class:`Task`; coordinates are those of the world."""
         return lambda coordinates, rates: (coordinates, rates)
 
-    @property
-    def region_speeds(self) -> list[float]:
-        """Of each region the largest speed near the tool [m/s]."""
-        return [fixture.largest_speed(self._start) for fixture in self.fixtures]
-
     def distances(self, y_t: np.ndarray, clock: np.ndarray) -> np.ndarray:
         """Return how far tool points are from each region [m], shape (samples, M).
 
@@ -145,36 +141,17 @@ class SpaceTask(Task):
         """See :class:`Task`; all of space is there."""
 
 
-def free_motion(scenario: Scenario) -> Admittance:
-    """Return the motion of a tool that is led through space.
-
-    Args:
-        scenario: The scenario.
-
-    Raises:
-        InputError: If a hand could not move it.
-    """
-    along = scenario.compliance.tangential
-    mass, damping, stiffness = along.mass, along.damping, along.stiffness
-    free = not stiffness.at and stiffness.value == 0.0
-    constant = isinstance(damping, Profile) and not (mass.at or damping.at)
-    if not (free and constant and isinstance(damping, Profile) and damping.value > 0.0):
-        raise InputError(
-            "compliance.tangential: controller.manifold = space needs a constant mass, a constant "
-            "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
-        )
-    return Admittance(mass.value, damping.value, scenario.controller.sampling_time)
-
-
-def make_lead(scenario: Scenario) -> Lead:
+def lead_of(scenario: Scenario) -> Lead:
     """Return what is between the velocity that is asked for and the tool.
 
     Args:
         scenario: The scenario.
     """
     parameters = scenario.fixtures or FixtureParameters()
-    period, degree = scenario.controller.sampling_time, RELATIVE_DEGREE[scenario.controller.law]
-    if degree > 1:
-        return FilterLead(degree, parameters.smoothing, period)
-    lag = parameters.lag_behind(scenario.servo.bandwidth)
-    return ServoLead(lag, scenario.servo.bus_delay, period)
+    return make_lead(
+        RELATIVE_DEGREE[scenario.controller.law],
+        parameters,
+        scenario.controller.sampling_time,
+        lag=parameters.lag_behind(scenario.servo.bandwidth),
+        delay=scenario.servo.bus_delay,
+    )

@@ -1,9 +1,7 @@
 """Switches of regions in a station that a person stands at."""
 
 import copy
-from types import SimpleNamespace
 
-import casadi as ca
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -13,11 +11,8 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.operator import OperatorParameters
 from diagrams.surroundings.operator import idle_controls
 from diagrams.surroundings.operator_file import controls_text
-from diagrams.tasks.guidance import near_expression, stiff_regions
+from diagrams.tasks.guidance import stiff_regions
 from experiments.catalog.scenario_catalog import find_scenario
-from pfsc_drake.geometry import torus
-from pfsc_drake.geometry.regions.shapes import SphereRegion
-from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
 from pfsc_drake.yaml.typed import load_file
 
 
@@ -34,18 +29,6 @@ def test_names_of_modes_and_regions(wedge):
     assert settings.fixtures.names == ["plane_1", "plane_2"]
     assert [fixture.name for fixture in station.task.fixtures] == settings.fixtures.names
     assert "mode" in station.log.rows
-
-
-def test_what_has_no_formula_is_left_to_a_schedule(wedge):
-    settings = wedge[0]
-    regions = [
-        SphereRegion((0.0, 0.0, 0.0), 0.1, inside=False),
-        SurfaceRegion(torus(0.3, 0.1), above=True),
-    ]
-    for count, expected in ((1, ca.Function), (2, type(None))):
-        fixtures = [SimpleNamespace(region=region) for region in regions[:count]]
-        task = SimpleNamespace(fixtures=fixtures, region_speeds=[0.0] * count)
-        assert isinstance(near_expression(settings, task), expected)
 
 
 def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):

@@ -1,13 +1,11 @@
 """Compliance: from forces on the tool to the reference of the law."""
 
-import math
 from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import ComplianceParameters, Scenario
 from pfsc_drake.control.compliance.impedance import (
     DAMPING,
     MASS,
@@ -19,14 +17,16 @@ from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.compliance.pressing import Pressing
-from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner
+from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
+from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, Manifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.followed import Wanted
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -34,30 +34,31 @@ from pfsc_drake.systems.block_system import BlockSystem
 _DESIRED_ORDER = 4
 
 
-def has_impedance(scenario: Scenario) -> bool:
+def has_impedance(compliance: ComplianceParameters, manifold: Manifold) -> bool:
     """Return whether the reference of the law is one that an impedance lets yield.
 
     In space a tool is led along by guidance, so that only the angles need an impedance.
 
     Args:
-        scenario: The scenario.
+        compliance: How the tool yields.
+        manifold: What is followed.
     """
-    if scenario.controller.manifold != SpaceManifold.name:
-        return scenario.compliance.is_given
-    return ComplianceParameters(rotational=scenario.compliance.rotational).is_given
+    if manifold.name != SpaceManifold.name:
+        return compliance.is_given
+    return ComplianceParameters(rotational=compliance.rotational).is_given
 
 
-def reference_order(scenario: Scenario, linearization: Linearization) -> int:
+def reference_order(compliance: ComplianceParameters, linearization: Linearization) -> int:
     """Return the highest derivative of the external reference that is needed.
 
     Args:
-        scenario: The scenario.
+        compliance: How the tool yields.
         linearization: Of the law.
 
     Raises:
         InputError: If there is compliance that the law cannot have.
     """
-    if not has_impedance(scenario):
+    if not has_impedance(compliance, linearization.manifold):
         return linearization.relative_degree
     if linearization.manifold.follows_time:
         raise InputError(
@@ -67,31 +68,43 @@ def reference_order(scenario: Scenario, linearization: Linearization) -> int:
     return max(linearization.relative_degree, _DESIRED_ORDER)
 
 
+def force_ports(
+    compliance: ComplianceParameters, ports: dict[str, OutputPort]
+) -> tuple[OutputPort, OutputPort]:
+    """Return the wrench that a tool yields to, and whether it is to be trusted.
+
+    Args:
+        compliance: How the tool yields.
+        ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
+            ``ready``.
+    """
+    names = ("wrench_measured", "tared")
+    if compliance.source == "observed":
+        names = ("wrench_observed", "ready")
+    return ports[names[0]], ports[names[1]]
+
+
 def add_compliance(
     builder: DiagramBuilder,
-    scenario: Scenario,
+    compliance: ComplianceParameters,
     linearization: Linearization,
     robot: RobotModel,
-    start: np.ndarray,
+    wanted: Wanted,
     ports: dict[str, OutputPort],
-    lap: float | None = None,
-    end: float = math.inf,
-    length: float = 0.0,
+    period: float,
 ) -> dict[str, OutputPort]:
     """Add everything between the measured forces on the tool and the reference of the law.
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario, with compliance.
+        compliance: How the tool yields.
         linearization: Of the law that follows the reference.
         robot: The robot as it is believed, N joints.
-        start: Joint coordinates at the start, shape (N,).
-        ports: ``wrench_measured`` and ``tared``, or without a sensor ``wrench_observed`` and
-            ``ready``; ``manifold_point``, ``manifold_state`` and ``desired_reference`` with
-            derivatives up to :func:`reference_order`; with an operator ``impedance_wish``.
-        lap: Length of the path [m] if it is closed.
-        end: When the external reference ends [s].
-        length: Of the path [m], if there is one.
+        wanted: What is wanted of the tool without forces.
+        ports: See :func:`force_ports`; ``joint_state``, ``manifold_point``, ``manifold_state`` and
+            ``desired_reference`` with derivatives up to :func:`reference_order`; with an operator
+            ``impedance_wish``.
+        period: Sampling time [s].
 
     Returns:
         ``reference`` for the law, and for the log ``desired_reference``, ``manifold_force``, with
@@ -103,46 +116,43 @@ def add_compliance(
     Raises:
         InputError: If the compliance does not suit the law.
     """
-    manifold, period = linearization.manifold, scenario.controller.sampling_time
-    impedance_parameters = scenario.compliance.impedance()
+    manifold, impedance_parameters = linearization.manifold, compliance.impedance()
     if manifold.name == SpaceManifold.name:
         # guidance leads along, see add_guidance
         impedance_parameters.tangential = CoordinateImpedance()
     law = ImpedanceLaw(
-        impedance_parameters.on_path(length),
+        impedance_parameters.on_path(wanted.length),
         manifold.coordinates,
         linearization.relative_degree,
         period,
-        desired_order=reference_order(scenario, linearization),
-        lap=lap,
+        desired_order=reference_order(compliance, linearization),
+        lap=wanted.lap,
     )
-    limits = _limits(scenario, linearization, robot, start)
+    limits = _limits(compliance, linearization.manifold, robot, wanted.start, period)
     free = None if limits is None else limits.tangential
     yielding = ImpedanceFilter(law, start="actual", free=free)
     impedance = builder.AddNamedSystem("impedance_filter", BlockSystem(yielding, period))
-    along = ManifoldForceTransform(manifold, with_turning=scenario.compliance.with_turning)
+    along = ManifoldForceTransform(manifold, with_turning=compliance.with_turning)
     transform = builder.AddNamedSystem("manifold_force_transform", BlockSystem(along, period))
     reference = impedance.GetOutputPort("reference")
     force = transform.GetOutputPort("manifold_force")
-    wrench, ready = "wrench_measured", "tared"
-    if scenario.compliance.source == "observed":
-        wrench, ready = "wrench_observed", "ready"
-    builder.Connect(ports[wrench], transform.GetInputPort("wrench"))
+    wrench, ready = force_ports(compliance, ports)
+    builder.Connect(wrench, transform.GetInputPort("wrench"))
     builder.Connect(ports["manifold_point"], transform.GetInputPort("manifold_point"))
     if transform.HasInputPort("reference"):
         builder.Connect(reference, transform.GetInputPort("reference"))
-    told = {"manifold_force": force, "reference": reference, "ready": ports[ready]}
-    signals = _add_press(builder, scenario, law, manifold.coordinates, told, end)
+    told = {"manifold_force": force, "reference": reference, "ready": ready}
+    signals = _add_press(builder, compliance, law, manifold.coordinates, told, wanted.end)
     builder.Connect(signals.pop("pressed_force", force), impedance.GetInputPort("manifold_force"))
-    builder.Connect(ports[ready], impedance.GetInputPort("ready"))
+    builder.Connect(ready, impedance.GetInputPort("ready"))
     for name in ("desired_reference", "manifold_state"):
         builder.Connect(ports[name], impedance.GetInputPort(name))
     desired = ports["desired_reference"]
     if limits is not None:
         signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
-    # where guidance leads along, the impedance is the scenario's
+    # where guidance leads along, the impedance is the one given
     if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
-        signals |= _add_tuner(builder, scenario, linearization, law, impedance, ports)
+        signals |= _add_tuner(builder, wanted.tuning, manifold.coordinates, law, impedance, ports)
     elif not law.is_constant:
         signals["damping"] = impedance.GetOutputPort("damping")
     return signals | {
@@ -154,11 +164,14 @@ def add_compliance(
 
 
 def _limits(
-    scenario: Scenario, linearization: Linearization, robot: RobotModel, start: np.ndarray
+    compliance: ComplianceParameters,
+    manifold: Manifold,
+    robot: RobotModel,
+    start: np.ndarray,
+    period: float,
 ) -> LedMotion | None:
     """Return what of the robot limits a hand that leads it along a manifold, if one does."""
-    parameters, manifold = scenario.compliance.limits, linearization.manifold
-    stiffness = scenario.compliance.tangential.stiffness
+    parameters, stiffness = compliance.limits, compliance.tangential.stiffness
     led = bool(stiffness.at) or np.isfinite(stiffness.value)
     if not (led and parameters.on and isinstance(manifold, PathManifold | SurfaceManifold)):
         return None
@@ -170,7 +183,7 @@ def _limits(
         tool_axis=manifold.tool.tool_axis,
         yaw_axis=manifold.tool.yaw_axis,
     )
-    return LedMotion(limits, manifold, scenario.controller.sampling_time)
+    return LedMotion(limits, manifold, period)
 
 
 def _add_limits(
@@ -191,15 +204,13 @@ def _add_limits(
 
 def _add_tuner(
     builder: DiagramBuilder,
-    scenario: Scenario,
-    linearization: Linearization,
+    tuning: TuningParameters,
+    coordinates: Sequence[Coordinate],
     law: ImpedanceLaw,
     impedance: BlockSystem,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Let an operator change the impedance; return it as it is, and the tank that pays for it."""
-    assert scenario.operator is not None
-    coordinates = linearization.manifold.coordinates
     given = _impedance_at_origin(law)
     # what is rigid has no mass of its own
     soft = np.isfinite(given[STIFFNESS])
@@ -208,14 +219,14 @@ def _add_tuner(
     masses[indices(coordinates, Kind.ROTATIONAL)] = given[
         MASS, indices(coordinates, Kind.ROTATIONAL)
     ]
-    tuning = ImpedanceTuner(scenario.operator.tuning, law, coordinates, masses)
+    block = ImpedanceTuner(tuning, law, coordinates, masses)
     sources = {
         "wish": ports["impedance_wish"],
         "manifold_state": ports["manifold_state"],
         "reference": impedance.GetOutputPort("reference"),
         "desired_reference": ports["desired_reference"],
     }
-    tuner = builder.AddNamedSystem("impedance_tuner", BlockSystem(tuning, law.period))
+    tuner = builder.AddNamedSystem("impedance_tuner", BlockSystem(block, law.period))
     for name, port in sources.items():
         builder.Connect(port, tuner.GetInputPort(name))
     builder.Connect(tuner.GetOutputPort("impedance"), impedance.GetInputPort("impedance"))
@@ -224,14 +235,14 @@ def _add_tuner(
 
 def _add_press(
     builder: DiagramBuilder,
-    scenario: Scenario,
+    compliance: ComplianceParameters,
     law: ImpedanceLaw,
     coordinates: Sequence[Coordinate],
     ports: dict[str, OutputPort],
     end: float,
 ) -> dict[str, OutputPort]:
     """Return what :class:`Pressing` gives, if there is a force reference."""
-    press = scenario.compliance.press
+    press = compliance.press
     if press is None:
         return {}
     across = indices(coordinates, Kind.TRANSVERSAL)
@@ -252,7 +263,7 @@ def _add_press(
         across.start,
         len(coordinates),
         ports["reference"].size(),
-        scenario.controller.sampling_time,
+        law.period,
         press.allowed_difference,
         press.taken_off(end),
     )

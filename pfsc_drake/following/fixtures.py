@@ -1,0 +1,226 @@
+"""The reference of a tool that is led by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
+from pfsc_drake.blocks.wiring_blocks import Linear
+from pfsc_drake.control.compliance.impedance import Profile
+from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
+from pfsc_drake.control.fixtures.fixture import Fixture
+from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
+from pfsc_drake.control.fixtures.guidance import ProgramGuidance
+from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
+from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
+from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.fixtures.printed import PrintedGuidance
+from pfsc_drake.control.fixtures.program import MOST_NEAR
+from pfsc_drake.control.fixtures.robot_limits import RobotLimits
+from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.compliance import force_ports
+from pfsc_drake.following.options.compliance import ComplianceParameters
+from pfsc_drake.following.options.fixtures import FixtureOptions
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.control.near_regions import NearRegions
+
+
+@dataclass(frozen=True)
+class Guided:
+    """What a tool is led through.
+
+    Attributes:
+        place: Space, with the orientation that the tool keeps.
+        fixtures: The M regions.
+        speeds: Of each the largest speed near the tool [m/s].
+        motion: The free motion.
+        lead: What is between the velocity that is asked for and the tool.
+        options: What else is chosen.
+    """
+
+    place: SpaceManifold
+    fixtures: Sequence[Fixture]
+    speeds: Sequence[float]
+    motion: Admittance
+    lead: Lead
+    options: FixtureOptions
+
+
+def free_motion(compliance: ComplianceParameters, period: float) -> Admittance:
+    """Return the motion of a tool that is led through space.
+
+    Args:
+        compliance: How the tool yields.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If a hand could not move it.
+    """
+    along = compliance.tangential
+    mass, damping, stiffness = along.mass, along.damping, along.stiffness
+    free = not stiffness.at and stiffness.value == 0.0
+    constant = isinstance(damping, Profile) and not (mass.at or damping.at)
+    if not (free and constant and isinstance(damping, Profile) and damping.value > 0.0):
+        raise InputError(
+            "compliance.tangential: controller.manifold = space needs a constant mass, a constant "
+            "positive damping, and stiffness: {value: 0}, so that a hand can lead the tool"
+        )
+    return Admittance(mass.value, damping.value, period)
+
+
+def make_lead(
+    relative_degree: int, options: FixtureOptions, period: float, *, lag: float, delay: float
+) -> Lead:
+    """Return what is between the velocity that is asked for and the tool.
+
+    Args:
+        relative_degree: r of the law.
+        options: What is chosen.
+        period: Sampling time [s].
+        lag: Of velocity servos [s], for r = 1.
+        delay: Of commands on their way to them [s].
+    """
+    if relative_degree > 1:
+        return FilterLead(relative_degree, options.smoothing, period)
+    return ServoLead(lag, delay, period)
+
+
+def add_fixture_guidance(
+    builder: DiagramBuilder,
+    guided: Guided,
+    compliance: ComplianceParameters,
+    robot: RobotModel,
+    order: int,
+    ports: dict[str, OutputPort],
+    start: np.ndarray,
+) -> BlockSystem:
+    """Add what leads the tool.
+
+    Args:
+        builder: Builder of the diagram.
+        guided: What it is led through.
+        compliance: Where the forces that lead it come from.
+        robot: The robot as it is believed.
+        order: Highest derivative of the reference that is needed.
+        ports: ``joint_state`` as measured, and those of :func:`force_ports`; where a person can
+            change them, ``regions_on`` and ``impedance_wish``, see :class:`ImpedanceTuner`.
+        start: Joint coordinates at the start, shape (N,).
+
+    Raises:
+        InputError: If the rules do not suit the law.
+    """
+    period, count = guided.motion.period, len(guided.fixtures)
+    guidance = make_guidance(guided, robot, order, start)
+    system = builder.AddNamedSystem("fixture_guidance", BlockSystem(guidance, period))
+    if guidance.tool.near is None:
+        regions = NearRegions(scheduled_regions(guided), count, period)
+        near = builder.AddNamedSystem("near_regions", regions)
+        builder.Connect(system.GetOutputPort("place"), near.GetInputPort("place"))
+        builder.Connect(near.GetOutputPort("near"), system.GetInputPort("near"))
+        if "regions_on" in ports:
+            builder.Connect(ports["regions_on"], near.GetInputPort("active"))
+    wrench, ready = force_ports(compliance, ports)
+    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
+    builder.Connect(wrench, system.GetInputPort("wrench"))
+    builder.Connect(ready, system.GetInputPort("ready"))
+    if "regions_on" in ports:
+        builder.Connect(ports["regions_on"], system.GetInputPort("active"))
+    if "impedance_wish" in ports:
+        picked = np.zeros((1, WISHES))
+        _, place = wishes_of(Kind.TANGENTIAL)
+        picked[0, place] = 1.0
+        damping = builder.AddNamedSystem("free_damping", BlockSystem(Linear(picked), period))
+        builder.Connect(ports["impedance_wish"], damping.GetInputPort("vector"))
+        builder.Connect(damping.GetOutputPort("product"), system.GetInputPort("damping"))
+    return system
+
+
+def make_guidance(
+    guided: Guided, robot: RobotModel, order: int, start: np.ndarray
+) -> FixtureGuidance:
+    """Return the rules that lead a tool.
+
+    Args:
+        guided: What it is led through.
+        robot: The robot as it is believed.
+        order: Highest derivative of the reference that is needed.
+        start: Joint coordinates at the start, shape (N,).
+
+    Raises:
+        InputError: If the rules do not suit the law.
+    """
+    parameters = guided.options.guidance
+    tool = LedTool(
+        tool_motion_function(robot),
+        guided.lead,
+        guided.motion,
+        len(guided.fixtures),
+        near_expression(guided),
+        order,
+        len(guided.place.coordinates),
+    )
+    if parameters.rules == "printed":
+        if not isinstance(guided.lead, ServoLead):
+            raise InputError(
+                "fixtures.guidance.rules = printed: controller.law must be velocity_servo, as in "
+                "Sec. 5.2.4"
+            )
+        return PrintedGuidance(tool, parameters.printed)
+    stiffness = [fixture.stiffness for fixture in guided.fixtures]
+    return ProgramGuidance(tool, parameters, stiffness, _robot_limits(guided, robot, start))
+
+
+def _robot_limits(guided: Guided, robot: RobotModel, start: np.ndarray) -> RobotLimits | None:
+    """Return what of the robot limits the hand, if anything is to."""
+    options, place = guided.options, guided.place
+    if not options.limits.on:
+        return None
+    return RobotLimits(
+        robot,
+        options.limits,
+        start,
+        oriented=place.is_oriented,
+        tool_axis=place.tool.tool_axis,
+        yaw_axis=place.tool.yaw_axis,
+        fastest=options.guidance.largest_speed + max(guided.speeds, default=0.0),
+    )
+
+
+def near_expression(guided: Guided) -> ca.Function | None:
+    """Return what is near as an expression; None where that takes a schedule of distances.
+
+    Many regions do, those whose distances are bounded in number, and what has no formula.
+
+    Args:
+        guided: What the tool is led through.
+    """
+    options = guided.options
+    if len(guided.fixtures) > MOST_NEAR or options.looks:
+        return None
+    within = reaches(options.guidance, guided.motion.period, guided.speeds)
+    try:
+        return near_rows([fixture.region for fixture in guided.fixtures], within)
+    except InputError:  # a fitted surface of many pieces
+        return None
+
+
+def scheduled_regions(guided: Guided) -> ScheduledRegions:
+    """Return the schedule of many distances.
+
+    Args:
+        guided: What the tool is led through.
+    """
+    options = guided.options
+    return ScheduledRegions(
+        [fixture.region for fixture in guided.fixtures],
+        options.guidance,
+        guided.motion.period,
+        speeds=guided.speeds,
+        looks=options.looks or None,
+    )

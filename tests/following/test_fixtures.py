@@ -1,0 +1,47 @@
+"""What is near a tool that is led by hand, as an expression or by a schedule."""
+
+import casadi as ca
+import pytest
+
+from pfsc_drake.control.fixtures.fixture import Fixture
+from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
+from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.following.fixtures import Guided, make_lead, near_expression
+from pfsc_drake.following.options.fixtures import FixtureOptions
+from pfsc_drake.geometry import torus
+from pfsc_drake.geometry.regions.shapes import SphereRegion
+from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
+
+PERIOD = 1e-3
+BALL = SphereRegion((0.0, 0.0, 0.0), 0.1, inside=False)
+
+
+def guided(regions, looks=0):
+    options = FixtureOptions(looks=looks)
+    lead = make_lead(2, options, PERIOD, lag=0.0, delay=0.0)
+    fixtures = [Fixture(region) for region in regions]
+    motion = Admittance(3.0, 60.0, PERIOD)
+    return Guided(SpaceManifold(2), fixtures, [0.0] * len(fixtures), motion, lead, options)
+
+
+def test_what_has_no_formula_is_left_to_a_schedule():
+    fitted = SurfaceRegion(torus(0.3, 0.1), above=True)
+    assert isinstance(near_expression(guided([BALL])), ca.Function)
+    assert near_expression(guided([BALL, fitted])) is None
+
+
+def test_many_regions_and_those_on_a_budget_are_left_to_a_schedule():
+    assert isinstance(near_expression(guided([BALL] * 8)), ca.Function)
+    assert near_expression(guided([BALL] * 9)) is None
+    assert near_expression(guided([BALL], looks=2)) is None
+
+
+def test_before_servos_their_lag_counts_before_torques_a_filter():
+    options = FixtureOptions(smoothing=0.004)
+    servo = make_lead(1, options, PERIOD, lag=0.005, delay=0.002)
+    assert isinstance(servo, ServoLead)
+    assert servo.lag == pytest.approx(0.007)
+    filtered = make_lead(3, options, PERIOD, lag=0.005, delay=0.002)
+    assert isinstance(filtered, FilterLead)
+    assert filtered.lag == pytest.approx(0.008)
