@@ -1,7 +1,7 @@
 """A network as few functions: stages of outputs, what is remembered, how it begins."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -51,6 +51,8 @@ class Program:
         stages: In an order in which they can be evaluated.
         update: ``x`` of the next tick, called ``x_next``.
         update_inputs, update_states, update_stages: What it takes.
+        update_stage: The stage that needs all that the update needs, so that both can be one
+            function, see :meth:`with_update`; None if there is none.
         initial: ``x`` at the start, called ``x_start``, of ``x``, ``preset`` (a number for each
             state by name; where it is not 0 that of ``x`` stays), ``t`` and ``initial_inputs``.
 
@@ -78,6 +80,7 @@ class Program:
             for k, stage in enumerate(self.stages)
         ]
         self._make_update()
+        self.update_stage = self._place_of_update()
         self._make_initial()
 
     def output(self, output: str) -> tuple[int, slice]:
@@ -121,6 +124,45 @@ class Program:
             # an input and an output may be called the same
             {"allow_duplicate_io_names": True},
         )
+
+    def with_update(self, k: int) -> Stage:
+        """Return a stage that has ``x_next`` behind its results.
+
+        Args:
+            k: The stage, :attr:`update_stage` of this program or of one with more inputs.
+        """
+        stage = self.stages[k]
+        arguments = {*stage.function.name_in(), *self.update.name_in()}
+        inputs = {name: symbol for name, symbol in self._u.items() if name in arguments}
+        stages = tuple(sorted({*stage.stages, *self.update_stages} - {k}))
+        named = {"x": self._x, "t": self._t} | inputs
+        named |= {f"stage_{j}": self._made[j] for j in stages}
+        result = _call(stage.function, named)
+        later = _call(self.update, named | {f"stage_{k}": result})
+        function = ca.Function(
+            f"stage_{k}_and_update",
+            list(named.values()),
+            [ca.vertcat(result, later)],
+            list(named),
+            ["result"],
+        )
+        states = stage.states | self.update_states
+        return replace(stage, function=function, inputs=tuple(inputs), states=states, stages=stages)
+
+    def _place_of_update(self) -> int | None:
+        nodes = self.network.updates
+        for k in reversed(range(len(self.stages) if self.size else 0)):
+            stage = self.stages[k]
+            needs = {False: stage.needs, True: stage.needs_at_start}
+            fits = all(
+                self._source_needs(source, at_start=begin) <= needs[begin]
+                for begin in needs
+                for node in nodes
+                for source in node.sources
+            )
+            if fits and all(j <= k for j in self.update_stages):
+                return k
+        return None
 
     def _grouped(self, order: list[Node], like: "Program | None") -> list[list[Node]]:
         """Return nodes by what they need, those that need less before."""
@@ -215,16 +257,18 @@ class Program:
         """Return the inputs that a node depends on, by way of wires and, at start, of states."""
         key = node.results[0], at_start
         if key not in self._needs:
-            needs: set[Source] = set()
-            for source in node.sources:
-                if source.kind in ("input", "tick"):
-                    needs.add(source)
-                elif source.kind == "wire":
-                    needs |= self._needs_of(self._maker[source.name], at_start=at_start)
-                elif at_start and source.name in self._starter:
-                    needs |= self._needs_at_start(self._starter[source.name])
-            self._needs[key] = frozenset(needs)
+            needs = (self._source_needs(source, at_start=at_start) for source in node.sources)
+            self._needs[key] = frozenset().union(*needs)
         return self._needs[key]
+
+    def _source_needs(self, source: Source, *, at_start: bool) -> Needs:
+        if source.kind == "wire":
+            return self._needs_of(self._maker[source.name], at_start=at_start)
+        if source.kind != "state":
+            return frozenset({source})
+        if at_start and source.name in self._starter:
+            return self._needs_at_start(self._starter[source.name])
+        return frozenset()
 
     def _needs_at_start(self, node: Node) -> Needs:
         needs: set[Source] = set()

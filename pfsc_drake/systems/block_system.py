@@ -90,7 +90,7 @@ class BlockSystem(LeafSystem):
         self._optional = [name for name, port in whole.inputs.items() if port.optional]
         self._asked: set[str] = set()
         self._stages: list[CacheEntry] = []
-        for k, stage in enumerate(declared.stages):
+        for k, stage in enumerate(_stages(declared, declared.update_stage)):
             self._stages.append(self._declare_stage(k, stage))
         for port in whole.outputs:
             self._declare_output(port)
@@ -168,13 +168,13 @@ class BlockSystem(LeafSystem):
 
         def calc(context: Context, value: Value) -> None:
             functions = self._program(context)
-            stage = functions.program.stages[k]
+            stage, bound = functions.stages[k]
             made = [(j, self._stages[j].Eval(context)) for j in stage.stages]
             self._given(context, functions, stage.inputs, shown, stage.needs_at_start)
             for j, values in made:
-                functions.made[j][:] = values
-            functions.stages[k].evaluate()
-            value.set_value(functions.stages[k].results["result"].copy())
+                functions.made[j][:] = values[: len(functions.made[j])]
+            bound.evaluate()
+            value.set_value(bound.results["result"].copy())
 
         needs = stage.needs | stage.needs_at_start
         sources = {self._inputs[s.name].ticket() for s in needs if s.kind == "input"}
@@ -210,7 +210,7 @@ class BlockSystem(LeafSystem):
             if left:
                 assert self.block is not None  # a network leaves no input open
                 program = Program(Network.of(self.block, left, self.network), self._declared)
-            self._programs[left] = _Functions(program)
+            self._programs[left] = _Functions(program, self._declared.update_stage)
         return self._programs[left]
 
     def _is_connected(self, context: Context, name: str) -> bool:
@@ -276,22 +276,37 @@ class BlockSystem(LeafSystem):
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
+        later = self._later(context)
+        state.get_mutable_value(self._memory)[self._own] = later[: self._hidden]
+        for group, part in self._shown.values():
+            state.get_mutable_value(group)[:] = later[part]
+
+    def _later(self, context: Context) -> np.ndarray:
+        """Return the states of the next tick."""
+        if self._declared.update_stage is not None:
+            found: np.ndarray = self._stages[self._declared.update_stage].Eval(context)
+            return found[-self._declared.size :]
         functions = self._program(context)
         made = [(k, self._stages[k].Eval(context)) for k in functions.program.update_stages]
         self._given(context, functions, functions.program.update_inputs, self._kept)
         for k, values in made:
             functions.made[k][:] = values
         functions.update.evaluate()
-        later = functions.update.results["x_next"]
-        state.get_mutable_value(self._memory)[self._own] = later[: self._hidden]
-        for group, part in self._shown.values():
-            state.get_mutable_value(group)[:] = later[part]
+        return functions.update.results["x_next"]
+
+
+def _stages(program: Program, update_stage: int | None) -> list[Stage]:
+    """Return a program's stages, one of them with the update."""
+    stages = list(program.stages)
+    if update_stage is not None:
+        stages[update_stage] = program.with_update(update_stage)
+    return stages
 
 
 class _Functions:
     """The functions of a program, bound to one set of arrays."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, update_stage: int | None) -> None:
         self.program = program
         self.x, self.t = np.zeros(program.size), np.zeros(1)
         self.preset = np.zeros(len(program.states))
@@ -299,8 +314,12 @@ class _Functions:
         self.made = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
         arrays = {"x": self.x, "t": self.t, "preset": self.preset} | self.u
         arrays |= {f"stage_{k}": values for k, values in enumerate(self.made)}
-        self.stages = [_bound(stage.function, arrays) for stage in program.stages]
-        self.update, self.initial = _bound(program.update, arrays), _bound(program.initial, arrays)
+        self.stages = [
+            (stage, _bound(stage.function, arrays)) for stage in _stages(program, update_stage)
+        ]
+        self.initial = _bound(program.initial, arrays)
+        if update_stage is None:
+            self.update = _bound(program.update, arrays)
 
 
 def _bound(function: ca.Function, arrays: dict[str, np.ndarray]) -> BoundFunction:

@@ -199,3 +199,21 @@ def test_wrong_inputs_are_refused():
 def test_unfed_inputs_are_named():
     with pytest.raises(ValueError, match=r"one.bias: nothing is connected"):
         Wiring({"one": Network.of(Lag())}, {("one", "value"): "u"}).network()
+
+
+def test_what_is_remembered_is_evaluated_with_the_stage_that_needs_as_much():
+    """One function then, of what two would tell; a lag's bias is needed by its update alone."""
+    assert Program(Network.of(Lag())).update_stage is None
+    program = Program(Network.of(Square()))
+    k = program.update_stage
+    assert k is not None
+    joined, stage = program.with_update(k).function, program.stages[k].function
+    numbers = {"x": ca.DM(0.5), "t": ca.DM(3.0), "u": ca.DM(1.7)}
+
+    def value(function):
+        return function(*(numbers[name] for name in function.name_in())).full().ravel()
+
+    numbers[f"stage_{k}"] = ca.DM(value(stage))
+    later = value(program.update)
+    np.testing.assert_array_equal(later, [1.7**2 + 1.0])
+    np.testing.assert_array_equal(value(joined), [*value(stage), *later])
