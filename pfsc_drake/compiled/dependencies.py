@@ -21,6 +21,8 @@ _READS_EVERYTHING = {
     ca.OP_SETNONZEROS_PARAM,
     ca.OP_ADDNONZEROS_PARAM,
 }
+# operations on sparse patterns take as long as on dense ones of so many entries
+_MANY = 1_000_000
 
 
 def dependencies(function: ca.Function) -> np.ndarray:
@@ -76,8 +78,9 @@ class _Walk:
     def _of_its_kind(self, function: ca.Function) -> sp.sparray:
         kind, parts = function.class_name(), function.info()
         if kind == "MXFunction":
-            n_in = sum(_sizes_in(function))
-            return self._matrices(function, sp.eye_array(n_in, dtype=bool, format="csr"))
+            elements = sp.eye_array(sum(_sizes_in(function)), dtype=bool, format="csr")
+            small = function.sz_w() * elements.shape[0] < _MANY
+            return self._matrices(function, elements.toarray() if small else elements)
         if kind == "SXFunction" and not _calls(function):
             return _jacobian(function)
         if kind == "Map":
