@@ -188,8 +188,7 @@ def _touching(
     for _ in range(_STEPS):
         (h_1, *n_1), (h_2, *n_2) = (_distance(region, y, clock) for region in (one, other))
         cosine = sum(a * b for a, b in zip(n_1, n_2, strict=True))
-        across = np.cross(n_1, n_2)
-        square = float(across @ across)
+        square = sum((n_1[i - 2] * n_2[i - 1] - n_1[i - 1] * n_2[i - 2]) ** 2 for i in range(3))
         if max(abs(h_1), abs(h_2)) < _COMMON:
             angle = math.degrees(math.atan2(math.sqrt(square), cosine))
             if angle < _NEARLY_PARALLEL_DEG:
