@@ -1,7 +1,11 @@
-"""How properties are tested: without looking at the clock, and longer by ``make fuzz``."""
+"""How properties are tested, without looking at the clock; and when code is compiled."""
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
+
+from pfsc_drake.compiled import bound_function
+from pfsc_drake.compiled.native_code import native_code
+from tests.deferred_code import DeferredCode
 
 _CALM = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture, HealthCheck.data_too_large]
 
@@ -16,6 +20,16 @@ settings.register_profile(
     print_blob=True,
 )
 settings.load_profile("suite")
+
+# where machine code is the subject, or speed
+_COMPILED_AT_ONCE = {"compiled", "benchmarks", "live"}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Compile what is evaluated often, and in some folders everything."""
+    at_once = _COMPILED_AT_ONCE & {*item.nodeid.split("/")}
+    bound_function.native_code = native_code if at_once else DeferredCode
 
 
 @pytest.fixture
