@@ -3,7 +3,8 @@
 After B. Bischof, "Path and Surface Following Control for Industrial Robotic
 Applications", dissertation, TU Wien, 2018.
 
-The door: :func:`add_path_following` and what its arguments are made of. Behind it, imports only
+The three doors, :func:`add_path_following`, :func:`add_surface_following` and
+:func:`add_guidance`, and what their arguments are made of. Behind it, imports only
 point downwards:
 
 * :mod:`pfsc_drake.following`: whole controllers, from the joint state to the drives.
@@ -26,14 +27,22 @@ __version__ = "0.1.0"
 
 # what users import, and the modules that are loaded when they do
 _DOOR = {
+    "ComplianceParameters": "pfsc_drake.following.options.compliance",
     "ControllerParameters": "pfsc_drake.following.options.controller",
+    "CoordinateImpedance": "pfsc_drake.control.compliance.impedance",
     "FaultParameters": "pfsc_drake.following.options.faults",
+    "Fixture": "pfsc_drake.control.fixtures.fixture",
     "Follower": "pfsc_drake.following.follower",
     "FollowerOptions": "pfsc_drake.following.follower",
     "GainParameters": "pfsc_drake.following.options.controller",
+    "GuidanceOptions": "pfsc_drake.following.guidance",
+    "HalfSpace": "pfsc_drake.geometry.regions.shapes",
     "LawGains": "pfsc_drake.following.options.controller",
     "Path": "pfsc_drake.geometry",
+    "Profile": "pfsc_drake.control.compliance.impedance",
+    "SphereRegion": "pfsc_drake.geometry.regions.shapes",
     "WaypointTable": "pfsc_drake.geometry",
+    "add_guidance": "pfsc_drake.following.guidance",
     "add_path_following": "pfsc_drake.following.path_following",
     "add_surface_following": "pfsc_drake.following.surface_following",
     "fuse": "pfsc_drake.systems.fuse",

@@ -18,7 +18,8 @@ from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.fixtures import Guided, free_motion, make_lead
+from pfsc_drake.following.fixtures import free_motion, make_lead
+from pfsc_drake.following.followed import Guided
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.hand_way import Place

@@ -1,8 +1,5 @@
 """The reference of a tool that is led by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import casadi as ca
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -10,7 +7,6 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.compliance.impedance import Profile
 from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
-from pfsc_drake.control.fixtures.fixture import Fixture
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
@@ -21,35 +17,14 @@ from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.manifolds.manifold import Kind
-from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.compliance import force_ports
+from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.fixtures import FixtureOptions
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.control.near_regions import NearRegions
-
-
-@dataclass(frozen=True)
-class Guided:
-    """What a tool is led through.
-
-    Attributes:
-        place: Space, with the orientation that the tool keeps.
-        fixtures: The M regions.
-        speeds: Of each the largest speed near the tool [m/s].
-        motion: The free motion.
-        lead: What is between the velocity that is asked for and the tool.
-        options: What else is chosen.
-    """
-
-    place: SpaceManifold
-    fixtures: Sequence[Fixture]
-    speeds: Sequence[float]
-    motion: Admittance
-    lead: Lead
-    options: FixtureOptions
 
 
 def free_motion(compliance: ComplianceParameters, period: float) -> Admittance:

@@ -1,15 +1,42 @@
 """What a tool is to follow: a manifold, where it is found, and the motion along it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
+from pfsc_drake.control.fixtures.fixture import Fixture
+from pfsc_drake.control.fixtures.lead import Lead
+from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.space import SpaceManifold
+from pfsc_drake.following.options.fixtures import FixtureOptions
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
+
+
+@dataclass(frozen=True)
+class Guided:
+    """What a tool is led through.
+
+    Attributes:
+        place: Space, with the orientation that the tool keeps.
+        fixtures: The M regions.
+        speeds: Of each the largest speed near the tool [m/s].
+        motion: The free motion.
+        lead: What is between the velocity that is asked for and the tool.
+        options: What else is chosen.
+    """
+
+    place: SpaceManifold
+    fixtures: Sequence[Fixture]
+    speeds: Sequence[float]
+    motion: Admittance
+    lead: Lead
+    options: FixtureOptions
 
 
 @dataclass(frozen=True)
@@ -19,16 +46,22 @@ class Followed:
     Attributes:
         manifold: The manifold that the law makes linear.
         projector: Finds the place of the tool on it.
-        motion: Tangential coordinates of the reference over time [m].
+        motion: Tangential coordinates of the reference over time [m]; None where a hand leads.
         start: Where the tool is when the motion begins.
         point: The manifold's point there, laid out by the manifold's layout.
+        lap: Length of the path [m] if it is closed.
+        length: Of the path [m], if there is one.
+        guided: What a hand leads the tool through, where one leads.
     """
 
     manifold: Manifold
     projector: Projector
-    motion: PiecewisePolynomialCurve
+    motion: PiecewisePolynomialCurve | None
     start: ToolTarget
     point: np.ndarray
+    lap: float | None = None
+    length: float = 0.0
+    guided: Guided | None = None
 
 
 @dataclass(frozen=True)

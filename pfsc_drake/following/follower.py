@@ -1,6 +1,7 @@
 """A whole controller as one diagram, with the ports that a robot has."""
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,29 +12,36 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
+from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.believed import Believed
+from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller
-from pfsc_drake.following.followed import Followed
+from pfsc_drake.following.fixtures import add_fixture_guidance
+from pfsc_drake.following.followed import Followed, Wanted
 from pfsc_drake.following.law import make_law
+from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
     GainParameters,
     LawGains,
 )
 from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.reference import add_reference
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
+from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
 # 1/s, of poles that nobody chooses
 BANDWIDTH = 20.0
+
+Ports = dict[str, OutputPort]
 
 
 @dataclass
@@ -51,6 +59,7 @@ class FollowerOptions:
             middle of the joints' limits if omitted.
         transition: How long the reference takes from where the tool is at the start to the motion
             that is wanted [s]; 0 for no such transition.
+        compliance: How the tool yields to a hand or to what it touches; by default not at all.
         override: Whether there is a port for the pace of the motion, see :class:`TimedReference`.
         measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
             ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
@@ -62,27 +71,35 @@ class FollowerOptions:
     friction: tuple[np.ndarray, np.ndarray] | None = None
     posture: np.ndarray | None = None
     transition: float = 0.0
+    compliance: ComplianceParameters = field(default_factory=ComplianceParameters)
     override: bool = False
     measures: str = "plant_state"
 
 
 class Follower(Diagram):
-    """Path or surface following control of one arm: all that is sampled between state and drives.
+    """Path or surface following, or guidance by hand, of one arm: all between state and drives.
 
     All of its systems are blocks of one sampling time: :func:`~pfsc_drake.systems.fuse.fuse` makes
-    them one, :meth:`stepper` steps them without Drake.
+    them one, :meth:`stepper` steps them without Drake. Only where a hand leads through more than
+    eight regions one is none, which looks at them in turn.
 
     Ports:
         plant_state (input): State ``[q, v]`` of the plant; or instead of it
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
         override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
-        wrench (input): With ``controller.external_torque.source`` known or measured: force and
-            torque on the tool point, world axes, shape (6,) [N, Nm].
+        wrench (input): Force and torque on the tool at the tool point, world axes, shape (6,)
+            [N, Nm], the load of the tool itself taken off: where a hand leads the tool, where it
+            yields by ``compliance``, and where the law or the posture is told of forces that are
+            known or measured. What is no finite number is a fault.
         drive_torque (output): Drive torques within their limits, shape (N,) [Nm or N]; of velocity
             servos
         velocity_reference (output): Joint velocities, shape (N,) [rad/s or m/s].
         actuation (output): The same in the order of the plant's actuators, held from tick to tick.
         reference (output): Derivatives 0..r of the virtual output's reference by rows.
+        manifold_force (output): Where it yields: forces along the coordinates, shape (m,) [N, Nm].
+        limit_force (output): Where a hand leads it along a manifold: by what forces the robot's
+            limits hold it, see :class:`LedMotion`.
+        mode, record (output): Where a hand leads it through space, see :class:`FixtureGuidance`.
         manifold_state (output): Derivatives 0..r-1 of the virtual output by rows, shape (r m,).
         manifold_point (output): Where on the manifold the tool is.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
@@ -92,7 +109,8 @@ class Follower(Diagram):
         plant: The robot, finalized; as it is believed.
         tool: Name of the frame whose origin follows the manifold.
         law: Name of the law.
-        make: ``r -> Followed``: what is followed by a law of relative degree r.
+        make: ``(robot, posture, r) -> Followed``: what is followed by a law of relative degree r,
+            and of a robot from which posture on.
         options: What else is chosen.
 
     Attributes:
@@ -112,7 +130,7 @@ class Follower(Diagram):
         plant: MultibodyPlant,
         tool: str,
         law: str,
-        make: Callable[[int], Followed],
+        make: Callable[[RobotModel, np.ndarray, int], Followed],
         options: FollowerOptions,
     ) -> None:
         super().__init__()
@@ -127,10 +145,9 @@ class Follower(Diagram):
             raise InputError(f"tool = {tool}: the plant has no frame of this name")
         self.robot, self._coordinates = chain_from_plant(plant, plant.GetFrameByName(tool))
         self._actuation = self._coordinates.actuation_rows(plant.num_actuators())
-        self.followed = followed = make(RELATIVE_DEGREE[law])
-        self.start_posture = solve_pose(
-            self.robot, followed.start, self._near(options.posture), "start"
-        )
+        near = self._near(options.posture)
+        self.followed = followed = make(self.robot, near, RELATIVE_DEGREE[law])
+        self.start_posture = solve_pose(self.robot, followed.start, near, "start")
         chosen = _with_gains(options.controller, law, options.bandwidth)
         self.period = chosen.sampling_time
         rest = RestPosture(self.start_posture, followed.point)
@@ -191,28 +208,19 @@ class Follower(Diagram):
             "joint_state": joint_state,
             "manifold_point": projector.GetOutputPort("manifold_point"),
         }
-        source = chosen.external_torque.source
-        if source in ("known", "measured"):
-            wrench = self._add("wrench", Collect({"measured": 6}))
-            builder.ExportInput(wrench.GetInputPort("measured"), "wrench")
-            name = "wrench_ext" if source == "known" else "wrench_measured"
-            ports[name] = wrench.GetOutputPort("all")
-        believed = Believed(self.robot, options.friction)
-        controller, _, _ = add_controller(builder, law, believed, chosen, options.faults, ports)
-        r, m = linearization.relative_degree, linearization.num_outputs
-        reference = self._add("reference", TimedReference(self.followed.motion, r, m, self.period))
-        if options.override:
-            builder.ExportInput(reference.GetInputPort("override"), "override")
-        told = reference.GetOutputPort("reference")
-        if options.transition > 0.0:
-            smooth = self._add(
-                "smooth_start", SmoothStart(options.transition, r, m, r * m, self.period)
-            )
-            builder.Connect(told, smooth.GetInputPort("desired_reference"))
-            state = controller.GetOutputPort("manifold_state")
-            builder.Connect(state, smooth.GetInputPort("manifold_state"))
-            told = smooth.GetOutputPort("reference")
-        builder.Connect(told, controller.GetInputPort("reference"))
+        ports |= self._forces(chosen, options)
+        compliance, believed = options.compliance, Believed(self.robot, options.friction)
+        yields = compliance.is_given and compliance.source == "observed"
+        observed = compliance.observed if yields else None
+        controller, signals, _ = add_controller(
+            builder, law, believed, chosen, options.faults, ports, observed
+        )
+        desired, made = self._motion(options, signals)
+        followed, robot = self.followed, self.robot
+        end = math.inf if followed.motion is None else followed.motion.domain[1]
+        wanted = Wanted(self.start_posture, options.transition, followed.lap, followed.length, end)
+        told = signals | {"desired_reference": desired}
+        made |= add_reference(builder, controller, linearization, robot, compliance, wanted, told)
         drive = controller.GetOutputPort(controller.drive_port)
         hold = self._add("hold", Hold(self.robot.dimension))
         builder.Connect(drive, hold.GetInputPort("value"))
@@ -220,10 +228,49 @@ class Follower(Diagram):
         builder.Connect(hold.GetOutputPort("held"), actuation.GetInputPort("vector"))
         builder.ExportOutput(drive, controller.drive_port)
         builder.ExportOutput(actuation.GetOutputPort("product"), "actuation")
-        builder.ExportOutput(told, "reference")
+        for name in ("reference", "manifold_force", "limit_force", "mode", "record"):
+            if name in made:
+                builder.ExportOutput(made[name], name)
         builder.ExportOutput(ports["manifold_point"], "manifold_point")
         for name in ("manifold_state", "status", "fault"):
             builder.ExportOutput(controller.GetOutputPort(name), name)
+
+    def _forces(self, chosen: ControllerParameters, options: FollowerOptions) -> Ports:
+        """Export what is known of forces on the tool, and return it by the names of its uses."""
+        compliance, source = options.compliance, chosen.external_torque.source
+        sensed = compliance.needs_sensor or source == "measured"
+        known = source == "known" or chosen.posture.yields == "known"
+        if not (sensed or known):
+            return {}
+        wrench = self._add("wrench", MeasuredWrench())
+        self._builder.ExportInput(wrench.GetInputPort("wrench"), "wrench")
+        made = {name: wrench.GetOutputPort(name) for name in ("sensor_fault", "tared")}
+        measured = wrench.GetOutputPort("measured")
+        made |= {"wrench_measured": measured} if sensed else {}
+        return made | ({"wrench_ext": measured} if known else {})
+
+    def _motion(self, options: FollowerOptions, signals: Ports) -> tuple[OutputPort, Ports]:
+        """Return the reference before it yields, and what else is told of it."""
+        followed, linearization = self.followed, self.law.linearization
+        order = reference_order(options.compliance, linearization)
+        if followed.motion is None:
+            assert followed.guided is not None
+            guidance = add_fixture_guidance(
+                self._builder,
+                followed.guided,
+                options.compliance,
+                self.robot,
+                order,
+                signals,
+                self.start_posture,
+            )
+            told = {name: guidance.GetOutputPort(name) for name in ("mode", "record")}
+            return guidance.GetOutputPort("reference"), told
+        timed = TimedReference(followed.motion, order, linearization.num_outputs, self.period)
+        reference = self._add("reference", timed)
+        if options.override:
+            self._builder.ExportInput(reference.GetInputPort("override"), "override")
+        return reference.GetOutputPort("reference"), {}
 
 
 def _with_gains(options: ControllerParameters, law: str, bandwidth: float) -> ControllerParameters:

@@ -11,6 +11,7 @@ from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower, FollowerOptions
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.robot.robot_model import RobotModel
 
 _VELOCITY, _ACCELERATION = 0.1, 0.5  # m/s, m/s^2
 
@@ -59,7 +60,7 @@ def add_path_following(
         [0.0, path.length], velocity=_VELOCITY, acceleration=_ACCELERATION
     )
 
-    def followed(relative_degree: int) -> Followed:
+    def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         oriented = path.orientation is not None
         manifold = PathManifold(relative_degree, oriented=oriented, turning=path.frame.turns)
 
@@ -70,7 +71,10 @@ def add_path_following(
         if oriented:
             R_e = quaternion_to_matrix(point[manifold.layout.quaternion][:4])
         start = ToolTarget(point[manifold.layout.position][:3], R_e)
-        return Followed(manifold, Projector(evaluator), along, start, point)
+        lap = path.length if path.closed else None
+        return Followed(
+            manifold, Projector(evaluator), along, start, point, lap=lap, length=path.length
+        )
 
     follower = Follower(plant, tool, law, followed, chosen)
     builder.AddSystem(follower)

@@ -15,6 +15,7 @@ from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
+from pfsc_drake.robot.robot_model import RobotModel
 
 
 def add_surface_following(
@@ -58,7 +59,7 @@ def add_surface_following(
         raise InputError(f"motion: {motion.dimension} coordinates; a surface has 2")
     theta = [sum(ends) / 2.0 for ends in surface.domain] if start is None else list(start)
 
-    def followed(relative_degree: int) -> Followed:
+    def followed(robot: RobotModel, posture: np.ndarray, relative_degree: int) -> Followed:
         manifold = SurfaceManifold(relative_degree, orientation=orientation, offset=offset)
         evaluator = SurfaceEvaluator(surface, relative_degree)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 import experiments.cli
@@ -139,6 +139,25 @@ def test_a_controller_in_a_diagram_of_ones_own(desk: Path, monkeypatch: pytest.M
     kinds = [c.kind.value for c in names["follower"].followed.manifold.coordinates]
     assert kinds == ["eta", *["xi"] * 2, *["phi"] * 3]
     assert builder.Build().num_output_ports() == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "port"), [(0, "manifold_force"), (1, "mode")], ids=["compliance", "guidance"]
+)
+def test_doors_of_the_library(
+    number: int, port: str, desk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(desk)
+    block = [block for block in blocks("python") if block.place.startswith("own_diagram")][number]
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    read_model(plant, Path("my_arm.urdf"), ModelOptions(fixed_joints={"finger": 0.02}))
+    names: dict[str, Any] = {"builder": builder, "plant": plant}
+    exec(compile(block.text, block.place, "exec"), names)
+    follower = names["follower"]
+    assert follower.HasInputPort("wrench") and follower.HasOutputPort(port)
+    told = follower.stepper().step(plant_state=follower.start_state, wrench=np.zeros(6))
+    assert told["fault"][0] == 0.0
 
 
 def test_edges_and_corners() -> None:

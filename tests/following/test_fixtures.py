@@ -7,7 +7,8 @@ from pfsc_drake.control.fixtures.fixture import Fixture
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.fixtures import Guided, make_lead, near_expression
+from pfsc_drake.following.fixtures import make_lead, near_expression
+from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.options.fixtures import FixtureOptions
 from pfsc_drake.geometry import torus
 from pfsc_drake.geometry.regions.shapes import SphereRegion

@@ -1,0 +1,139 @@
+"""A tool that yields to a hand on a user's own path or surface: options of the same call."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from pfsc_drake import (
+    ComplianceParameters,
+    ControllerParameters,
+    CoordinateImpedance,
+    FollowerOptions,
+    Profile,
+    WaypointTable,
+    add_path_following,
+    add_surface_following,
+    path_from_waypoints,
+    rest_to_rest,
+    straight_lines,
+)
+from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
+from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.controller import ExternalTorqueParameters
+from pfsc_drake.geometry.surfaces.shapes import paraboloid
+from pfsc_drake.robot.models.files import models_directory
+from tests.following.pulled import Pulled
+
+POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]]
+SPRING = CoordinateImpedance(Profile(4.0), Profile(200.0), Profile(2500.0))
+FREE = CoordinateImpedance(Profile(3.0), Profile(60.0), Profile(0.0))
+
+
+@pytest.fixture(scope="module", name="path")
+def fixture_path():
+    return path_from_waypoints(WaypointTable(np.array(POINTS)), smoothness=6, closed=True)
+
+
+def load(builder):
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    Parser(plant).AddModels(str(models_directory() / "comau_racer_1_4" / "comau_racer_1_4.sdf"))
+    plant.Finalize()
+    return plant
+
+
+def options(**compliance):
+    controller = ControllerParameters(external_torque=ExternalTorqueParameters("measured"))
+    return FollowerOptions(controller=controller, compliance=ComplianceParameters(**compliance))
+
+
+def on_path(path, law="rigid", **compliance):
+    """Return a tool that stands at the start of a motion along the path."""
+    builder = DiagramBuilder()
+    plant = load(builder)
+    motion = rest_to_rest([0.1, 0.11], velocity=0.1, acceleration=1.0, dwell=5.0)
+    chosen = options(**compliance)
+    follower = add_path_following(
+        builder, plant, "tool_point", path, law, motion=motion, options=chosen
+    )
+    return Pulled(builder, plant, follower)
+
+
+def axes(tool):
+    point = tool.read("manifold_point")
+    return tool.follower.followed.manifold.axes(point).full()
+
+
+def test_a_tool_yields_across_a_path_like_its_spring(path):
+    """By f / k across, and not along."""
+    tool = on_path(path, transversal=SPRING)
+    across = axes(tool)[:, 1]
+    tool.pull(20.0 * across)
+    tool.run(0.8)
+    assert tool.fault() == Fault.NONE
+    eta, *xi = tool.read("manifold_state")[:3]
+    force = axes(tool).T @ (20.0 * across)
+    np.testing.assert_allclose(tool.read("manifold_force")[1:3], force[1:], atol=1e-9)
+    np.testing.assert_allclose(xi, force[1:] / 2500.0, rtol=0.01, atol=2e-5)
+    wanted = tool.follower.followed.motion.derivatives(np.array([0.8]), 0)[0, 0, 0]
+    assert eta == pytest.approx(wanted, abs=1e-5)
+    tool.pull(np.zeros(3))
+    tool.run(1.6)
+    assert np.linalg.norm(tool.read("manifold_state")[1:3]) < 1e-4
+
+
+def test_a_hand_leads_a_tool_along_a_path_as_far_as_its_joints_are_fast(path):
+    """Along with f / d, on the path; then no joint is faster than its share."""
+    tool = on_path(path, tangential=FREE)
+    tool.pull(6.0 * axes(tool)[:, 0])
+    tool.run(0.4)
+    assert tool.fault() == Fault.NONE
+    eta, *xi = tool.read("manifold_state")[:3]
+    assert 0.01 < eta - 0.1 < 0.05
+    assert np.linalg.norm(xi) < 1e-5
+    assert not tool.read("limit_force").any()
+    slow = on_path(path, tangential=FREE, limits=RobotLimitParameters(speed_share=0.01))
+    slow.pull(60.0 * axes(slow)[:, 0])
+    slow.run(0.3)
+    assert slow.fault() == Fault.NONE
+    v = slow.plant.GetVelocities(slow.context)
+    share = np.abs(v) / slow.follower.robot.gather("velocity_limit")
+    assert share.max() == pytest.approx(0.01, rel=0.02)
+    assert slow.read("limit_force").max() > 10.0
+
+
+def test_a_tool_yields_across_a_surface_like_its_spring():
+    surface = paraboloid([(-0.3, 0.3), (-0.3, 0.3)], 0.5, [0.9, 0.0, 0.7])
+    builder = DiagramBuilder()
+    plant = load(builder)
+    motion = straight_lines([[0.1, 0.0], [0.11, 0.0]], velocity=0.1, acceleration=1.0)
+    follower = add_surface_following(
+        builder,
+        plant,
+        "tool_point",
+        surface,
+        motion,
+        "rigid",
+        options=options(transversal=SPRING),
+    )
+    tool = Pulled(builder, plant, follower)
+    normal = axes(tool)[:, 2]
+    tool.pull(-15.0 * normal)
+    tool.run(0.8)
+    assert tool.fault() == Fault.NONE
+    force = axes(tool)[:, 2] @ (-15.0 * normal)
+    assert tool.read("manifold_state")[2] == pytest.approx(force / 2500.0, rel=0.01)
+
+
+def test_what_yields_can_do_without_a_sensor_before_torques(path):
+    """There is no port for a wrench then; and velocity servos tell no torques."""
+    builder = DiagramBuilder()
+    plant = load(builder)
+    chosen = FollowerOptions(compliance=ComplianceParameters(source="observed", transversal=SPRING))
+    follower = add_path_following(builder, plant, "tool_point", path, "rigid", options=chosen)
+    assert not follower.HasInputPort("wrench")
+    assert follower.HasOutputPort("manifold_force")
+    with pytest.raises(InputError, match=r"compliance.source = observed with .*velocity_servo"):
+        add_path_following(builder, plant, "tool_point", path, "velocity_servo", options=chosen)
