@@ -168,16 +168,19 @@ def _entry_by_entry(node: ca.MX, operands: Pattern) -> Pattern | None:
 
 def _jacobian(function: ca.Function) -> sp.csr_array:
     """Return the Jacobian's pattern, (nonzeros out, nonzeros in)."""
-    result = sp.lil_array((sum(_sizes_out(function)), sum(_sizes_in(function))), dtype=bool)
+    rows: list[int] = []
+    columns: list[int] = []
     first_row = 0
     for o, n_rows in enumerate(_sizes_out(function)):
         first_column = 0
         for i, n_columns in enumerate(_sizes_in(function)):
-            rows, columns = function.jac_sparsity(o, i, True).get_triplet()
-            result[first_row + np.array(rows, int), first_column + np.array(columns, int)] = True
+            block = function.jac_sparsity(o, i, True).get_triplet()
+            rows += [first_row + row for row in block[0]]
+            columns += [first_column + column for column in block[1]]
             first_column += n_columns
         first_row += n_rows
-    return result.tocsr()
+    shape = first_row, sum(_sizes_in(function))
+    return sp.csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=shape)
 
 
 def _calls(function: ca.Function) -> bool:

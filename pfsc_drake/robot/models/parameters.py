@@ -4,6 +4,8 @@ The dataclasses mirror the file, say what each key means and refuse what is out 
 ``source`` always says where the numbers are from. :func:`load_parameters` reads the file.
 """
 
+import copy
+import functools
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.parameter_checks import check_vector, require
 from pfsc_drake.robot.serial.denavit_hartenberg import DenavitHartenberg
+from pfsc_drake.yaml.text_file import read_text
 from pfsc_drake.yaml.typed import REQUIRED, load_file
 
 # Placeholders of required keys make a robot with one joint: a schema's defaults must be valid.
@@ -314,6 +317,12 @@ def load_parameters(robot: str | Path) -> RobotParameters:
         path = models_directory() / path / "parameters.yaml"
         if str(robot) not in known:
             raise InputError(f"robot {str(robot)!r}: must be a file or one of {', '.join(known)}")
+    return copy.deepcopy(_parameters(path, read_text(path)))
+
+
+@functools.lru_cache(maxsize=16)
+def _parameters(path: Path, content: str) -> RobotParameters:
+    """Returns the parameters in a file, which says ``content``; not to be changed."""
     return load_file(RobotParameters, path)
 
 

@@ -72,6 +72,17 @@ def test_wrong_parameters_name_file_and_key(tmp_path, pattern, replacement, mess
     assert "\n" not in str(caught.value)
 
 
+def test_parameters_are_ones_own_and_those_of_the_file_as_it_is(tmp_path):
+    text = (DIRECTORY / "parameters.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    mass = load_parameters(path).links[0].mass
+    load_parameters(path).links[0].mass += 1.0
+    assert load_parameters(path).links[0].mass == mass
+    path.write_text(text.replace("name: comau_racer_1_4\n", "name: renamed\n"), encoding="utf-8")
+    assert load_parameters(path).name == "renamed"
+
+
 def test_missing_parameters_are_named(tmp_path):
     # a DELTA has parameters of another kind, the SCARA arm none
     for name in ("comau", "festo_expt_45", "scara_600"):
