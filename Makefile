@@ -3,13 +3,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 FUZZ_SECONDS ?= 600
 DEMO_OUT := out/demo
+# a file's tests share what they build; in the order of folders, which ends with short files
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup demo test lint types unit fuzz benchmark models clean
+.PHONY: help setup demo test test-quick lint types unit fuzz benchmark models clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
 	@echo "make test       linters, types and the whole test suite"
+	@echo "make test-quick the tests without those marked slow"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
 	@echo "make models     write the robot models anew from their parameters"
@@ -37,7 +40,10 @@ types: setup
 	$(BIN)/mypy
 
 unit: setup
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(PYTEST)
+
+test-quick: setup
+	$(PYTEST) -m "not slow"
 
 # rounds with a seed each; memory is bounded, so that what devours it fails instead
 fuzz: setup

@@ -143,6 +143,7 @@ def foreign_page():
         server.shutdown()
 
 
+@pytest.mark.slow
 def test_a_person_pushes_the_tool_along_and_ctrl_c_keeps_what_was_done(start):
     session = start("vf_hard_spline")
     session.until(lambda status: status["phase"] == "running" and status["time"] > 0.5)
@@ -167,6 +168,7 @@ def test_a_person_pushes_the_tool_along_and_ctrl_c_keeps_what_was_done(start):
     assert {"scenario.yaml", "operator.csv", "log.h5", "report.html"} <= names
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_browser() is None, reason=f"none of {', '.join(NAMES)} is installed")
 def test_a_person_guides_the_tool_in_a_browser(start, tmp_path):
     session = start("vf_soft_circle")
@@ -222,6 +224,7 @@ def test_a_person_guides_the_tool_in_a_browser(start, tmp_path):
     assert (session.out / "take_1" / "log.h5").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_browser() is None, reason=f"none of {', '.join(NAMES)} is installed")
 def test_strangers_pull_nothing_and_of_two_pages_one_leads(start, tmp_path, foreign_page):
     session = start("vf_soft_circle")

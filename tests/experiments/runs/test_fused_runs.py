@@ -17,6 +17,8 @@ from experiments.simulation import configure
 from pfsc_drake.yaml.typed import load_file
 from tests.deferred_code import compiled_at_once
 
+pytestmark = pytest.mark.slow
+
 DURATION = 0.1
 
 

@@ -20,6 +20,8 @@ from diagrams.scenario import RobotParameters, Scenario
 from experiments.catalog.scenario_file import read_scenario
 from pfsc_drake.yaml.typed import load_typed
 
+pytestmark = pytest.mark.slow
+
 BEGIN, PULLED = 0.12, 0.28  # s
 # s, when what lags has settled: servos take longer (15 1/s, Tab. 5.3), as does the arm's own mass
 SETTLED = {("sensor", "dynamic law"): 0.38, ("sensor", "kinematic law"): 0.5}

@@ -6,6 +6,8 @@ import pytest
 
 from experiments.catalog.scenario_catalog import find_scenario
 
+pytestmark = pytest.mark.slow
+
 CASES = {
     "vf_forbidden_region": (),  # planes, a paraboloid and a cylinder
     "vf_soft_region": (),

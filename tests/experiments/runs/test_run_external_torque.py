@@ -6,6 +6,8 @@ import pytest
 
 from experiments.cli import main
 
+pytestmark = pytest.mark.slow
+
 PUSH = ("hold_back={begin: 0.25, end: 0.55, force: -180, ramp: 0.1}", "start.offset=[0, 0]")
 
 

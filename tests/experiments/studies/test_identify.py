@@ -7,6 +7,8 @@ import pytest
 
 from experiments.studies.identify import Circle, Drive, write_identification
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(name="out", scope="module")
 def fixture_out(tmp_path_factory):

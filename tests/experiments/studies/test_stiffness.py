@@ -7,6 +7,8 @@ import pytest
 from experiments.cli import main
 from experiments.studies.stiffness import write_study
 
+pytestmark = pytest.mark.slow
+
 
 def test_stiff_joints_suit_the_simple_laws_and_soft_ones_do_not(tmp_path):
     lines = []

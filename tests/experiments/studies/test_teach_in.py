@@ -13,6 +13,8 @@ from experiments.studies.teach_in import write_teach_in
 from experiments.teaching.options import TeachingOptions
 from pfsc_drake.yaml.reading import dump_yaml
 
+pytestmark = pytest.mark.slow
+
 BARE = ("--no-figures", "--no-recording")
 WAY = (
     "hand.waypoints=[{time: 0.3, position: [0.8, -0.36, 1.02], zyx_deg: [159.9, -14.3, -11.6]}, "

@@ -3,6 +3,7 @@
 import signal
 
 import psutil
+import pytest
 
 from experiments.catalog.scenario_file import read_scenario
 from experiments.sweep import many
@@ -10,6 +11,8 @@ from experiments.sweep.many import run_many
 from experiments.sweep.rows import COMPLETED, DIED, REFUSED
 from experiments.sweep.summary import MACHINE_METRICS
 from experiments.sweep.worker import RunTask, run_task
+
+pytestmark = pytest.mark.slow
 
 DURATION = 0.05  # s
 
