@@ -3,7 +3,6 @@
 import copy
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,6 +14,7 @@ from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
 from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.streamed_reference import StreamedReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.tool_kinematics import ToolKinematics
 from pfsc_drake.errors import InputError, require
@@ -24,13 +24,12 @@ from pfsc_drake.following.controller import add_controller
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Followed, Wanted
 from pfsc_drake.following.law import make_law
-from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
     GainParameters,
     LawGains,
 )
-from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.following.reference import add_reference
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
@@ -38,42 +37,7 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse
 
-# 1/s, of poles that nobody chooses
-BANDWIDTH = 20.0
-
 Ports = dict[str, OutputPort]
-
-
-@dataclass
-class FollowerOptions:
-    """What can be chosen of a path or surface following controller.
-
-    Attributes:
-        bandwidth: Of the error dynamics [1/s], for coordinates without gains of their own; their
-            poles are chosen by it, see :class:`GainParameters`.
-        controller: Gains, limits, friction, forces, posture, sampling time. Its law is the one
-            that the controller is added with.
-        faults: What is a fault.
-        friction: Coefficients f_c and f_v of the drives that are believed, each (N,).
-        posture: From where the posture at the start is looked for, shape (N,) [rad or m]; the
-            middle of the joints' limits if omitted.
-        transition: How long the reference takes from where the tool is at the start to the motion
-            that is wanted [s]; 0 for no such transition.
-        compliance: How the tool yields to a hand or to what it touches; by default not at all.
-        override: Whether there is a port for the pace of the motion, see :class:`TimedReference`.
-        measures: What is measured: ``plant_state``, the state ``[q, v]`` of the plant, or
-            ``joint_state``, ``[q_J, v_J, q_M, v_M]``.
-    """
-
-    bandwidth: float = BANDWIDTH
-    controller: ControllerParameters = field(default_factory=ControllerParameters)
-    faults: FaultParameters = field(default_factory=FaultParameters)
-    friction: tuple[np.ndarray, np.ndarray] | None = None
-    posture: np.ndarray | None = None
-    transition: float = 0.0
-    compliance: ComplianceParameters = field(default_factory=ComplianceParameters)
-    override: bool = False
-    measures: str = "plant_state"
 
 
 class Follower(Diagram):
@@ -87,6 +51,8 @@ class Follower(Diagram):
         plant_state (input): State ``[q, v]`` of the plant; or instead of it
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
         override (input, optional): Pace of the motion, shape (1,); see :class:`TimedReference`.
+        goal (input): With ``stream``: arc length of the last way point [m], shape (1,), and
+        speed (input, optional): how fast to go there [m/s]; see :class:`StreamedReference`.
         wrench (input): Force and torque on the tool at the tool point, world axes, shape (6,)
             [N, Nm], the load of the tool itself taken off: where a hand leads the tool, where it
             yields by ``compliance``, and where the law or the posture is told of forces that are
@@ -217,7 +183,8 @@ class Follower(Diagram):
         )
         desired, made = self._motion(options, signals)
         followed, robot = self.followed, self.robot
-        end = math.inf if followed.motion is None else followed.motion.domain[1]
+        motion = followed.motion if options.stream is None else None
+        end = math.inf if motion is None else motion.domain[1]
         wanted = Wanted(self.start_posture, options.transition, followed.lap, followed.length, end)
         told = signals | {"desired_reference": desired}
         made |= add_reference(builder, controller, linearization, robot, compliance, wanted, told)
@@ -266,10 +233,24 @@ class Follower(Diagram):
             )
             told = {name: guidance.GetOutputPort(name) for name in ("mode", "record")}
             return guidance.GetOutputPort("reference"), told
-        timed = TimedReference(followed.motion, order, linearization.num_outputs, self.period)
-        reference = self._add("reference", timed)
-        if options.override:
-            self._builder.ExportInput(reference.GetInputPort("override"), "override")
+        m, motion, stream = linearization.num_outputs, followed.motion, options.stream
+        block: TimedReference | StreamedReference
+        if stream is None:
+            block = TimedReference(motion, order, m, self.period)
+            ports = ["override"] if options.override else []
+        else:
+            if motion.dimension != 1 or options.override:
+                raise InputError(
+                    "stream: given; must be None on surfaces, which have two coordinates to go "
+                    "along, and with an override, in place of which there is the port speed"
+                )
+            start = float(motion.derivatives(np.array([motion.domain[0]]), 0)[0, 0, 0])
+            end = followed.length if followed.lap is None else math.inf
+            block = StreamedReference(stream, order, m, self.period, start=start, end=end)
+            ports = ["goal", "speed"]
+        reference = self._add("reference", block)
+        for name in ports:
+            self._builder.ExportInput(reference.GetInputPort(name), name)
         return reference.GetOutputPort("reference"), {}
 
 

@@ -17,10 +17,11 @@ from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.followed import Followed, Guided
-from pfsc_drake.following.follower import Follower, FollowerOptions
+from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.following.options.fixtures import FixtureOptions
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.geometry import matrix_to_quaternion
 from pfsc_drake.geometry.regions.checks import refuse_forbidden_start, refuse_same_regions
 from pfsc_drake.geometry.regions.moving import MovingRegion

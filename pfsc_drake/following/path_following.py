@@ -8,7 +8,8 @@ from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.following.followed import Followed
-from pfsc_drake.following.follower import Follower, FollowerOptions
+from pfsc_drake.following.follower import Follower
+from pfsc_drake.following.options.follower import FollowerOptions
 from pfsc_drake.geometry import Path, PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel

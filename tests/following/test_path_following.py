@@ -8,7 +8,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 import pfsc_drake
-from pfsc_drake import FollowerOptions, WaypointTable, add_path_following, path_from_waypoints
+from pfsc_drake import (
+    FollowerOptions,
+    StreamLimits,
+    WaypointTable,
+    add_path_following,
+    path_from_waypoints,
+)
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
@@ -40,6 +46,8 @@ def closed_loop(path, model, law, options=None, **changes):
     builder.Connect(follower.GetOutputPort("actuation"), plant.get_actuation_input_port())
     if follower.HasInputPort("override"):
         builder.ExportInput(follower.GetInputPort("override"), "override")
+    if follower.HasInputPort("goal"):
+        builder.ExportInput(follower.GetInputPort("goal"), "goal")
     simulator = Simulator(builder.Build())
     root = simulator.get_mutable_context()
     plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(root), follower.start_state)
@@ -71,6 +79,31 @@ def test_a_users_own_plant_follows_a_users_own_path(path, model, law):
     np.testing.assert_allclose(pose.translation(), wanted, rtol=0, atol=3e-5)
     assert np.linalg.norm(read(simulator, follower, "manifold_state")[1:3]) < 1e-5
     assert eta > 0.1
+
+
+def test_a_stream_of_way_points_is_followed_and_waited_for(path):
+    """The tool goes on when a way point comes, rests at the last one, and is on the path always."""
+    options = FollowerOptions(stream=StreamLimits(velocity=0.3, acceleration=3.0, bandwidth=40.0))
+    simulator, follower = closed_loop(path, "comau_racer_1_4", "rigid", options)
+    goal, root = simulator.get_system().GetInputPort("goal"), simulator.get_mutable_context()
+    places, beside = [], []
+    for time, eta in ((0.1, 0.02), (0.2, np.nan), (0.4, 0.05), (1.2, np.nan)):
+        goal.FixValue(root, eta)
+        simulator.AdvanceTo(time)
+        eta, *xi = read(simulator, follower, "manifold_state")[:3]
+        places.append(eta)
+        beside.append(np.linalg.norm(xi))
+    assert read(simulator, follower, "fault")[0] == Fault.NONE
+    assert max(beside) < 1e-5
+    assert places[0] < places[1] < 0.021 < places[2] < 0.05
+    assert places[3] == pytest.approx(0.05, abs=1e-5)
+
+
+def test_a_stream_has_a_speed_and_no_override(path):
+    with pytest.raises(InputError, match=r"stream: given; must be None .* with an override"):
+        closed_loop(
+            path, "comau_racer_1_4", "rigid", FollowerOptions(stream=StreamLimits(), override=True)
+        )
 
 
 def test_velocity_servos_are_told_velocities(path):

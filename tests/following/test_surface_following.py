@@ -7,7 +7,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake import FollowerOptions, add_surface_following, rest_to_rest, straight_lines
+from pfsc_drake import (
+    FollowerOptions,
+    StreamLimits,
+    add_surface_following,
+    rest_to_rest,
+    straight_lines,
+)
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.shapes import paraboloid
@@ -46,6 +52,16 @@ def test_a_users_own_plant_follows_a_users_own_surface(surface):
     np.testing.assert_allclose([eta_1, eta_2], wanted, rtol=0, atol=1e-4)
     assert abs(xi) < 1e-5
     assert wanted[0] > 0.25
+
+
+def test_way_points_do_not_stream_on_surfaces(surface):
+    builder = DiagramBuilder()
+    motion = straight_lines([[0.2, 0.0], [0.3, -0.05]], velocity=0.4, acceleration=4.0)
+    options = FollowerOptions(stream=StreamLimits())
+    with pytest.raises(InputError, match="stream: given; must be None on surfaces"):
+        add_surface_following(
+            builder, load(builder), "tool_point", surface, motion, "rigid", options=options
+        )
 
 
 def test_a_motion_of_one_coordinate_is_refused(surface):
