@@ -233,11 +233,12 @@ class BlockSystem(LeafSystem):
         needs_at_start: Needs | None = None,
     ) -> None:
         """Write states, tick and inputs into the functions' arguments."""
-        memory = context.get_discrete_state(self._memory).value()
+        state = context.get_discrete_state()
+        memory = state.value(self._memory)
         if memory[_STARTED]:
             functions.x[: self._hidden] = memory[self._own]
             for group, part in shown:
-                functions.x[part] = context.get_discrete_state(group).value()
+                functions.x[part] = state.value(group)
         else:
             functions.x[:] = self._begun(context, needs_at_start)[self._x]
         functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
