@@ -6,6 +6,8 @@ import casadi as ca
 import numpy as np
 
 _STARTS = 3
+# calls in a row of one function, so that code grows with the logarithm of the number of samples
+_CALLS = 16
 
 
 def nearest_samples(
@@ -24,18 +26,60 @@ def nearest_samples(
     Returns:
         Three starts for a search of the nearest point, the nearest first, each of shape (p,).
     """
+    dimension, p = points.shape[1], parameters.shape[1]
     # from their middle, so that nothing is lost where they are far from the origin
     middle = points.mean(axis=0)
     around = points - middle
-    cost = ca.MX(ca.DM(np.sum(around**2, axis=1))) - ca.MX(ca.DM(2.0 * around)) @ (y - middle)
-    numbers = ca.MX(ca.DM(np.arange(float(len(points)))))
-    columns = [ca.MX(ca.DM(column)) for column in parameters.T]
-    starts = []
+    samples = np.column_stack([np.sum(around**2, axis=1), 2.0 * around, parameters])
+    starts: list[ca.MX] = []
     for _ in range(_STARTS):
-        index = ca.mmin(ca.if_else(cost <= ca.mmin(cost), numbers, len(points) - 1.0))
-        starts.append(ca.vertcat(*[column[index] for column in columns]))
-        near = ca.MX(1.0)
-        for k, column in enumerate(columns):
-            near = ca.logic_and(near, ca.fabs(column - starts[-1][k]) < apart[k])
-        cost = ca.if_else(near, math.inf, cost)
+        known = ca.vertcat(*starts, np.full(p * (_STARTS - len(starts)), math.inf))
+        state = ca.vertcat(y - middle, known, math.inf, ca.DM(parameters[0]))
+        best = _over_all(_nearer(dimension, p, apart), state, samples)
+        starts.append(best[-p:])
     return starts
+
+
+def _nearer(dimension: int, p: int, apart: np.ndarray) -> ca.Function:
+    """Return ``(state, sample) -> state``, which keeps the nearest sample that may be one.
+
+    The state is ``[y, starts that are known, cost, parameters]``, a sample
+    ``[|x|^2, 2 x, parameters]``; costs are squared distances but for ``|y|^2``.
+    """
+    y, known = ca.SX.sym("y", dimension), [ca.SX.sym(f"start_{k}", p) for k in range(_STARTS)]
+    best, parameters = ca.SX.sym("cost"), ca.SX.sym("parameters", p)
+    square, double, own = ca.SX.sym("square"), ca.SX.sym("double", dimension), ca.SX.sym("own", p)
+    cost = square - ca.dot(double, y)
+    for start in known:
+        near = [ca.fabs(own[k] - start[k]) < apart[k] for k in range(p)]
+        cost = ca.if_else(ca.logic_all(ca.vertcat(*near)), math.inf, cost)
+    nearer = cost < best
+    kept = [ca.if_else(nearer, new, old) for new, old in ((cost, best), (own, parameters))]
+    return ca.Function(
+        "nearer",
+        [ca.vertcat(y, *known, best, parameters), ca.vertcat(square, double, own)],
+        [ca.vertcat(y, *known, *kept)],
+    )
+
+
+def _over_all(step: ca.Function, state: ca.MX, samples: np.ndarray) -> ca.MX:
+    """Return what a state has become after a step with each sample, [n, size]."""
+    levels = max(1, math.ceil(math.log(len(samples), _CALLS)))
+    calls = math.ceil(round(len(samples) ** (1.0 / levels), 9))
+    # the last one again, which is no nearer then
+    rows = np.minimum(np.arange(calls**levels), len(samples) - 1)
+    columns = samples[rows].T
+    for _ in range(levels - 1):
+        step = _repeated(step, calls)
+    for part in np.hsplit(columns, calls):
+        state = step(state, ca.DM(part))
+    return state
+
+
+def _repeated(step: ca.Function, calls: int) -> ca.Function:
+    """Return a function that does some steps."""
+    begin = state = ca.MX.sym("state", step.size1_in(0))
+    samples = ca.MX.sym("samples", step.size1_in(1), calls * step.size2_in(1))
+    for part in ca.horzsplit(samples, step.size2_in(1)):
+        state = step(state, part)
+    return ca.Function(f"{step.name()}_{calls}", [begin, samples], [state])
