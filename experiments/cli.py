@@ -22,10 +22,12 @@ from rich.table import Table
 
 from experiments.catalog.scenario_catalog import expand_home, list_scenarios
 from experiments.outcomes import (
-    judge_export,
+    judge_commands,
     judge_live,
+    judge_replay,
     judge_run,
     judge_sweep,
+    print_export,
     print_live,
     print_run,
     print_sweep,
@@ -386,30 +388,52 @@ def export_command(
     check: Annotated[
         bool,
         typer.Option(
-            "--check", help="Compile it, let it repeat a run and compare; needs gcc for that."
+            "--check", help="Compile it, let it repeat the run and compare; needs gcc for that."
         ),
     ] = False,
     duration: Annotated[
-        str, typer.Option(metavar="SECONDS", help="Simulated time of that run in s.")
+        str, typer.Option(metavar="SECONDS", help="Simulated time of the run beside it in s.")
     ] = "1",
 ) -> None:
     """Write a scenario's controller as C99."""
     from experiments.catalog.scenario_file import read_scenario
-    from experiments.export import check_export, export_scenario, record
+    from experiments.export import export_scenario
+    from experiments.replay import check_export, missing_tool
 
     seconds = _read_duration(duration)
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out)
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        console = Console()
+        console, lacking = Console(), missing_tool()
         with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
-            export = export_scenario(loaded, folder, progress)
-            replay = None
-            if check:
-                progress(0.0, "recording a run, compiling and repeating it")
-                replay = check_export(folder, record(export, seconds))
-        raise typer.Exit(judge_export(console, export, folder, checked=check, replay=replay))
+            export = export_scenario(loaded, folder, seconds, progress)
+            replay = check_export(folder, progress) if check and lacking is None else None
+        print_export(console, export, folder)
+        if check and replay is None:
+            console.print(f"not compiled: there is no {lacking} here", highlight=False)
+        raise typer.Exit(0 if replay is None else judge_replay(console, replay, folder))
+
+
+@app.command("replay")
+def replay_command(
+    folder: Annotated[Path, typer.Argument(help="Of an exported controller.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="log.h5 of a run, or a CSV of a robot: t, q_1, .., v_1, .., perhaps q_M_1, .., "
+            "v_M_1, .., and name_1, .. of every further input."
+        ),
+    ],
+) -> None:
+    """Tell what an exported controller would have commanded, before power is on; needs gcc."""
+    from experiments.replay import replay_log
+
+    with interruptible():
+        console, place = Console(), expand_home(folder)
+        with ProgressDisplay(console, place.name, None, paced=False) as progress:
+            commands = replay_log(place, expand_home(log), progress)
+        raise typer.Exit(judge_commands(console, commands))
 
 
 @app.command("inverse-kinematics")

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -13,9 +14,10 @@ from reporting.interruption import INTERRUPTED
 from reporting.terminal import print_error
 
 if TYPE_CHECKING:
-    from experiments.export import Export, Replay
+    from experiments.export import Export
     from experiments.finished_run import RunOutcome
     from experiments.live.start import LiveOutcome
+    from experiments.replay import Commands, Replay
     from experiments.sweep.sweep import SweepOutcome
     from reporting.metrics import Metric
 
@@ -116,17 +118,16 @@ def judge_sweep(outcome: "SweepOutcome", out: Path) -> int:
     return status
 
 
-def judge_export(
-    console: Console, export: "Export", out: Path, *, checked: bool, replay: "Replay | None"
-) -> int:
-    """Tells what has been exported and what the check has found; returns the exit status."""
-    state = export.controller.interface()["state_bytes"]
-    said = f"{out}: {len(export.files)} files, state {state} bytes"
-    console.print(said, highlight=False, markup=False, soft_wrap=True)
-    if replay is None:
-        if checked:
-            console.print("not compiled: there is no gcc here", highlight=False)
-        return 0
+def print_export(console: Console, export: "Export", out: Path) -> None:
+    """What has been exported, in one line."""
+    said = export.controller.interface()
+    sizes = f"state {said['state_bytes']} bytes, tables {said['table_bytes']} bytes"
+    text = f"{out}: {len(export.files)} files, {sizes}"
+    console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+def judge_replay(console: Console, replay: "Replay", out: Path) -> int:
+    """Tells what a controller in C made of its record; returns the exit status."""
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     for title in ("Ticks", "differing", "median [us]", "p99 [us]", "worst [us]"):
         table.add_column(title, justify="right")
@@ -136,6 +137,37 @@ def judge_export(
     if replay.differing:
         print_error(f"error: {out}: {replay.text.splitlines()[0]}")
         return WRONG_INPUT
+    return 0
+
+
+def judge_commands(console: Console, commands: "Commands") -> int:
+    """Tells what drives would have been told; returns the exit status."""
+    from pfsc_drake.control.law.fault import Fault
+
+    told = commands.told
+    change = np.abs(np.diff(told, axis=0)).max(axis=0, initial=0.0)
+    columns = {
+        "first": told[0],
+        "lowest": told.min(axis=0),
+        "highest": told.max(axis=0),
+        "largest change": change,
+    }
+    if commands.difference is not None:
+        columns["from the log"] = commands.difference
+    console.print(f"{commands.port} [{commands.unit}], {len(told)} ticks", markup=False)
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in ("Drive", *columns):
+        table.add_column(title, justify="right")
+    for i in range(told.shape[1]):
+        table.add_row(str(i + 1), *(f"{values[i]:.5g}" for values in columns.values()))
+    console.print(table)
+    if commands.assumed:
+        console.print(commands.assumed, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"all outputs: {commands.file}", highlight=False, markup=False, soft_wrap=True)
+    if commands.fault:
+        why = Fault(commands.fault).explanation
+        print_error(f"fault: {why}, from t = {commands.fault_time:.3f} s on")
+        return FAULT
     return 0
 
 

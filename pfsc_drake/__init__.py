@@ -8,6 +8,7 @@ The three doors, :func:`add_path_following`, :func:`add_surface_following` and
 point downwards:
 
 * :mod:`pfsc_drake.following`: whole controllers, from the joint state to the drives.
+* :mod:`pfsc_drake.codegen`: controllers as C99.
 * :mod:`pfsc_drake.systems`: blocks as Drake systems, one by one or fused; plants, drawing.
 * :mod:`pfsc_drake.physics`: what a controller meets and does not know.
 * :mod:`pfsc_drake.control`: what a controller knows: laws, manifolds, observers, fixtures.
@@ -46,6 +47,7 @@ _DOOR = {
     "add_guidance": "pfsc_drake.following.guidance",
     "add_path_following": "pfsc_drake.following.path_following",
     "add_surface_following": "pfsc_drake.following.surface_following",
+    "export": "pfsc_drake.codegen.export",
     "fuse": "pfsc_drake.systems.fuse",
     "path_from_waypoints": "pfsc_drake.geometry",
     "rest_to_rest": "pfsc_drake.control.law.reference",

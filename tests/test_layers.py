@@ -14,7 +14,7 @@ LAYERS = [
     ["reporting"],
     ["diagrams"],
     ["pfsc_drake.following"],
-    ["pfsc_drake.export"],
+    ["pfsc_drake.codegen"],
     ["pfsc_drake.systems"],
     ["pfsc_drake.physics"],
     ["pfsc_drake.control"],

@@ -34,7 +34,8 @@ def add_sensor(
             acts on the tool.
 
     Returns:
-        ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``.
+        ``wrench_measured`` (at the tool point, world axes), ``tared``, ``sensor_fault``,
+        and ``wrench_sensor``, what the sensor itself tells.
 
     Raises:
         InputError: If the sensor does not suit the robot or the sampling time.
@@ -55,7 +56,8 @@ def add_sensor(
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     signals = {"wrench_measured": "wrench", "tared": "tared", "sensor_fault": "fault"}
-    return {name: compensation.GetOutputPort(port) for name, port in signals.items()}
+    found = {name: compensation.GetOutputPort(port) for name, port in signals.items()}
+    return found | {"wrench_sensor": reading}
 
 
 def _add_transducer(builder: DiagramBuilder, mount: SensorMount, scenario: Scenario) -> BlockSystem:

@@ -226,6 +226,7 @@ def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> No
     known = {
         "wrench_ext": ("N, Nm", wrench),
         "wrench_measured": ("N, Nm", wrench),
+        "wrench_sensor": ("N, Nm", wrench),
         "wrench_observed": ("N, Nm", wrench),
         "manifold_force": ("N, Nm", manifold),
         "damping": ("N s/m, Nm s/rad", [name.replace("tau", "d", 1) for name in manifold]),

@@ -11,7 +11,7 @@ import casadi as ca
 from pfsc_drake.compiled.code import Code, Tables
 from pfsc_drake.compiled.operations import function_name
 
-__all__ = ["CCode", "helpers", "table_text"]
+__all__ = ["CCode", "helpers", "table_head", "table_text"]
 
 _EXPRESSIONS = {
     ca.OP_ADD: "{x} + {y}",
@@ -244,7 +244,17 @@ def table_text(name: str, values: Sequence[str]) -> str:
     numbers = [f"{_number(value)}," for value in values]
     lines = [" ".join(numbers[i : i + 6]) for i in range(0, len(numbers), 6)]
     rows = "".join(f"    {line}\n" for line in lines)
-    return f"static const double {name}[{len(values)}] = {{\n{rows}}};\n"
+    return f"{table_head(name, len(values))} = {{\n{rows}}};\n"
+
+
+def table_head(name: str, size: int) -> str:
+    """Return what declares a table.
+
+    Args:
+        name: Its name.
+        size: Number of its values.
+    """
+    return f"const double {name}[{size}]"
 
 
 def _function(name: str, parameters: Sequence[str], lines: Sequence[str]) -> str:

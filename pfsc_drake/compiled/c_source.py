@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.c_code import CCode, helpers, table_text
-from pfsc_drake.compiled.code import Table
+from pfsc_drake.compiled.c_code import CCode, helpers, table_head, table_text
+from pfsc_drake.compiled.code import Table, Tables
 from pfsc_drake.compiled.translation import Translation
 
 __all__ = ["c_source", "parameters"]
@@ -40,43 +40,47 @@ def c_source(functions: Mapping[str, ca.Function], prefix: str) -> dict[str, str
     (``-std=c99`` or ``-ffp-contract=off``), or calculate inexactly.
 
     Args:
-        functions: By the names that they are to have behind ``prefix_``: identifiers.
+        functions: By the names that they are to have behind ``prefix_``: identifiers, none of them
+            ``tables``.
         prefix: An identifier.
 
     Returns:
-        Contents of ``prefix.c``, ``prefix.h`` and ``prefix_tables.h`` by their names. A function
-        takes a pointer to the nonzeros of each argument, then of each result, all of them by their
-        names (:func:`parameters`).
+        Contents of files by their names: ``prefix.h``, ``prefix_name.c`` of each function, and
+        their tables, ``prefix_tables.h`` and ``.c``. A function takes a pointer to the nonzeros of
+        each argument, then of each result, all of them by their names (:func:`parameters`).
 
     Raises:
         Untranslatable: If a function contains something that has no translation.
     """
-    translation = Translation(CCode)
-    declarations, definitions = [], []
+    tables = Tables(f"{prefix}_table")
+    declarations, files = [], {}
     for name, function in functions.items():
+        translation = Translation(CCode, tables)
         inner = translation.function(function)
         given = parameters(function)
         declared = f"void {prefix}_{name}({_declared(function, given)})"
         declarations.append(f"{declared};\n")
-        definitions.append(f"{declared}\n{{\n    {inner}({', '.join(given)});\n}}\n")
-    guard = f"{prefix}_h".upper()
-    tables = [
-        table_text(name, [str(value) for value in Table(np.frombuffer(content))])
-        for content, name in translation.tables.names.items()
-    ]
-    text = "\n".join([*translation.texts, *definitions])
-    return {
-        f"{prefix}.h": "\n".join(
-            [f"#ifndef {guard}\n#define {guard}\n", _OPEN, *declarations, _CLOSE, "#endif\n"]
-        ),
-        f"{prefix}_tables.h": "\n".join(tables) or "/* there are none */\n",
-        f"{prefix}.c": "\n".join(
+        defined = f"{declared}\n{{\n    {inner}({', '.join(given)});\n}}\n"
+        text = "\n".join([*translation.texts, defined])
+        files[f"{prefix}_{name}.c"] = "\n".join(
             [
                 f'#include "{prefix}.h"\n\n#include <math.h>\n#include <stddef.h>\n',
                 f'#include "{prefix}_tables.h"\n',
                 helpers(text),
                 text,
             ]
+        )
+    named = {
+        name: [str(value) for value in Table(np.frombuffer(content))]
+        for content, name in tables.names.items()
+    }
+    extern = "".join(f"extern {table_head(name, len(named[name]))};\n" for name in named)
+    written = [table_text(name, values) for name, values in named.items()]
+    return files | {
+        f"{prefix}.h": _guarded(f"{prefix}_h", "\n".join([_OPEN, *declarations, _CLOSE])),
+        f"{prefix}_tables.h": _guarded(f"{prefix}_tables_h", extern or "/* there are none */\n"),
+        f"{prefix}_tables.c": "\n".join(
+            [f'#include "{prefix}_tables.h"\n\n#include <math.h>\n', *written]
         ),
     }
 
@@ -94,6 +98,11 @@ def parameters(function: ca.Function) -> list[str]:
             name += "_"
         names.append(name)
     return names
+
+
+def _guarded(name: str, text: str) -> str:
+    guard = name.upper()
+    return f"#ifndef {guard}\n#define {guard}\n\n{text}\n#endif\n"
 
 
 def _declared(function: ca.Function, names: list[str]) -> str:

@@ -58,11 +58,15 @@ class Table(Sequence[Value]):
 class Tables:
     """Constants that functions share, each content once.
 
+    Args:
+        prefix: Of their names.
+
     Attributes:
         names: Their pointers by content, which is doubles as they are in memory.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "table") -> None:
+        self._prefix = prefix
         self.names: dict[bytes, str] = {}
 
     def pointer(self, values: Sequence[Value]) -> str:
@@ -74,7 +78,7 @@ class Tables:
         if not isinstance(values, Table):
             bits = np.array([int(str(value), 16) for value in values], dtype=np.uint64)
             values = Table(bits.view(np.float64))
-        return self.names.setdefault(values.content, f"table{len(self.names)}")
+        return self.names.setdefault(values.content, f"{self._prefix}{len(self.names)}")
 
 
 class Code(ABC):

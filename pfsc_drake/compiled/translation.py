@@ -41,15 +41,16 @@ class Translation:
 
     Args:
         language: Of the code.
+        tables: Those of other functions, where they are to be shared.
 
     Attributes:
         texts: The functions.
         tables: Their tables.
     """
 
-    def __init__(self, language: type[Code]) -> None:
+    def __init__(self, language: type[Code], tables: Tables | None = None) -> None:
         self._language = language
-        self.tables = Tables()
+        self.tables = Tables() if tables is None else tables
         self.texts: list[str] = []
         self._count = 0
         # by address, so that they are kept: to read a function's content takes long

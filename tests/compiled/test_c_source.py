@@ -1,7 +1,6 @@
 """Functions in C: compiled without a warning, and against the interpreter."""
 
 import ctypes
-import shutil
 import subprocess
 
 import casadi as ca
@@ -13,6 +12,7 @@ from pfsc_drake.compiled.operations import Untranslatable
 from tests.compiled import test_computed_indices, test_matrix_instructions, test_translation
 from tests.compiled.interpreter import SPECIAL, assert_same_bits
 from tests.compiled.test_operations import BINARY, UNARY
+from tests.compilers import needs_gcc
 
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 X, T = ca.SX.sym("x", 2), ca.SX.sym("t")
@@ -57,18 +57,17 @@ FUNCTIONS = {
 @pytest.fixture(scope="module", name="compiled")
 def fixture_compiled(tmp_path_factory):
     """Return what calls the functions, as compiled at once; every warning is an error."""
-    gcc = shutil.which("gcc")
-    if gcc is None:
-        pytest.skip("no gcc on this machine")
     folder = tmp_path_factory.mktemp("source")
     for name, text in c_source(FUNCTIONS, "test").items():
         (folder / name).write_text(text)
-    command = [gcc, "-std=c99", "-O1", *WARNINGS, "-shared", "-fPIC", "test.c", "-o", "test.so"]
+    sources = sorted(file.name for file in folder.glob("*.c"))
+    command = ["gcc", "-std=c99", "-O1", *WARNINGS, "-shared", "-fPIC", "-o", "test.so", *sources]
     done = subprocess.run([*command, "-lm"], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[:3000]
     return ctypes.CDLL(str(folder / "test.so"))
 
 
+@needs_gcc
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_results(name, compiled):
     function, rng = FUNCTIONS[name], np.random.default_rng(0)
@@ -96,11 +95,11 @@ def test_results(name, compiled):
 
 def test_indices_that_are_none_do_not_overflow():
     """Unlike in the interpreter, where two of them make a zero."""
-    text = c_source({"f": ca.Function("f", [], [ca.MX(1.0)])}, "p")["p.c"]
+    text = c_source({"f": ca.Function("f", [], [ca.MX(1.0)])}, "p")["p_f.c"]
     assert "rounded" not in text
     module = test_computed_indices
     both = ca.Function("f", [module.A, module.K, module.J], [module.READ["rows of columns"]])
-    assert "-most" in c_source({"f": both}, "p")["p.c"]
+    assert "-most" in c_source({"f": both}, "p")["p_f.c"]
 
 
 def test_header_and_names():
@@ -109,7 +108,7 @@ def test_header_and_names():
     )
     assert parameters(function) == ["a_x", "double_", "e", "a_x_", "y"]
     files = c_source({"step": function}, "robot")
-    assert set(files) == {"robot.c", "robot.h", "robot_tables.h"}
+    assert set(files) == {"robot_step.c", "robot.h", "robot_tables.c", "robot_tables.h"}
     assert (
         "void robot_step(const double a_x[2], const double double_[1], const double *e, "
         "double a_x_[2], double y[1]);" in files["robot.h"]
@@ -118,9 +117,9 @@ def test_header_and_names():
 
 def test_nothing_that_is_not_needed():
     files = c_source({"f": ca.Function("f", [X, T], [X[0] + 1.0])}, "p")
-    assert files["p.c"].count("static") == 1
-    assert "(void)a1;" in files["p.c"]
-    assert "static" not in files["p_tables.h"]
+    assert files["p_f.c"].count("static") == 1
+    assert "(void)a1;" in files["p_f.c"]
+    assert "const" not in files["p_tables.h"] + files["p_tables.c"]
 
 
 def test_what_has_no_translation():

@@ -48,15 +48,16 @@ class FaultSwitch(Block):
 
     Args:
         num_drives: N.
+        unit: Of what they are told.
     """
 
-    def __init__(self, num_drives: int) -> None:
+    def __init__(self, num_drives: int, unit: str = "") -> None:
         self.inputs = {
             "drive": Port(num_drives),
             "stop": Port(num_drives, optional=True),
             "fault": Port(1),
         }
-        self.outputs, self.states = {"told": Port(num_drives)}, {}
+        self.outputs, self.states = {"told": Port(num_drives, unit)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""

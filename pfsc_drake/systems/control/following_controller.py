@@ -97,7 +97,8 @@ class FollowingController(Diagram):
         causes |= {"alarms": alarms.GetOutputPort("fault"), "law": sampled.GetOutputPort("fault")}
         # the root cause first
         latch = add("fault_latch", FaultLatch(list(causes)))
-        switch = add("switch", FaultSwitch(law.robot.dimension))
+        unit = "Nm or N" if commands_torque else "rad/s or m/s"
+        switch = add("switch", FaultSwitch(law.robot.dimension, unit))
         report = add("report", LawReport(law.layout))
         for name, port in causes.items():
             connect(port, latch.GetInputPort(name))

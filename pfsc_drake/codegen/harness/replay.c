@@ -1,9 +1,13 @@
 /* Feed a recorded log to the controller and compare what it puts out, bit by bit.
 
-   usage: replay [LOG]     LOG: replay.bin if omitted
+   usage: replay [LOG [STEPS]]          replay.bin and 1000000 if omitted
+          replay -w INPUTS OUTPUTS
 
    The log holds doubles: for each tick the inputs, then the outputs, as in interface.json.
+   Then so many steps are measured, one after the other.
    Prints one line of numbers for programs, too. Status 0: all bits the same; 1: not; 2: no log.
+
+   With -w the log holds nothing but inputs, and what the controller makes of them is written.
 */
 #define _POSIX_C_SOURCE 199309L
 
@@ -17,7 +21,7 @@
 
 #define INPUTS (sizeof(controller_inputs) / sizeof(double))
 #define OUTPUTS (sizeof(controller_outputs) / sizeof(double))
-#define MEASURED 100000 /* ticks */
+#define MEASURED 1000000 /* steps */
 
 typedef struct {
     controller_inputs inputs;
@@ -111,12 +115,44 @@ static void measure(const tick_record *log, size_t ticks, double *times, size_t 
     qsort(times, count, sizeof *times, ascending);
 }
 
+/* Write what the controller makes of inputs; return the status. */
+static int write_outputs(const char *from, const char *to)
+{
+    FILE *in = fopen(from, "rb"), *out = fopen(to, "wb");
+    controller_state state;
+    controller_inputs inputs;
+    controller_outputs outputs;
+    size_t ticks = 0;
+    int status = in == NULL || out == NULL ? 2 : 0;
+    while (status == 0 && fread(&inputs, sizeof inputs, 1, in) == 1) {
+        if (ticks++ == 0) {
+            controller_initialize(&state, &inputs);
+        }
+        controller_step(&state, &inputs, &outputs);
+        status = fwrite(&outputs, sizeof outputs, 1, out) == 1 ? 0 : 2;
+    }
+    if (in != NULL) {
+        fclose(in);
+    }
+    if (out != NULL && fclose(out) != 0) {
+        status = 2;
+    }
+    return ticks == 0 ? 2 : status;
+}
+
 int main(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "replay.bin";
+    const size_t given = argc > 2 ? strtoul(argv[2], NULL, 10) : MEASURED;
+    const size_t measured = given > 0 ? given : 1;
     size_t ticks, differing;
-    tick_record *log = read_log(name, &ticks);
-    double *times = malloc(MEASURED * sizeof *times);
+    tick_record *log;
+    double *times;
+    if (argc == 4 && strcmp(argv[1], "-w") == 0) {
+        return write_outputs(argv[2], argv[3]);
+    }
+    log = read_log(name, &ticks);
+    times = malloc(measured * sizeof *times);
     if (log == NULL || ticks == 0 || times == NULL) {
         fprintf(stderr, "%s: no log, or an empty one\n", name);
         free(log);
@@ -124,10 +160,10 @@ int main(int argc, char **argv)
         return 2;
     }
     differing = compare(log, ticks);
-    measure(log, ticks, times, MEASURED);
+    measure(log, ticks, times, measured);
     printf("ticks %lu differing %lu median_us %.2f p99_us %.2f worst_us %.2f\n",
-           (unsigned long)ticks, (unsigned long)differing, times[MEASURED / 2],
-           times[MEASURED / 100 * 99], times[MEASURED - 1]);
+           (unsigned long)ticks, (unsigned long)differing, times[measured / 2],
+           times[measured - 1 - measured / 100], times[measured - 1]);
     free(log);
     free(times);
     return differing == 0 ? 0 : 1;

@@ -2,7 +2,6 @@
 
 import ctypes
 import json
-import shutil
 import subprocess
 
 import numpy as np
@@ -11,9 +10,10 @@ import pytest
 from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.control.cases import all_finite, latched, where
 from pfsc_drake.errors import InputError
-from pfsc_drake.export.c_controller import CController
+from tests.compilers import needs_gcc
 
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 FLAGS = ["-std=c99", "-O1", *WARNINGS, "-shared", "-fPIC"]
@@ -58,7 +58,7 @@ def test_the_interface_says_what_there_is(controller, tmp_path):
     assert said["scenario"] == "damper"
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc")
+@needs_gcc
 def test_c_is_python_to_the_last_bit(controller, tmp_path):
     controller.write(tmp_path)
     sources = [str(file) for file in tmp_path.glob("*.c")]

@@ -1,8 +1,10 @@
 """A network of blocks as a controller in C99."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,11 @@ import numpy as np
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.compiled.c_source import c_source, parameters
+from pfsc_drake.compiled.operations import Untranslatable
 from pfsc_drake.errors import InputError
 
 _FUNCTIONS = "controller_functions"
+_DOUBLE = 8  # bytes
 _HEADER = """\
 /* {title}
 
@@ -29,6 +33,7 @@ extern "C" {{
 #endif
 
 #define CONTROLLER_SAMPLING_TIME {period!r} /* s */
+#define CONTROLLER_DRIVES {drives} /* numbers of the first output, which the drives are told */
 
 typedef struct {{
     double tick; /* number of the next tick */
@@ -90,7 +95,8 @@ class CController:
         period: Sampling time [s].
         title: What it is.
         presets: States that it begins with, by name; the others are what the inputs say.
-        scenario: What it was made from: a name, or a hash.
+        scenario: Name of what it was made from.
+        hash: SHA-256 of that.
     """
 
     program: Program
@@ -98,6 +104,7 @@ class CController:
     title: str = "Controller"
     presets: Mapping[str, np.ndarray] = field(default_factory=dict)
     scenario: str = ""
+    hash: str = ""
 
     @classmethod
     def of(cls, network: Network, period: float, **about: Any) -> "CController":
@@ -120,16 +127,20 @@ class CController:
         return cls(Program(network), period, **about)
 
     def files(self) -> dict[str, str]:
-        """Return the contents of all source files and of ``interface.json``, by name."""
-        step, initial = self.program.step(), self._initial()
-        functions = c_source({"step": step, "initial": initial}, _FUNCTIONS)
+        """Return the contents of all source files and of ``interface.json``, by name.
+
+        Raises:
+            InputError: If something has no translation to C.
+        """
+        step, initial = self._step, self._initial
         size = max(self.program.size, 1)
         given = {"x": "state->x", "t": "&state->tick", "x_next": "x_next"}
         fault = f"(int) outputs->{_identifier('fault')}[0]"
-        return functions | {
+        return self._functions | {
             "controller.h": _HEADER.format(
                 title=self.title,
                 period=self.period,
+                drives=self.interface()["outputs"][0]["size"],
                 size=size,
                 inputs=_members(self.interface()["inputs"]),
                 outputs=_members(self.interface()["outputs"]),
@@ -172,9 +183,11 @@ class CController:
         return {
             "inputs": inputs,
             "outputs": outputs,
-            "state_bytes": 8 * (1 + max(self.program.size, 1)),
+            "state_bytes": _DOUBLE * (1 + max(self.program.size, 1)),
             "sampling_time": self.period,
+            "table_bytes": self.table_bytes,
             "scenario": self.scenario,
+            "hash": self.hash,
         }
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
@@ -185,6 +198,24 @@ class CController:
             preset[list(self.program.states).index(name)] = 1.0
         return x, preset
 
+    @property
+    def table_bytes(self) -> int:
+        """Size of the tables."""
+        declared = self._functions[f"{_FUNCTIONS}_tables.h"]
+        return sum(_DOUBLE * int(size) for size in re.findall(r"\[(\d+)\];", declared))
+
+    @cached_property
+    def _functions(self) -> dict[str, str]:
+        try:
+            return c_source({"step": self._step, "initial": self._initial}, _FUNCTIONS)
+        except Untranslatable as error:
+            raise InputError(f"export: {error}, which has no translation to C") from None
+
+    @cached_property
+    def _step(self) -> ca.Function:
+        return self.program.step()
+
+    @cached_property
     def _initial(self) -> ca.Function:
         """Return ``(t, inputs ..) -> x_start``."""
         names = self.program.initial_inputs

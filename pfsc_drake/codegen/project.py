@@ -3,8 +3,11 @@
 import shutil
 from pathlib import Path
 
-from pfsc_drake.export.c_controller import CController
+import numpy as np
 
+from pfsc_drake.codegen.c_controller import CController
+
+LOG = "replay.bin"
 _HARNESS = Path(__file__).parent / "harness"
 _README = """\
 # {title}
@@ -26,27 +29,42 @@ A fault other than 0 holds until the next `controller_initialize`; the outputs t
 |---|---|---|
 {outputs}
 
-The state takes {state} bytes, the source {source} kB.
+The state takes {state} bytes, tables {tables} bytes, the source {source} kB. Made from
+{origin}.
 
-- `make` builds `replay` and `main_rt`. Other compilers: `-std=c99` or `-ffp-contract=off`.
-- `./replay [LOG]` feeds recorded inputs and compares the outputs bit by bit; it prints the time of
-  a step. `replay.bin` is there if the export was checked.
+- `make` builds `replay`, `replay_random` and `main_rt`; so does CMake: `cmake -B build && cmake
+  --build build`. Other compilers: `make CC=clang OPTIMIZATION=-O2`, with `-std=c99` or
+  `-ffp-contract=off`.
+- `./replay [LOG]` feeds recorded inputs, those of `replay.bin`, and compares the outputs bit by
+  bit; it prints the time of a step. On another machine the sine may differ in the last place.
+- `./replay_random` feeds wrong inputs: they end in a fault, and what drives are told is finite.
+- `make sanitize` does both with the sanitizers of addresses and undefined behaviour.
 - `./main_rt [SECONDS [LOG]]` steps once per sampling time with deadlines and prints a histogram.
   Put your drivers into its two functions `read_inputs` and `write_outputs`.
 - `interface.json` says the same as these tables, for programs.
 """
 
 
-def write_project(controller: CController, folder: Path) -> list[Path]:
+def write_project(
+    controller: CController, folder: Path, recorded: np.ndarray | None = None
+) -> list[Path]:
     """Write a controller and what goes with it, and return all files.
 
     Args:
         controller: The controller.
         folder: Made if it does not exist.
+        recorded: Inputs, then outputs of each tick of a run, in the order of ``interface.json``,
+            shape (ticks, inputs and outputs), for ``replay.bin``.
+
+    Raises:
+        InputError: If something has no translation to C.
     """
     written = controller.write(folder)
     for file in sorted(_HARNESS.iterdir()):
         written.append(Path(shutil.copyfile(file, folder / file.name)))
+    if recorded is not None:
+        written.append(folder / LOG)
+        np.ascontiguousarray(recorded, dtype=float).tofile(folder / LOG)
     source = sum(file.stat().st_size for file in written if file.name.startswith("controller"))
     readme = folder / "README.md"
     said = controller.interface()
@@ -57,6 +75,8 @@ def write_project(controller: CController, folder: Path) -> list[Path]:
             inputs=_rows(said["inputs"]),
             outputs=_rows(said["outputs"]),
             state=said["state_bytes"],
+            tables=said["table_bytes"],
+            origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",
             source=round(source / 1000),
         ),
         encoding="utf-8",

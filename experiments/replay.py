@@ -1,0 +1,295 @@
+"""Exported controllers at work: compiled, compared with a record, and fed with logs."""
+
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.results.run_log import RunLog
+from pfsc_drake.codegen.project import LOG
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.number_table import read_numbers
+from reporting.progress import ProgressListener
+
+COMMANDS = "commands.csv"
+_LONGEST = 1200.0  # s
+_RESULT = re.compile(
+    r"ticks (\d+) differing (\d+) median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
+)
+_TOOLS = ("gcc", "make")
+# what inputs of controllers are called in logs
+_LOGGED = {"measured_wrench": "wrench_sensor", "delivered": "wrench_sensor"}
+_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
+_ROUNDING = 1e-6  # of a tick
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What the controller in C made of a recorded run.
+
+    Attributes:
+        ticks: Of the run.
+        differing: How many of them have an output that is not the same to the last bit.
+        median, p99, worst: Times of a step, in a row [us].
+        text: What was printed.
+    """
+
+    ticks: int
+    differing: int
+    median: float
+    p99: float
+    worst: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Commands:
+    """What an exported controller would have told the drives.
+
+    Attributes:
+        port: Name of what the drives are told.
+        unit: Its unit.
+        times: Of the ticks [s], shape (ticks,).
+        told: What the drives are told, shape (ticks, N).
+        fault: The first fault, 0 for none.
+        fault_time: When it came [s].
+        difference: From what the log says the drives were told, largest magnitude of each, shape
+            (N,); None if it does not say.
+        assumed: What was assumed of the log, if anything.
+        file: Where all outputs at all ticks are.
+    """
+
+    port: str
+    unit: str
+    times: np.ndarray
+    told: np.ndarray
+    fault: int
+    fault_time: float
+    difference: np.ndarray | None
+    assumed: str
+    file: Path
+
+
+def missing_tool() -> str | None:
+    """Return what is needed to compile and is not on this machine, None if all is there."""
+    return next((tool for tool in _TOOLS if shutil.which(tool) is None), None)
+
+
+def check_export(
+    folder: Path, progress: ProgressListener, optimization: str = "", steps: int | None = None
+) -> Replay:
+    """Compile an exported controller and let it repeat the run that is recorded beside it.
+
+    Args:
+        folder: With the files.
+        progress: Told what goes on.
+        optimization: Options of the compiler instead of those of the Makefile.
+        steps: How many are measured, 1e6 if omitted.
+
+    Raises:
+        InputError: If it cannot be compiled, or not be run.
+    """
+    compile_replay(folder, progress, optimization)
+    progress(0.0, "repeating the run")
+    given = [LOG] if steps is None else [LOG, str(steps)]
+    replayed = _run([str(folder.resolve() / "replay"), *given], folder)
+    found = _RESULT.search(replayed.stdout)
+    if found is None:
+        raise InputError(f"{folder}/replay ended with status {replayed.returncode}")
+    ticks, differing = int(found[1]), int(found[2])
+    median, p99, worst = (float(found[i]) for i in (3, 4, 5))
+    return Replay(ticks, differing, median, p99, worst, replayed.stdout)
+
+
+def compile_replay(folder: Path, progress: ProgressListener, optimization: str = "") -> None:
+    """Compile an exported controller and what feeds it, one file after the other.
+
+    Args:
+        folder: With the files.
+        progress: Told what goes on.
+        optimization: Options of the compiler instead of those of the Makefile.
+
+    Raises:
+        InputError: If the compiler says anything.
+    """
+    options = [f"OPTIMIZATION={optimization}"] if optimization else []
+    sources = [folder / "replay.c", *sorted(folder.glob("controller*.c"))]
+    for source in sources:
+        size = source.stat().st_size / 1e6
+        progress(0.0, f"compiling {source.name}, {size:.1f} MB")
+        _make(folder, source.with_suffix(".o").name, options)
+    _make(folder, "replay", options)
+
+
+def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
+    """Feed a log to an exported controller.
+
+    Args:
+        folder: With the files.
+        log: ``log.h5`` of a run, or a CSV file with columns ``t``, ``q_1`` .. ``q_N``, ``v_1`` ..
+            ``v_N``, perhaps ``q_M_1`` .., ``v_M_1`` .. of the motors, and ``name_1`` .. of every
+            further input.
+        progress: Told what goes on.
+
+    Raises:
+        InputError: If there is no such controller, it cannot be compiled, or the log does not tell
+            what it needs.
+    """
+    said = _interface(folder)
+    is_run = log.suffix.lower() in (".h5", ".hdf5")
+    recorded = _of_run(log, said["inputs"]) if is_run else _of_csv(log, said["inputs"])
+    period = said["sampling_time"]
+    ticks = int(np.floor((recorded.times[-1] - recorded.times[0]) / period + _ROUNDING)) + 1
+    times = recorded.times[0] + period * np.arange(ticks)
+    row = np.searchsorted(recorded.times, times + _ROUNDING * period, side="right") - 1
+    compile_replay(folder, progress)
+    progress(0.0, "feeding the log")
+    outputs = _fed(folder, recorded.inputs[row], sum(port["size"] for port in said["outputs"]))
+    ends = np.cumsum([0, *(port["size"] for port in said["outputs"])])
+    parts = {
+        port["name"]: outputs[:, a:b]
+        for port, a, b in zip(said["outputs"], ends, ends[1:], strict=False)
+    }
+    drives = said["outputs"][0]
+    told, faults = parts[drives["name"]], np.flatnonzero(parts["fault"][:, 0])
+    difference = None
+    if recorded.told is not None and recorded.told.shape[1] == told.shape[1]:
+        difference = np.abs(told - recorded.told[row]).max(axis=0)
+    names = [f"{port['name']}_{i + 1}" for port in said["outputs"] for i in range(port["size"])]
+    file = folder / COMMANDS
+    np.savetxt(
+        file,
+        np.column_stack([times, outputs]),
+        fmt="%.12g",
+        delimiter=",",
+        header=",".join(["t", *names]),
+        comments="",
+    )
+    first = faults[0] if faults.size else None
+    return Commands(
+        drives["name"],
+        drives["unit"],
+        times,
+        told,
+        0 if first is None else int(parts["fault"][first, 0]),
+        np.nan if first is None else float(times[first]),
+        difference,
+        recorded.assumed,
+        file,
+    )
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """Times [s] (n,), inputs (n, size), what drives were told (n, N), and what was assumed."""
+
+    times: np.ndarray
+    inputs: np.ndarray
+    told: np.ndarray | None = None
+    assumed: str = ""
+
+
+def _interface(folder: Path) -> dict[str, Any]:
+    file = folder / "interface.json"
+    try:
+        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InputError(
+            f"{file}: cannot be read; allowed: a folder that export has written"
+        ) from None
+    return said
+
+
+def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
+    run = RunLog.read(log)
+
+    def found(name: str) -> np.ndarray:
+        if name not in run:
+            raise InputError(f"{log}: no signal {name}, which the controller needs")
+        return run[name].values
+
+    columns = []
+    for port in inputs:
+        if port["name"] == "joint_state":
+            seen = "_measured" if "q_J_measured" in run else ""
+            columns += [found(f"{name}{seen}") for name in _JOINT_STATE]
+        else:
+            columns.append(found(_LOGGED.get(port["name"], port["name"])))
+        if sum(part.shape[1] for part in columns) != sum(
+            p["size"] for p in inputs[: inputs.index(port) + 1]
+        ):
+            raise InputError(f"{log}: not of this robot; {port['name']} has {port['size']} numbers")
+    told = run["tau_d"].values if "tau_d" in run else None
+    return _Recorded(run.time, np.hstack(columns), told)
+
+
+def _of_csv(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
+    joints = next((p["size"] // 4 for p in inputs if p["name"] == "joint_state"), 0)
+    motors = [f"{name}_{i + 1}" for name in ("q_M", "v_M") for i in range(joints)]
+    links = [f"{name}_{i + 1}" for name in ("q", "v") for i in range(joints)]
+    others = [
+        f"{port['name']}_{i + 1}"
+        for port in inputs
+        if port["name"] != "joint_state"
+        for i in range(port["size"])
+    ]
+    needed = ["t", *links, *others]
+
+    def check(place: str, header: list[str]) -> None:
+        lacking = [name for name in needed if name not in header]
+        if lacking:
+            raise InputError(f"{place}: no column {lacking[0]}; needed: {', '.join(needed)}")
+
+    table = read_numbers(str(log), "samples", check)
+    column = dict(zip(table.header, table.rows.T, strict=True))
+    times = column["t"]
+    if np.any(np.diff(times) <= 0.0):
+        late = table.lines[1 + int(np.argmax(np.diff(times) <= 0.0))]
+        raise InputError(f"{log}, line {late}: t does not grow")
+    has_motors = all(name in column for name in motors)
+    parts = []
+    for port in inputs:
+        if port["name"] == "joint_state":
+            parts += [column[name] for name in [*links, *(motors if has_motors else links)]]
+        else:
+            parts += [column[f"{port['name']}_{i + 1}"] for i in range(port["size"])]
+    assumed = (
+        "" if has_motors or not joints else "no q_M, v_M: motors are taken to be where q, v is"
+    )
+    return _Recorded(times, np.column_stack(parts), assumed=assumed)
+
+
+def _fed(folder: Path, inputs: np.ndarray, size: int) -> np.ndarray:
+    """Return what the controller makes of inputs, shape (ticks, size)."""
+    with tempfile.TemporaryDirectory() as place:
+        given, made = Path(place) / "inputs", Path(place) / "outputs"
+        np.ascontiguousarray(inputs).tofile(given)
+        done = _run([str(folder.resolve() / "replay"), "-w", str(given), str(made)], folder)
+        if done.returncode != 0:
+            raise InputError(f"{folder}/replay ended with status {done.returncode}")
+        return np.fromfile(made).reshape(len(inputs), size)
+
+
+def _make(folder: Path, target: str, options: list[str]) -> None:
+    lacking = missing_tool()
+    if lacking is not None:
+        raise InputError(f"{folder}: cannot be compiled: there is no {lacking} here")
+    done = _run(["make", "--silent", *options, target], folder)
+    if done.returncode != 0 or done.stderr:
+        said = (done.stderr.splitlines() or ["nothing"])[0]
+        raise InputError(f"{folder}: make {target} says: {said}")
+
+
+def _run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=_LONGEST, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{folder}: {command[0]} took more than {_LONGEST:g} s") from None
