@@ -259,7 +259,10 @@ def _with_gains(options: ControllerParameters, law: str, bandwidth: float) -> Co
     chosen = copy.deepcopy(options)
     chosen.law = law
     gains = chosen.gains.setdefault(law, LawGains())
-    for kind in ("eta", "xi", "phi"):
+    kinds = ["eta", "xi", "phi"]
+    if not gains.xi.is_given:  # else the posture has those of xi
+        kinds.append("posture")
+    for kind in kinds:
         if not getattr(gains, kind).is_given:
             setattr(gains, kind, GainParameters(bandwidth=bandwidth))
     return chosen

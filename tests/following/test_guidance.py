@@ -12,7 +12,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pfsc_drake import Fixture, FollowerOptions, GuidanceOptions, SphereRegion, add_guidance
 from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.regions.course import CurveCourse
+from pfsc_drake.geometry.regions.moving import ShiftedRegion
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
 from tests.following.pulled import Pulled
@@ -20,31 +23,37 @@ from tests.following.pulled import Pulled
 START = RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), [0.9, 0.0, 0.8])
 FLOOR = HalfSpace([0.0, 0.0, 0.795], [0.0, 0.0, 1.0])
 MASS, DAMPING = 3.0, 60.0
+RISE = {"velocity": 0.2, "acceleration": 4.0}  # m/s, m/s^2
 
 
 def load(builder, name="comau_racer_1_4"):
     plant = builder.AddSystem(MultibodyPlant(0.0))
-    Parser(plant).AddModels(str(models_directory() / "comau_racer_1_4" / f"{name}.sdf"))
+    Parser(plant).AddModels(str(next(models_directory().glob(f"*/{name}.sdf"))))
     plant.Finalize()
     return plant
 
 
-def led(regions, law="rigid", model="comau_racer_1_4", options=None):
+def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START):
     """Return a led tool at the start."""
     builder = DiagramBuilder()
     plant = load(builder, model)
     follower = add_guidance(
-        builder, plant, "tool_point", regions, law, start=START, options=options
+        builder, plant, "tool_point", regions, law, start=start, options=options
     )
     return Pulled(builder, plant, follower)
 
 
 @pytest.mark.parametrize(
-    ("law", "model"), [("rigid", "comau_racer_1_4"), ("elastic", "comau_racer_1_4_elastic")]
+    ("law", "model"),
+    [
+        ("rigid", "comau_racer_1_4"),
+        ("elastic", "comau_racer_1_4_elastic"),
+        ("rigid", "franka_emika_panda"),
+    ],
 )
 def test_a_hand_feels_the_mass_and_damping_that_are_given(law, model):
     """From rest ``v' = (f - d v) / m``, after the filter's lags; and it does not turn."""
-    tool = led([], law, model)
+    tool = led([], law, model, start=None if model == "franka_emika_panda" else START)
     force, time = np.array([3.0, -6.0, 4.0]), 0.25
     start = tool.pose()
     tool.pull(force)
@@ -72,6 +81,20 @@ def test_a_hard_region_holds_the_tool_and_a_soft_one_gives_way():
         assert tool.pose().translation()[0] > START.translation()[0] + 0.01
     assert abs(held["hard"]) < 2e-5
     assert held["soft"] == pytest.approx(-12.0 / 6e3, rel=0.02)
+
+
+def test_a_region_that_rises_lifts_the_tool():
+    """A floor that is 20 mm higher after 0.2 s, against a hand that presses with 6 N."""
+    rises = ShiftedRegion(FLOOR, CurveCourse(rest_to_rest([0.0, 0.02], **RISE)), [0.0, 0.0, 1.0])
+    tool = led([rises], options=GuidanceOptions(bandwidth=150.0))
+    tool.pull([0.0, 0.0, -6.0])
+    lowest = np.inf
+    for time in np.arange(0.01, 0.5, 0.01):
+        tool.run(time)
+        lowest = min(lowest, rises.distance_at(*tool.pose().translation(), time)[0])
+    assert tool.fault() == Fault.NONE
+    assert -6e-5 < lowest < 0.0  # what the law misses of the reference
+    assert tool.pose().translation()[2] == pytest.approx(0.815, abs=1e-4)
 
 
 def test_without_the_hands_force_told_the_law_lets_it_push_the_tool():
