@@ -1,27 +1,43 @@
-"""The map of one sampling period of a whole diagram, and its derivative.
+"""The derivative of the map of one sampling period of a whole diagram.
 
-A controlled robot is continuous between its ticks and jumps at them. From right after one tick to
-right after the next its state obeys a smooth map as long as nothing switches. The state of this map
-is everything that the diagram remembers: the plant's motion, what is held for it, filters,
-observers, the controller's memory. Its derivative by central differences is the closed loop as it
-is sampled, with no model of the controller but the controller itself.
+That of blocks is taken from their expressions, exactly. What is no block, above all the plant, is
+differentiated by central differences, while what the blocks put out is held. Both are joined where
+they are wired. So nothing of the controller is modelled a second time.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.analysis import InitializeParams, Simulator
-from pydrake.systems.framework import Context, Diagram, System
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, InputPort
 
-# s, by which the section lies behind the tick, so that the tick is not made again
-_BEHIND = 1e-9
+from diagrams.one_period_map import OnePeriodMap
+from pfsc_drake.blocks.slope import NetworkSlope, SlopeAt
+from pfsc_drake.systems.block_system import BlockSystem
+
 # relative to a variable, or absolute if that is larger
 _DIFFERENCE = 1e-6
 # part of a central difference by which the two one-sided ones may differ; more is a switch
 _BEND = 0.05
 # relative to a variable or 1; smaller changes are rounding
 _ROUNDING = 1e-11
+_ROUNDING_OF_TIME = 1e-6  # of a period
+
+
+@dataclass(frozen=True)
+class RestSlope:
+    """Derivative of what is no block, from right after a tick to right after the next.
+
+    Attributes:
+        of_inputs: Of what it gives the blocks at that tick, by its variables and by what the
+            blocks put out.
+        of_own: The same of its variables.
+    """
+
+    of_inputs: tuple[np.ndarray, np.ndarray]
+    of_own: tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -30,162 +46,220 @@ class SectionDerivative:
 
     Attributes:
         A: ``dx_{k+1} / dx_k``, shape (n, n), the variables being those that were asked for.
-        changes: Whether a variable in the column changes one in the row by more than rounding.
-        switches: Variables for which the map has no slope there: flags and counters, and limits
-            that are just reached; shape (n,).
+        rest: What is not the blocks' in it, one for each interval between ticks of blocks.
+        wires: What the blocks put out at the last tick, by ``block.output``.
     """
 
     A: np.ndarray
-    changes: np.ndarray
-    switches: np.ndarray
+    rest: Sequence[RestSlope]
+    wires: dict[str, np.ndarray]
 
 
-class OnePeriodMap:
-    """A diagram's state right after a tick as a function of its state after the tick before.
-
-    Variables are numbered through: the continuous state, then all discrete states. What a diagram
-    remembers beside (abstract state) stays as it is at the section.
+class PeriodDerivative:
+    """What differentiates a diagram's map of one period.
 
     Args:
-        diagram: The diagram.
-        period: Sampling time [s], of which every other in the diagram is a whole fraction.
+        one_period: The map.
+        diagram: Its diagram. Blocks of it are those at its top, fused or not, which sample at the
+            period or at whole fractions of it. What they put out between their ticks must not
+            depend on what moves there, where something continuous is fed with it.
         configure: Tells a simulator how to integrate.
 
     Attributes:
-        context: Where the map arrived last.
-        size: Number of variables.
+        rest: Where the variables stand that are no block's.
+        states: Where each state of a block stands, by ``block.state``.
     """
 
     def __init__(
-        self, diagram: Diagram, period: float, configure: Callable[[Simulator], None]
+        self, one_period: OnePeriodMap, diagram: Diagram, configure: Callable[[Simulator], None]
     ) -> None:
-        self.period = period
-        self._diagram = diagram
-        self._simulator = Simulator(diagram)
-        configure(self._simulator)
-        self.context = self._simulator.get_mutable_context()
-        self._silent = InitializeParams(suppress_initialization_events=True)
-        self._groups = range(self.context.num_discrete_state_groups())
-        sizes = [self.context.num_continuous_states()]
-        sizes += [self.context.get_discrete_state(group).size() for group in self._groups]
-        ends = np.cumsum(sizes).tolist()
-        self._parts = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-        self.size: int = ends[-1]
+        self._map = one_period
+        self._blocks = [s for s in diagram.GetSystems() if isinstance(s, BlockSystem)]
+        self._slopes = [NetworkSlope(system.network) for system in self._blocks]
+        self._memory = [one_period.rows(system) for system in self._blocks]
+        self._states = [
+            {name: rows[part] for name, part in system.states.items()}
+            for system, rows in zip(self._blocks, self._memory, strict=True)
+        ]
+        self.rest = np.setdiff1d(np.arange(one_period.size), np.concatenate([[], *self._memory]))
+        self._num_core = one_period.num_continuous
+        self._is_sampled = len(self.rest) > self._num_core
+        step = min([one_period.period, *(system.period for system in self._blocks)])
+        self._intervals = round(one_period.period / step)
+        self._free = OnePeriodMap(diagram, step, configure)
+        # where what blocks put out is held
+        self._held = OnePeriodMap(diagram, step, configure)
+        self.states: dict[str, np.ndarray] = {}
+        for system, rows in zip(self._blocks, self._states, strict=True):
+            prefix = "" if system.block is None else f"{system.get_name()}."
+            self.states |= {f"{prefix}{name}": where for name, where in rows.items()}
+        self._find_wires(diagram)
 
-    def rows(self, system: System) -> np.ndarray:
-        """Return where a system's continuous and discrete state stand among the variables.
-
-        Args:
-            system: A system of the diagram.
-        """
-        context = self._diagram.CreateDefaultContext()
-        for part in self._parts:
-            self._set_part(context, part, np.zeros(part.stop - part.start))
-        own = system.GetMyMutableContextFromRoot(context)
-        own.SetContinuousState(np.ones(own.num_continuous_states()))
-        for group in range(own.num_discrete_state_groups()):
-            own.SetDiscreteState(group, np.ones(own.get_discrete_state(group).size()))
-        return np.flatnonzero(self.variables(context))
-
-    def variables(self, context: Context) -> np.ndarray:
-        """Return all variables of a context, shape (size,)."""
-        discrete = [context.get_discrete_state(group).value() for group in self._groups]
-        return np.concatenate([context.get_continuous_state_vector().CopyToVector(), *discrete])
-
-    def adopted(self, section: Context) -> Context:
-        """Return a section of this diagram with time and variables of another's.
-
-        Args:
-            section: Context of a diagram that differs in numbers only.
-        """
-        context = self._diagram.CreateDefaultContext()
-        context.SetTime(section.get_time())
-        x = self.variables(section)
-        for part in self._parts:
-            self._set_part(context, part, x[part])
-        return context
-
-    def advance(self, section: Context, x: np.ndarray | None = None) -> np.ndarray:
-        """Return the variables right after the next tick, shape (size,).
+    def at(
+        self,
+        section: Context,
+        chosen: np.ndarray | None = None,
+        rest: Sequence[RestSlope] = (),
+    ) -> SectionDerivative:
+        """Return the derivative at a section.
 
         Args:
             section: Context right after a tick; unchanged.
-            x: Variables in place of its own, shape (size,).
+            chosen: Indices of the variables to look at, shape (n,); all if omitted, where rows
+                of what blocks remember and never tell are left zero.
+            rest: What is not the blocks', if it is known: of a diagram whose blocks alone differ.
         """
-        self.approach(section, x)
-        self._simulator.AdvancePendingEvents()
-        return self.variables(self.context)
+        A, start, made = np.eye(self._map.size), section, []
+        for interval in range(self._intervals):
+            made.append(rest[interval] if rest else self._slope_of_rest(start))
+            self._free.approach(start)
+            points = self._points(self._free.context)
+            wanted = chosen if self._intervals == 1 else None
+            A = self._joined(points, made[-1], wanted) @ A
+            if interval + 1 < self._intervals:
+                self._free.pass_tick()
+                start = self._free.context.Clone()
+        wires = self._wires(points)
+        return SectionDerivative(A if chosen is None else A[np.ix_(chosen, chosen)], made, wires)
 
-    def approach(self, section: Context, x: np.ndarray | None = None) -> None:
-        """Go to the next tick, which is not made yet.
-
-        What watches differences between ticks finds there what it finds in a run; right after a
-        tick it would compare a state with itself.
+    def wires(self, section: Context) -> dict[str, np.ndarray]:
+        """Return what blocks put out at the next tick, by ``block.output``.
 
         Args:
             section: Context right after a tick; unchanged.
-            x: Variables in place of its own, shape (size,).
         """
-        context, time = self.context, section.get_time()
-        # a product as in Drake's own schedule, so that rounding does not lose the tick
-        next_tick = (round(time / self.period) + 1) * self.period
-        context.SetTimeStateAndParametersFrom(section)
-        if x is not None:
-            for part in self._parts:
-                self._set_part(context, part, x[part])
-        context.SetTime(time + _BEHIND)
-        self._simulator.Initialize(self._silent)
-        self._simulator.AdvanceTo(next_tick)
+        self._map.approach(section)
+        return self._wires(self._points(self._map.context))
 
-    def derivative(self, section: Context, chosen: np.ndarray | None = None) -> SectionDerivative:
-        """Return the map's derivative by central differences.
+    def _wires(self, points: Sequence[SlopeAt]) -> dict[str, np.ndarray]:
+        found = {}
+        for system, point in zip(self._blocks, points, strict=True):
+            prefix = "" if system.block is None else f"{system.get_name()}."
+            found |= {f"{prefix}{name}": point.wire(name) for name in system.network.wires}
+        return found
 
-        Args:
-            section: Context right after a tick; unchanged.
-            chosen: Indices of the variables to look at, shape (n,); all if omitted.
-        """
-        x = self.variables(section)
-        chosen = np.arange(self.size) if chosen is None else chosen
-        n = len(chosen)
-        A, changes = np.zeros((n, n)), np.zeros((n, n), dtype=bool)
-        middle = self.advance(section)[chosen]
-        # what is not known yet stays so; it must not make a switch of all that does not touch it
-        known = np.isfinite(middle)
-        switches = ~(np.isfinite(x[chosen]) & known)
-        middle[~known] = 0.0
-        noise = _ROUNDING * np.maximum(1.0, np.abs(middle))
-        for column, variable in enumerate(chosen):
-            if switches[column]:
-                continue
-            delta = _DIFFERENCE * max(1.0, abs(x[variable]))
+    def _find_wires(self, diagram: Diagram) -> None:
+        """Number what blocks are fed with, and what they put out that others are fed with."""
+        self._inputs: dict[tuple[int, str], np.ndarray] = {}
+        self._outputs: dict[tuple[int, str], np.ndarray] = {}
+        self._num_inputs = self._num_outputs = 0
+        # from blocks to the rest, from the rest to blocks, from blocks to blocks
+        self._fed: list[tuple[np.ndarray, InputPort]] = []
+        self._given: list[InputPort] = []
+        self._direct: list[tuple[np.ndarray, np.ndarray]] = []
+        numbers = {system: k for k, system in enumerate(self._blocks)}
+        for (target, i), (source, o) in diagram.connection_map().items():
+            port, output = target.get_input_port(i), source.get_output_port(o)
+            if target not in numbers and not target.num_output_ports():
+                continue  # a log
+            if source in numbers:
+                key = numbers[source], output.get_name()
+                if key not in self._outputs:
+                    self._outputs[key] = self._num_outputs + np.arange(port.size())
+                    self._num_outputs += port.size()
+                if target not in numbers:
+                    self._fed.append((self._outputs[key], port))
+            if target in numbers:
+                into = self._num_inputs + np.arange(port.size())
+                self._inputs[numbers[target], port.get_name()] = into
+                self._num_inputs += port.size()
+                self._given.append(port)
+                if source in numbers:
+                    self._direct.append((into, self._outputs[key]))
+
+    def _points(self, root: Context) -> list[SlopeAt]:
+        """Return the derivatives of all blocks at a tick that is not made yet."""
+        points = []
+        for system, slope in zip(self._blocks, self._slopes, strict=True):
+            own = system.GetMyContextFromRoot(root)
+            x = {name: system.state(own, name) for name in system.states}
+            u = {name: system.GetInputPort(name).Eval(own) for name in slope.network.inputs}
+            points.append(slope.at(x, u, math.floor(_ticks(root, system) + _ROUNDING_OF_TIME)))
+        return points
+
+    def _slope_of_rest(self, start: Context) -> RestSlope:
+        self._free.approach(start)
+        put_out = np.zeros(self._num_outputs)
+        for (k, name), part in self._outputs.items():
+            own = self._blocks[k].GetMyContextFromRoot(self._free.context)
+            put_out[part] = self._blocks[k].GetOutputPort(name).Eval(own)
+        x, n, m = self._map.variables(start), len(self.rest), self._num_inputs
+        z = np.concatenate([x[self.rest], put_out])
+        middle = self._moved(start, x, z)
+        slope = np.zeros((len(middle), len(z)))
+        # what is not known yet stays so
+        finite = np.isfinite(middle)
+        for column in np.flatnonzero(np.isfinite(z)):
+            delta = _DIFFERENCE * max(1.0, abs(z[column]))
+            shift = np.zeros(len(z))
+            shift[column] = delta
             forward, backward = (
-                self._shifted(section, x, variable, sign * delta)[chosen] - middle
-                for sign in (1.0, -1.0)
+                self._moved(start, x, z + side)[finite] - middle[finite] for side in (shift, -shift)
             )
-            forward[~known] = backward[~known] = 0.0
-            with np.errstate(invalid="ignore"):
-                difference, bend = forward - backward, np.abs(forward + backward)
-            scale = np.maximum(np.abs(forward), np.abs(backward))
+            scale = np.max(np.maximum(np.abs(forward), np.abs(backward)), initial=0.0)
+            bend = np.abs(forward + backward)
             # written so that NaN is a switch
-            smooth = bend <= _BEND * np.max(scale, initial=0.0) + noise
-            switches[column] = not np.all(smooth)
-            A[:, column] = difference / (2.0 * delta)
-            changes[:, column] = scale > noise
-        return SectionDerivative(A, changes, switches)
+            is_smooth = bend <= _BEND * scale + _ROUNDING * np.maximum(1.0, np.abs(middle[finite]))
+            if np.all(is_smooth) or column < self._num_core:
+                slope[finite, column] = (forward - backward) / (2.0 * delta)
+        return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]))
 
-    def _shifted(
-        self, section: Context, x: np.ndarray, variable: int, difference: float
+    def _moved(self, start: Context, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return what blocks are fed with and the rest's variables, one interval later."""
+        root, x = self._held.context, x.copy()
+        x[self.rest] = z[: len(self.rest)]
+        for part, port in self._fed:
+            own = port.get_system().GetMyMutableContextFromRoot(root)
+            port.FixValue(own, z[len(self.rest) + part])
+        self._held.approach(start, x)
+        given = [port.Eval(port.get_system().GetMyContextFromRoot(root)) for port in self._given]
+        arrived = self._held.pass_tick() if self._is_sampled else self._held.variables(root)
+        return np.concatenate([*given, arrived[self.rest]])
+
+    def _joined(
+        self, points: Sequence[SlopeAt], rest: RestSlope, chosen: np.ndarray | None
     ) -> np.ndarray:
-        shifted = x.copy()
-        shifted[variable] += difference
-        try:
-            return self.advance(section, shifted)
-        except RuntimeError:  # a flag that was shifted leads where no plant goes
-            return np.full(self.size, np.nan)
+        """Return the derivative over one interval, shape (size, size)."""
+        size = self._map.size
+        # states and outputs of blocks by states and inputs
+        D = np.zeros((size + self._num_outputs, size + self._num_inputs))
+        for k, (system, point) in enumerate(zip(self._blocks, points, strict=True)):
+            states = self._states[k]
+            ports = [name for block, name in self._outputs if block == k]
+            wires = [system.network.outputs[name] for name in ports]
+            names = list(states)
+            if chosen is not None:
+                names = [name for name in states if np.isin(states[name], chosen).any()]
+            elif self._intervals == 1:
+                names = point.reaching(wires)
+            ticks = _ticks(self._free.context, system)
+            if abs(ticks - round(ticks)) > _ROUNDING_OF_TIME:  # remembers what it did
+                D[self._memory[k], self._memory[k]], names = 1.0, []
+            rows = [states[name] for name in names]
+            rows += [size + self._outputs[k, name] for name in ports]
+            for source, piece in point.derivatives(names, wires).items():
+                columns = (
+                    states[source.name]
+                    if source.kind == "state"
+                    else size + self._inputs[k, source.name]
+                )
+                D[np.ix_(np.concatenate(rows), columns)] = piece
+        A, next_u, y_x, y_u = D[:size, :size], D[:size, size:], D[size:, :size], D[size:, size:]
+        own, u_y = self.rest, rest.of_inputs[1].copy()
+        u_x = np.zeros((self._num_inputs, size))
+        u_x[:, own] = rest.of_inputs[0]
+        for into, put_out in self._direct:
+            u_x[into], u_y[into] = 0.0, 0.0
+            u_y[into, put_out] = 1.0
+        # what goes from blocks through the rest and back within the tick comes to an end
+        u_x = np.linalg.solve(np.eye(len(u_x)) - u_y @ y_u, u_x + u_y @ y_x)
+        y_x = y_x + y_u @ u_x
+        A = A + next_u @ u_x
+        A[np.ix_(own, own)] += rest.of_own[0]
+        A[own] += rest.of_own[1] @ y_x
+        return A
 
-    def _set_part(self, context: Context, part: slice, values: np.ndarray) -> None:
-        which = self._parts.index(part)
-        if which == 0:
-            context.SetContinuousState(values)
-        else:
-            context.SetDiscreteState(which - 1, values)
+
+def _ticks(root: Context, system: BlockSystem) -> float:
+    """Return the time in sampling intervals of a system."""
+    return root.get_time() / system.period

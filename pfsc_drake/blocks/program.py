@@ -1,6 +1,6 @@
 """A network as few functions: stages of outputs, what is remembered, how it begins."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -73,7 +73,7 @@ class Program:
         values = ca.vertsplit(self._x, _ends(sizes)) if self.size else []
         self._states = dict(zip(self.states, values, strict=True))
         self._needs: dict[tuple[str, bool], Needs] = {}
-        order = _ordered(network.nodes, self._maker)
+        order = ordered(network.nodes)
         self.stages, self._stage_of = self._stages(self._grouped(order, like))
         self._made = [
             ca.MX.sym(f"stage_{k}", stage.function.numel_out(0))
@@ -360,12 +360,16 @@ class Program:
         )
 
 
-def _ordered(nodes: Iterable[Node], maker: Mapping[str, Node]) -> list[Node]:
+def ordered(nodes: Collection[Node]) -> list[Node]:
     """Return nodes such that each comes after those that it takes wires of.
+
+    Args:
+        nodes: All that evaluate wires.
 
     Raises:
         InputError: If there is a loop.
     """
+    maker = {name: node for node in nodes for name in node.results}
     order: dict[int, Node] = {}
     way: list[Node] = []
 

@@ -1,5 +1,6 @@
 """A block, or a network of them, as a Drake system."""
 
+import functools
 import math
 from collections.abc import Iterable
 
@@ -168,7 +169,7 @@ class BlockSystem(LeafSystem):
 
         def calc(context: Context, value: Value) -> None:
             functions = self._program(context)
-            stage, bound = functions.stages[k]
+            stage, bound = functions.stage(k)
             made = [(j, self._stages[j].Eval(context)) for j in stage.stages]
             self._given(context, functions, stage.inputs, shown, stage.needs_at_start)
             for j, values in made:
@@ -315,13 +316,25 @@ class _Functions:
         self.made = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
         arrays = {"x": self.x, "t": self.t, "preset": self.preset} | self.u
         arrays |= {f"stage_{k}": values for k, values in enumerate(self.made)}
-        self.stages = [
-            (stage, _bound(stage.function, arrays)) for stage in _stages(program, update_stage)
-        ]
-        self.initial = _bound(program.initial, arrays)
-        if update_stage is None:
-            self.update = _bound(program.update, arrays)
+        self._arrays = arrays
+        self._stages = _stages(program, update_stage)
+        self._bound_stages: dict[int, BoundFunction] = {}
 
+    def stage(self, k: int) -> tuple[Stage, BoundFunction]:
+        """Return a stage; what nobody evaluates is never compiled."""
+        if k not in self._bound_stages:
+            self._bound_stages[k] = self._bound(self._stages[k].function)
+        return self._stages[k], self._bound_stages[k]
 
-def _bound(function: ca.Function, arrays: dict[str, np.ndarray]) -> BoundFunction:
-    return BoundFunction(function, **{name: arrays[name] for name in function.name_in()})
+    @functools.cached_property
+    def initial(self) -> BoundFunction:
+        """What is remembered at the start."""
+        return self._bound(self.program.initial)
+
+    @functools.cached_property
+    def update(self) -> BoundFunction:
+        """What is remembered at the next tick, where no stage evaluates it."""
+        return self._bound(self.program.update)
+
+    def _bound(self, function: ca.Function) -> BoundFunction:
+        return BoundFunction(function, **{name: self._arrays[name] for name in function.name_in()})

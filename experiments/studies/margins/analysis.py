@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.systems.framework import Context
 
+from diagrams.linearization import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from experiments.studies.margins.box import Box, Error, corners, single_errors
@@ -282,10 +283,12 @@ class _Study:
     progress: ProgressListener
     duration: float
     chosen: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    # what is no block, at the times of instants
+    plants: dict[float, Sequence[RestSlope]] = field(default_factory=dict)
 
     def build(self, error: Error) -> StationLoop:
         self.progress(0.0, f"linearizing, {error}")
-        return StationLoop(error.applied_to(self.settings), self.folder, self.walked.station.task)
+        return StationLoop(error.applied_to(self.settings), self.folder, self.walked)
 
     def section(self, loop: StationLoop, instant: Instant, unknown: float = 0.0) -> Context:
         """Return an instant as a state of a loop's own station, with a payload [kg]."""
@@ -309,7 +312,11 @@ class _Study:
         for instant in instants:
             self.progress(instant.time, f"linearizing, {error}")
             section = self.section(loop, instant, error.unknown_mass)
-            loops.append(linearize(loop, section, self.chosen))
+            is_same = loop.plant_alone_remembers and error.unknown_mass == 0.0
+            plant = self.plants.get(instant.time, ()) if is_same else ()
+            loops.append(linearize(loop, section, self.chosen, plant))
+            if is_same and loops[-1] is not None:
+                self.plants[instant.time] = loops[-1].rest
         places = [
             Place(instant, None if linear is None else modes(linear.A, loop.map.period))
             for instant, linear in zip(instants, loops, strict=True)

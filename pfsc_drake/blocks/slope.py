@@ -1,0 +1,172 @@
+"""The derivative of a network over one tick, exactly, from the derivatives of its functions."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.network import TICK, Network, Node, Source
+from pfsc_drake.blocks.program import ordered
+
+# relative to an argument, or absolute if that is larger
+_DIFFERENCE = 1e-6
+# rows of an adjoint by what they are the derivative by, shape (k, size) each
+Adjoint = dict[Source, np.ndarray]
+
+
+class NetworkSlope:
+    """What differentiates a network: the chain rule over the functions that it consists of.
+
+    Each function is differentiated by CasADi, when its derivative is asked for first; of what
+    changes nothing that is asked for, none is made.
+
+    Args:
+        network: The network.
+
+    Attributes:
+        network: The same.
+        order: Its nodes, in an order in which they can be evaluated.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self.order = ordered(network.nodes)
+        self._jacobians: dict[int, ca.Function] = {}
+
+    def at(self, x: Mapping[str, np.ndarray], u: Mapping[str, np.ndarray], t: float) -> "SlopeAt":
+        """Return the derivative at a tick.
+
+        Args:
+            x: States by name.
+            u: Inputs by name.
+            t: Number of the tick.
+        """
+        known = {Source("state", name): value for name, value in x.items()}
+        known |= {Source("input", name): value for name, value in u.items()}
+        known[TICK] = np.array([t])
+        for node in self.order:
+            results = node.function.call([ca.DM(known[source]) for source in node.sources])
+            for name, value in zip(node.results, results, strict=True):
+                known[Source("wire", name)] = value.full().ravel()
+        return SlopeAt(self, known)
+
+    def jacobian(self, node: Node, known: Mapping[Source, np.ndarray]) -> list[list[np.ndarray]]:
+        """Return the derivatives of a node's results (rows) by its arguments (columns).
+
+        Args:
+            node: The node.
+            known: Its arguments.
+        """
+        if id(node) not in self._jacobians:
+            self._jacobians[id(node)] = node.function.jacobian()
+        arguments = [ca.DM(known[source]) for source in node.sources]
+        nothing = [ca.DM(*node.function.size_out(i)) for i in range(node.function.n_out())]
+        blocks = [block.full() for block in self._jacobians[id(node)].call(arguments + nothing)]
+        n = len(node.sources)
+        for column in range(n):
+            for k in np.flatnonzero(_unknown(blocks[column::n])):
+                difference = _difference(node.function, arguments, column, int(k))
+                for block, entries in zip(blocks[column::n], difference, strict=True):
+                    block[:, k] = entries
+        return [blocks[row * n : (row + 1) * n] for row in range(len(node.results))]
+
+
+@dataclass(frozen=True)
+class SlopeAt:
+    """The derivative of a network at one tick.
+
+    Attributes:
+        slope: Of which network.
+        known: All values at that tick: states, inputs, wires.
+    """
+
+    slope: NetworkSlope
+    known: Mapping[Source, np.ndarray]
+
+    def wire(self, name: str) -> np.ndarray:
+        """Return the value of a wire."""
+        return self.known[Source("wire", name)]
+
+    def derivatives(self, states: Sequence[str], wires: Sequence[str]) -> Adjoint:
+        """Return derivatives of states at the next tick, then of wires, one below the other.
+
+        Args:
+            states: Which states.
+            wires: Which wires.
+
+        Returns:
+            By each state and each input that any of them depends on, shape (k, size).
+        """
+        network, found = self.slope.network, Adjoint()
+        sizes = [network.states[name] for name in states] + [network.wires[w] for w in wires]
+        pieces = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+        of_next = dict(zip(states, pieces, strict=False))
+        for name, weights in zip(wires, pieces[len(states) :], strict=True):
+            _add(found, Source("wire", name), weights)
+        for node in network.updates:
+            self._through(node, {n: of_next.pop(n) for n in node.results if n in of_next}, found)
+        for name, weights in of_next.items():  # what stays
+            _add(found, Source("state", name), weights)
+        for node in reversed(self.slope.order):
+            sources = [(name, Source("wire", name)) for name in node.results]
+            self._through(node, {n: found.pop(s) for n, s in sources if s in found}, found)
+        found.pop(TICK, None)
+        return found
+
+    def reaching(self, wires: Sequence[str]) -> list[str]:
+        """Return the states that wires depend on, now or some ticks later.
+
+        Args:
+            wires: Which wires.
+        """
+        reaching: dict[str, None] = {}
+        new, told = [], list(wires)
+        while new or told:
+            found = self.derivatives(new, told)
+            depended = [s.name for s, rows in found.items() if s.kind == "state" and rows.any()]
+            new, told = [name for name in depended if name not in reaching], []
+            reaching |= dict.fromkeys(new)
+        return list(reaching)
+
+    def _through(self, node: Node, weights: Mapping[str, np.ndarray], found: Adjoint) -> None:
+        """Add what a node's results contribute by way of its arguments."""
+        weights = {name: rows for name, rows in weights.items() if rows.any()}
+        if not weights:
+            return
+        jacobian = dict(
+            zip(node.results, self.slope.jacobian(node, self.known), strict=True)
+        )
+        for name, rows in weights.items():
+            for source, block in zip(node.sources, jacobian[name], strict=True):
+                if block.any():
+                    _add(found, source, rows @ block)
+
+
+def _unknown(blocks: list[np.ndarray]) -> np.ndarray:
+    """Return which columns have an entry that is no number, in any of several matrices."""
+    return np.any([~np.isfinite(block).all(axis=0) for block in blocks], axis=0)
+
+
+def _difference(
+    function: ca.Function, arguments: list[ca.DM], column: int, k: int
+) -> list[np.ndarray]:
+    """Return the derivatives of all results by one element where calculus has no answer.
+
+    That is a length that is zero, or a case that does not hold and divides by zero. What is not
+    finite itself moves nothing.
+    """
+    value = float(arguments[column][k])
+    step, sides = _DIFFERENCE * max(1.0, abs(value)), []
+    for sign in (1.0, -1.0):
+        shifted = ca.DM(arguments[column])
+        shifted[k] = value + sign * step
+        given = [*arguments[:column], shifted, *arguments[column + 1 :]]
+        sides.append([result.full().ravel() for result in function.call(given)])
+    with np.errstate(invalid="ignore"):
+        differences = [(a - b) / (2.0 * step) for a, b in zip(*sides, strict=True)]
+    return [np.where(np.isfinite(entries), entries, 0.0) for entries in differences]
+
+
+def _add(found: Adjoint, source: Source, rows: np.ndarray) -> None:
+    found[source] = found[source] + rows if source in found else rows
