@@ -64,6 +64,7 @@ class PeriodDerivative:
             period or at whole fractions of it. What they put out between their ticks must not
             depend on what moves there, where something continuous is fed with it.
         configure: Tells a simulator how to integrate.
+        smooth: Variables that have a slope whatever differences say, as those of a plant.
 
     Attributes:
         rest: Where the variables stand that are no block's.
@@ -71,7 +72,11 @@ class PeriodDerivative:
     """
 
     def __init__(
-        self, one_period: OnePeriodMap, diagram: Diagram, configure: Callable[[Simulator], None]
+        self,
+        one_period: OnePeriodMap,
+        diagram: Diagram,
+        configure: Callable[[Simulator], None],
+        smooth: np.ndarray | None = None,
     ) -> None:
         self._map = one_period
         self._blocks = [s for s in diagram.GetSystems() if isinstance(s, BlockSystem)]
@@ -82,8 +87,8 @@ class PeriodDerivative:
             for system, rows in zip(self._blocks, self._memory, strict=True)
         ]
         self.rest = np.setdiff1d(np.arange(one_period.size), np.concatenate([[], *self._memory]))
-        self._num_core = one_period.num_continuous
-        self._is_sampled = len(self.rest) > self._num_core
+        self._is_sampled = len(self.rest) > one_period.num_continuous
+        self._smooth = np.isin(self.rest, [] if smooth is None else smooth)
         step = min([one_period.period, *(system.period for system in self._blocks)])
         self._intervals = round(one_period.period / step)
         self._free = OnePeriodMap(diagram, step, configure)
@@ -106,14 +111,15 @@ class PeriodDerivative:
         Args:
             section: Context right after a tick; unchanged.
             chosen: Indices of the variables to look at, shape (n,); all if omitted, where rows
-                of what blocks remember and never tell are left zero.
+                of what blocks remember and never tell are left zero. A column without a slope, that
+            of a flag or a limit that is just reached, is zero.
             rest: What is not the blocks', if it is known: of a diagram whose blocks alone differ.
         """
         A, start, made = np.eye(self._map.size), section, []
         for interval in range(self._intervals):
             made.append(rest[interval] if rest else self._slope_of_rest(start))
             self._free.approach(start)
-            points = self._points(self._free.context)
+            points = self._points(self._free.as_sampled())
             wanted = chosen if self._intervals == 1 else None
             A = self._joined(points, made[-1], wanted) @ A
             if interval + 1 < self._intervals:
@@ -129,10 +135,10 @@ class PeriodDerivative:
             section: Context right after a tick; unchanged.
         """
         self._map.approach(section)
-        return self._wires(self._points(self._map.context))
+        return self._wires(self._points(self._map.as_sampled()))
 
     def _wires(self, points: Sequence[SlopeAt]) -> dict[str, np.ndarray]:
-        found = {}
+        found: dict[str, np.ndarray] = {}
         for system, point in zip(self._blocks, points, strict=True):
             prefix = "" if system.block is None else f"{system.get_name()}."
             found |= {f"{prefix}{name}": point.wire(name) for name in system.network.wires}
@@ -179,9 +185,10 @@ class PeriodDerivative:
 
     def _slope_of_rest(self, start: Context) -> RestSlope:
         self._free.approach(start)
+        sampled = self._free.as_sampled()
         put_out = np.zeros(self._num_outputs)
         for (k, name), part in self._outputs.items():
-            own = self._blocks[k].GetMyContextFromRoot(self._free.context)
+            own = self._blocks[k].GetMyContextFromRoot(sampled)
             put_out[part] = self._blocks[k].GetOutputPort(name).Eval(own)
         x, n, m = self._map.variables(start), len(self.rest), self._num_inputs
         z = np.concatenate([x[self.rest], put_out])
@@ -200,7 +207,7 @@ class PeriodDerivative:
             bend = np.abs(forward + backward)
             # written so that NaN is a switch
             is_smooth = bend <= _BEND * scale + _ROUNDING * np.maximum(1.0, np.abs(middle[finite]))
-            if np.all(is_smooth) or column < self._num_core:
+            if np.all(is_smooth) or column >= n or self._smooth[column]:
                 slope[finite, column] = (forward - backward) / (2.0 * delta)
         return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]))
 
@@ -212,7 +219,10 @@ class PeriodDerivative:
             own = port.get_system().GetMyMutableContextFromRoot(root)
             port.FixValue(own, z[len(self.rest) + part])
         self._held.approach(start, x)
-        given = [port.Eval(port.get_system().GetMyContextFromRoot(root)) for port in self._given]
+        sampled = self._held.as_sampled()
+        given = [
+            port.Eval(port.get_system().GetMyContextFromRoot(sampled)) for port in self._given
+        ]
         arrived = self._held.pass_tick() if self._is_sampled else self._held.variables(root)
         return np.concatenate([*given, arrived[self.rest]])
 
@@ -252,11 +262,10 @@ class PeriodDerivative:
             u_x[into], u_y[into] = 0.0, 0.0
             u_y[into, put_out] = 1.0
         # what goes from blocks through the rest and back within the tick comes to an end
-        u_x = np.linalg.solve(np.eye(len(u_x)) - u_y @ y_u, u_x + u_y @ y_x)
-        y_x = y_x + y_u @ u_x
+        u_x[:] = np.linalg.solve(np.eye(len(u_x)) - u_y @ y_u, u_x + u_y @ y_x)
         A = A + next_u @ u_x
         A[np.ix_(own, own)] += rest.of_own[0]
-        A[own] += rest.of_own[1] @ y_x
+        A[own] += rest.of_own[1] @ (y_x + y_u @ u_x)
         return A
 
 

@@ -119,6 +119,17 @@ class OnePeriodMap:
         self._simulator.Initialize(self._silent)
         self._simulator.AdvanceTo(next_tick)
 
+    def as_sampled(self) -> Context:
+        """Return the context at the tick that was approached, as what samples finds it.
+
+        A discrete plant, which remembers contact beside its state, has made its step then.
+        """
+        if not self.context.num_abstract_states():
+            return self.context
+        found = self.context.Clone()
+        self._diagram.CalcForcedUnrestrictedUpdate(self.context, found.get_mutable_state())
+        return found
+
     def _set_part(self, context: Context, part: slice, values: np.ndarray) -> None:
         which = self._parts.index(part)
         if which == 0:

@@ -68,7 +68,7 @@ class NetworkSlope:
             for k in np.flatnonzero(_unknown(blocks[column::n])):
                 difference = _difference(node.function, arguments, column, int(k))
                 for block, entries in zip(blocks[column::n], difference, strict=True):
-                    block[:, k] = entries
+                    block[:, k] = np.where(np.isfinite(block[:, k]), block[:, k], entries)
         return [blocks[row * n : (row + 1) * n] for row in range(len(node.results))]
 
 
@@ -121,7 +121,8 @@ class SlopeAt:
             wires: Which wires.
         """
         reaching: dict[str, None] = {}
-        new, told = [], list(wires)
+        new: list[str] = []
+        told = list(wires)
         while new or told:
             found = self.derivatives(new, told)
             depended = [s.name for s, rows in found.items() if s.kind == "state" and rows.any()]
@@ -134,9 +135,7 @@ class SlopeAt:
         weights = {name: rows for name, rows in weights.items() if rows.any()}
         if not weights:
             return
-        jacobian = dict(
-            zip(node.results, self.slope.jacobian(node, self.known), strict=True)
-        )
+        jacobian = dict(zip(node.results, self.slope.jacobian(node, self.known), strict=True))
         for name, rows in weights.items():
             for source, block in zip(node.sources, jacobian[name], strict=True):
                 if block.any():

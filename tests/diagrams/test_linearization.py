@@ -1,5 +1,6 @@
 """The derivative of a sampled diagram's map against its closed form."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -7,8 +8,13 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LinearSystem, ZeroOrderHold
 from scipy.linalg import expm
 
-from diagrams.linearization import OnePeriodMap
+from diagrams.linearization import PeriodDerivative
+from diagrams.one_period_map import OnePeriodMap
 from experiments.simulation import configure
+from pfsc_drake.blocks.block import Block, Port
+from pfsc_drake.blocks.wiring_blocks import Hold
+from pfsc_drake.control.cases import where
+from pfsc_drake.systems.block_system import BlockSystem
 
 T = 0.01
 F, B = np.array([[0.0, 1.0], [-40.0, -0.5]]), np.array([[0.0], [2.0]])
@@ -45,17 +51,49 @@ class Controller(LeafSystem):
         memory[2] += 1.0
 
 
-@pytest.fixture(name="loop")
-def fixture_loop():
+class ControllerBlock(Block):
+    """The same as a block, whose last x is known by name."""
+
+    inputs, outputs = {"motion": Port(2)}, {"told": Port(1)}
+    states = {"last": 2, "count": 1, "stopped": 1}
+
+    def output(self, x, u, t):
+        told = -ca.DM(GAIN) @ (u.motion + 0.1 * x.last)
+        return {"told": where(x.stopped, 0.0, told)}
+
+    def update(self, x, u, y, t):
+        return {"last": u.motion, "count": x.count + 1.0}
+
+
+class FirstHalf(Block):
+    """``s+ = y``, ``y = s + 0.5 u``, twice in a period."""
+
+    inputs, outputs, states = {"u": Port(1)}, {"y": Port(1)}, {"s": 1}
+
+    def output(self, x, u, t):
+        return {"y": x.s + 0.5 * u.u}
+
+    def update(self, x, u, y, t):
+        return {"s": 0.3 * y.y}
+
+
+def make_loop(controller, hold, *between):
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", LinearSystem(F, B, np.eye(2), np.zeros((2, 1))))
-    controller = builder.AddNamedSystem("controller", Controller())
-    hold = builder.AddNamedSystem("hold", ZeroOrderHold(T, 1))
-    builder.Connect(plant.get_output_port(), controller.get_input_port())
-    builder.Connect(controller.get_output_port(), hold.get_input_port())
-    builder.Connect(hold.get_output_port(), plant.get_input_port())
+    output = plant.get_output_port()
+    for name, system in (("controller", controller), *between, ("hold", hold)):
+        builder.AddNamedSystem(name, system)
+        builder.Connect(output, system.get_input_port(0))
+        output = system.get_output_port(0)
+    builder.Connect(output, plant.get_input_port())
     diagram = builder.Build()
-    return diagram, OnePeriodMap(diagram, T, integrate), plant, hold
+    one_period = OnePeriodMap(diagram, T, integrate)
+    return diagram, one_period, plant, hold, PeriodDerivative(one_period, diagram, integrate)
+
+
+@pytest.fixture(name="loop")
+def fixture_loop():
+    return make_loop(Controller(), ZeroOrderHold(T, 1))
 
 
 def integrate(simulator):
@@ -74,7 +112,7 @@ def after_ticks(diagram, ticks):
 
 
 def test_unperturbed_it_is_the_run_itself(loop):
-    diagram, one_period, *_ = loop
+    diagram, one_period = loop[:2]
     for ticks in (1, 29, 1200):  # 1200 * 0.01 is not 1199 * 0.01 + 0.01 in floating point
         arrived = one_period.advance(after_ticks(diagram, ticks))
         np.testing.assert_allclose(
@@ -83,39 +121,77 @@ def test_unperturbed_it_is_the_run_itself(loop):
 
 
 def test_it_knows_whose_variables_are_whose(loop):
-    _, one_period, plant, hold = loop
+    _, one_period, plant, hold, _ = loop
     np.testing.assert_array_equal(one_period.rows(plant), [0, 1])
     assert len(one_period.rows(hold)) == 1
     assert one_period.size == 2 + 4 + 1
 
 
-def test_the_derivative_is_that_of_the_sampled_loop(loop):
-    diagram, one_period, _, hold = loop
+LOOPS = [
+    lambda: make_loop(Controller(), ZeroOrderHold(T, 1)),
+    lambda: make_loop(Controller(), BlockSystem(Hold(1), T)),
+    lambda: make_loop(BlockSystem(ControllerBlock(), T), ZeroOrderHold(T, 1)),
+    lambda: make_loop(BlockSystem(ControllerBlock(), T), BlockSystem(Hold(1), T)),
+]
+
+
+@pytest.mark.parametrize("make", LOOPS)
+def test_the_derivative_is_that_of_the_sampled_loop(make):
+    diagram, one_period, _, hold, derivative = make()
     section = after_ticks(diagram, 7)
     before = one_period.variables(section)
-    slope = one_period.derivative(section)
+    A = derivative.at(section).A
     exponential = expm(np.block([[F, B], [np.zeros((1, 3))]]) * T)
-    motion, hold_row = exponential[:2], int(one_period.rows(hold)[0])
-    memory = [i for i in range(2, 7) if i != hold_row]
-    expected = np.zeros((7, 7))
-    expected[np.ix_([0, 1], [0, 1, hold_row])] = motion
+    motion, hold_row = exponential[:2], int(one_period.rows(hold)[-1])
+    controller = one_period.rows(diagram.GetSubsystemByName("controller"))[-4:]
+    memory, plant, told = controller[:2], [0, 1], -GAIN @ motion
+    columns = [0, 1, hold_row]
+    np.testing.assert_allclose(A[np.ix_(plant, columns)], motion, rtol=1e-6, atol=1e-7)
     # right after the tick the controller remembers x, and the hold has what it made of both
-    expected[np.ix_(memory[:2], [0, 1, hold_row])] = motion
-    told = -GAIN @ motion
-    expected[hold_row, [0, 1, hold_row]] = told[0]
-    expected[hold_row, memory[:2]] = -0.1 * GAIN[0]
-    expected[memory[2], memory[2]] = 1.0
-    smooth = ~slope.switches
-    np.testing.assert_allclose(
-        slope.A[np.ix_(smooth, smooth)], expected[np.ix_(smooth, smooth)], rtol=1e-6, atol=1e-7
-    )
+    np.testing.assert_allclose(A[np.ix_(memory, columns)], motion, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(A[hold_row, columns], told[0], rtol=1e-6)
+    np.testing.assert_allclose(A[hold_row, memory], -0.1 * GAIN[0], rtol=1e-6)
+    np.testing.assert_array_equal(A[plant][:, memory], 0.0)
     # what stops the controller when it is not zero has no slope
-    assert np.flatnonzero(slope.switches).tolist() == [memory[3]]
+    np.testing.assert_array_equal(A[:, controller[3]] * (np.arange(len(A)) != controller[3]), 0.0)
     np.testing.assert_array_equal(one_period.variables(section), before)
 
 
-def test_a_choice_of_variables_is_a_part_of_the_whole(loop):
-    diagram, one_period, *_ = loop
-    section, chosen = after_ticks(diagram, 3), np.array([0, 1, 6])
-    whole, part = one_period.derivative(section), one_period.derivative(section, chosen)
+def test_a_block_that_samples_twice_in_a_period():
+    """Against the linear map of two halves, written out."""
+    between = ("half", BlockSystem(FirstHalf(), T / 2))
+    loop = make_loop(BlockSystem(ControllerBlock(), T), BlockSystem(Hold(1), T / 2), between)
+    diagram, one_period, _, hold, derivative = loop
+    half = diagram.GetSubsystemByName("half")
+    last = one_period.rows(diagram.GetSubsystemByName("controller"))[-4:-2]
+    rows = [0, 1, *last, one_period.rows(half)[-1], one_period.rows(hold)[-1]]
+    found = derivative.at(after_ticks(diagram, 7)).A[np.ix_(rows, rows)]
+    exponential = expm(np.block([[F, B], [np.zeros((1, 3))]]) * (T / 2))
+    flow = np.eye(6)
+    flow[np.ix_([0, 1], [0, 1, 5])] = exponential[:2]
+    # y = s - k (x + 0.1 last) / 2, held; s+ = 0.3 y; last+ = x at whole ticks
+    y = np.concatenate([-0.5 * GAIN[0], -0.05 * GAIN[0], [1.0, 0.0]])
+    jump = np.eye(6)
+    jump[4], jump[5] = 0.3 * y, y
+    whole = jump.copy()
+    whole[2:4] = np.eye(6)[:2]
+    np.testing.assert_allclose(found, whole @ flow @ jump @ flow, rtol=1e-6, atol=1e-7)
+
+
+def test_a_choice_of_variables_is_a_part_of_the_whole():
+    diagram, _, _, _, derivative = LOOPS[3]()
+    section, chosen = after_ticks(diagram, 3), np.array([0, 1, 10])
+    whole = derivative.at(section)
+    part = derivative.at(section, chosen, whole.rest)
     np.testing.assert_array_equal(part.A, whole.A[np.ix_(chosen, chosen)])
+
+
+def test_it_tells_what_blocks_put_out():
+    diagram, one_period, _, hold, derivative = LOOPS[3]()
+    section = after_ticks(diagram, 3)
+    told = derivative.wires(section)["controller.told"]
+    one_period.approach(section)
+    one_period.pass_tick()
+    own = hold.GetMyContextFromRoot(one_period.context)
+    np.testing.assert_allclose(hold.state(own, "held"), told, rtol=1e-14)
+    assert one_period.rows(hold)[-1] == derivative.states["hold.held"][0]

@@ -25,6 +25,8 @@ Kind = TypeVar("Kind", bound=LeafSystem)
 # accurate enough for eigenvalues while no mode turns by more than 1 rad per step; RK3 would damp
 # such a resonance by 30 1/s at 1 ms
 _SCHEME, _MOST_STEPS = "runge_kutta5", 100
+# smaller derivatives are what an iteration leaves of its start
+_ROUNDING = 1e-10
 # times its stiffness, up to which a surface that is touched is looked at
 STIFFEST = 64.0
 _SENSOR, _FAULT = "tool_compensation", "fault_latch.fault"
@@ -47,9 +49,7 @@ class StationLoop:
         spring: What the tool presses on, if it does: a spring in place of contact.
     """
 
-    def __init__(
-        self, settings: Scenario, folder: Path, like: "StationLoop | None" = None
-    ) -> None:
+    def __init__(self, settings: Scenario, folder: Path, like: "StationLoop | None" = None) -> None:
         # blocks as one are simulated three times as fast
         settings = replace(settings, simulation=replace(settings.simulation, fused=True))
         task = None if like is None else like.station.task
@@ -59,7 +59,8 @@ class StationLoop:
         self._has_sensor = settings.needs_sensor
         self._step: float = self._accurate_step() if like is None else like._step
         self.map = OnePeriodMap(diagram, period, self.configure)
-        self.derivative = PeriodDerivative(self.map, diagram, self.configure)
+        plant = self.map.rows(self.station.part.plant)
+        self.derivative = PeriodDerivative(self.map, diagram, self.configure, plant)
         self.drives, self.drives_are_servos = self._find_drives()
 
     def configure(self, simulator: Simulator) -> None:
@@ -174,7 +175,8 @@ class StationLoop:
         core[self.drives] = True
         found = core
         for section in sections:
-            found = found | in_loop(self.derivative.at(section).A != 0.0, core)
+            changes = np.abs(self.derivative.at(section).A) > _ROUNDING
+            found = found | in_loop(changes, core)
         return np.flatnonzero(found)
 
     def _accurate_step(self) -> float:

@@ -75,10 +75,53 @@ def test_a_posture_that_is_pulled_is_in_the_loop(task):
     changes = [f"controller.posture.task={task}", "reference.dwell=1"]
     loop = StationLoop(settings_of("pfc_panda_7r", *changes), folder())
     chosen = loop.variables_in_loop([at_rest(loop)])
-    posture = loop.station.diagram.GetSubsystemByName("posture_reference")
-    own = np.isin(loop.map.rows(posture), chosen)
+    states = loop.derivative.states
+    rows = [states[name] for name in states if name.startswith("posture_reference.")]
+    own = np.isin(np.concatenate(rows), chosen)
     # the motion of seven joints, orders 0 to 2, not the goal
     assert own.sum() == (0 if task == "reference" else 21)
+
+
+def differences(loop, section, chosen):
+    """Derivative of the whole station's map, the controller included, by differences."""
+    x, step = loop.map.variables(section), 1e-6
+    columns = []
+    for variable in chosen:
+        shift = np.zeros(loop.map.size)
+        shift[variable] = step * max(1.0, abs(x[variable]))
+        sides = [loop.map.advance(section, x + side)[chosen] for side in (shift, -shift)]
+        columns.append((sides[0] - sides[1]) / (2.0 * shift[variable]))
+    return np.column_stack(columns)
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("pfc_elastic_3r", []),
+        ("pfc_delta", []),
+        (
+            "pfc_compliant_6r",
+            ["controller.law=velocity_servo", "servo.period=0.0005", "servo.bus_delay=0.002"],
+        ),
+    ],
+)
+def test_the_derivative_is_that_of_the_whole_station_in_motion(name, overrides):
+    loop = StationLoop(settings_of(name, *overrides), folder())
+    simulator = Simulator(loop.station.diagram)
+    loop.configure(simulator)
+    root = simulator.get_mutable_context()
+    loop.station.set_start(root)
+    simulator.Initialize()
+    simulator.AdvanceTo(0.4)
+    simulator.AdvancePendingEvents()
+    chosen = loop.variables_in_loop([root])
+    assert len(chosen) > len(loop.map.rows(loop.station.part.plant))
+    A, expected = linearize(loop, root, chosen).A, differences(loop, root, chosen)
+    scale = np.abs(expected).max(axis=0) + 1e-3
+    np.testing.assert_allclose(A / scale, expected / scale, atol=2e-5)
+    found, rates = modes(A, loop.map.period).rate, modes(expected, loop.map.period).rate
+    slow = rates > -400.0
+    np.testing.assert_allclose(found[: slow.sum()], rates[slow], rtol=1e-3, atol=1e-3)
 
 
 CASES = [
