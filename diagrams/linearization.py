@@ -19,6 +19,8 @@ from pfsc_drake.systems.block_system import BlockSystem
 
 # relative to a variable, or absolute if that is larger
 _DIFFERENCE = 1e-6
+# the same of what is put out: a plant answers almost linearly, and by little within an interval
+_DIFFERENCE_OF_OUTPUTS = 1e-2
 # part of a central difference by which the two one-sided ones may differ; more is a switch
 _BEND = 0.05
 # relative to a variable or 1; smaller changes are rounding
@@ -197,7 +199,8 @@ class PeriodDerivative:
         # what is not known yet stays so
         finite = np.isfinite(middle)
         for column in np.flatnonzero(np.isfinite(z)):
-            delta = _DIFFERENCE * max(1.0, abs(z[column]))
+            share = _DIFFERENCE if column < n else _DIFFERENCE_OF_OUTPUTS
+            delta = share * max(1.0, abs(z[column]))
             shift = np.zeros(len(z))
             shift[column] = delta
             forward, backward = (
@@ -220,9 +223,7 @@ class PeriodDerivative:
             port.FixValue(own, z[len(self.rest) + part])
         self._held.approach(start, x)
         sampled = self._held.as_sampled()
-        given = [
-            port.Eval(port.get_system().GetMyContextFromRoot(sampled)) for port in self._given
-        ]
+        given = [port.Eval(port.get_system().GetMyContextFromRoot(sampled)) for port in self._given]
         arrived = self._held.pass_tick() if self._is_sampled else self._held.variables(root)
         return np.concatenate([*given, arrived[self.rest]])
 

@@ -84,29 +84,20 @@ def test_a_posture_that_is_pulled_is_in_the_loop(task):
 
 def differences(loop, section, chosen):
     """Derivative of the whole station's map, the controller included, by differences."""
-    x, step = loop.map.variables(section), 1e-6
-    columns = []
+    x, columns = loop.map.variables(section), []
     for variable in chosen:
         shift = np.zeros(loop.map.size)
+        # a torque moves a joint by little within a tick
+        step = 1e-2 if variable in loop.drives else 1e-5
         shift[variable] = step * max(1.0, abs(x[variable]))
         sides = [loop.map.advance(section, x + side)[chosen] for side in (shift, -shift)]
         columns.append((sides[0] - sides[1]) / (2.0 * shift[variable]))
     return np.column_stack(columns)
 
 
-@pytest.mark.parametrize(
-    ("name", "overrides"),
-    [
-        ("pfc_elastic_3r", []),
-        ("pfc_delta", []),
-        (
-            "pfc_compliant_6r",
-            ["controller.law=velocity_servo", "servo.period=0.0005", "servo.bus_delay=0.002"],
-        ),
-    ],
-)
-def test_the_derivative_is_that_of_the_whole_station_in_motion(name, overrides):
-    loop = StationLoop(settings_of(name, *overrides), folder())
+@pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_delta"])
+def test_the_derivative_is_that_of_the_whole_station_in_motion(name):
+    loop = StationLoop(settings_of(name), folder())
     simulator = Simulator(loop.station.diagram)
     loop.configure(simulator)
     root = simulator.get_mutable_context()
