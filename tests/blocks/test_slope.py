@@ -13,8 +13,7 @@ from pfsc_drake.control.cases import where
 class Pendulum(Block):
     """``y = sin(x) u``, ``x+ = x + y cos(x)``, a state that stays, one that nobody asks for."""
 
-    inputs, outputs = {"u": Port(1)}, {"y": Port(1)}
-    states = {"x": 1, "kept": 1, "unheard": 1}
+    inputs, outputs, states = {"u": Port(1)}, {"y": Port(1)}, {"x": 1, "kept": 1, "unheard": 1}
 
     def output(self, x, u, t):
         return {"y": ca.sin(x.x) * u.u + x.kept}

@@ -54,8 +54,9 @@ class Controller(LeafSystem):
 class ControllerBlock(Block):
     """The same as a block, whose last x is known by name."""
 
-    inputs, outputs = {"motion": Port(2)}, {"told": Port(1)}
-    states = {"last": 2, "count": 1, "stopped": 1}
+    def __init__(self):
+        self.inputs, self.outputs = {"motion": Port(2)}, {"told": Port(1)}
+        self.states = {"last": 2, "count": 1, "stopped": 1}
 
     def output(self, x, u, t):
         told = -ca.DM(GAIN) @ (u.motion + 0.1 * x.last)
