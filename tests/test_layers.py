@@ -1,6 +1,7 @@
 """The layers of the architecture: imports only point downwards."""
 
 import ast
+import functools
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,7 @@ LAW_KNOWS_NO = [
 ]
 
 
+@functools.cache
 def modules():
     """Return the imported modules of every file, by the file's own module."""
     found = {}
@@ -81,9 +83,6 @@ def modules():
     return found
 
 
-MODULES = modules()
-
-
 def inside(module, room):
     return module == room or module.startswith(room + ".")
 
@@ -98,13 +97,13 @@ def height(module):
 
 def test_every_file_is_in_a_layer():
     faces = {"pfsc_drake"}
-    assert [m for m in MODULES if height(m) is None and m not in faces] == []
+    assert [m for m in modules() if height(m) is None and m not in faces] == []
 
 
 def test_imports_point_downwards():
     wrong = [
         f"{module} imports {other}"
-        for module, imported in MODULES.items()
+        for module, imported in modules().items()
         for other in imported
         if height(module) is not None
         and height(other) is not None
@@ -117,7 +116,7 @@ def test_imports_point_downwards():
 def test_rooms_that_do_not_know_what_is_beside_them(room, other):
     wrong = [
         f"{module} imports {target}"
-        for module, imported in MODULES.items()
+        for module, imported in modules().items()
         if inside(module, room)
         for target in imported
         if inside(target, other)
@@ -129,7 +128,7 @@ def test_rooms_that_do_not_know_what_is_beside_them(room, other):
 def test_packages_that_a_room_does_not_know(room):
     wrong = [
         f"{module} imports {target}"
-        for module, imported in MODULES.items()
+        for module, imported in modules().items()
         if inside(module, room)
         for target in imported
         if any(inside(target, package) for package in UNKNOWN[room])
@@ -141,7 +140,7 @@ def test_the_law_knows_no_particular_manifold():
     laws = ("pfsc_drake.control.law", "pfsc_drake.control.compliance")
     wrong = [
         f"{module} imports {target}"
-        for module, imported in MODULES.items()
+        for module, imported in modules().items()
         if any(inside(module, room) for room in laws)
         for target in imported
         if any(inside(target, known) for known in LAW_KNOWS_NO)
@@ -152,8 +151,8 @@ def test_the_law_knows_no_particular_manifold():
 def test_no_two_files_import_each_other():
     """Not even by a detour."""
     files = {
-        module: {other for other in imported if other in MODULES and other != module}
-        for module, imported in MODULES.items()
+        module: {other for other in imported if other in modules() and other != module}
+        for module, imported in modules().items()
     }
     done, path = set(), []
 
