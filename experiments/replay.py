@@ -23,8 +23,8 @@ _RESULT = re.compile(
     r"ticks (\d+) differing (\d+) median_us ([\d.]+) p99_us ([\d.]+) worst_us ([\d.]+)"
 )
 _TOOLS = ("gcc", "make")
-# what inputs of controllers are called in logs
-_LOGGED = {"measured_wrench": "wrench_sensor", "delivered": "wrench_sensor"}
+# a force sensor's, whatever led it to the controller
+_WRENCH, _WRENCH_SIZE = "wrench_sensor", 6
 _JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
 _ROUNDING = 1e-6  # of a tick
 
@@ -220,7 +220,8 @@ def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
             seen = "_measured" if "q_J_measured" in run else ""
             columns += [found(f"{name}{seen}") for name in _JOINT_STATE]
         else:
-            columns.append(found(_LOGGED.get(port["name"], port["name"])))
+            is_sensor = port["name"] not in run and port["size"] == _WRENCH_SIZE
+            columns.append(found(_WRENCH if is_sensor else port["name"]))
         if sum(part.shape[1] for part in columns) != sum(
             p["size"] for p in inputs[: inputs.index(port) + 1]
         ):

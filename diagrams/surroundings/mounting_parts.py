@@ -129,10 +129,11 @@ def add_payload(
         builder: Builder of the diagram.
         scenario: The scenario.
         mounting: Its plates.
-        ports: ``wrench_measured``, ``tared``, ``tool_pose`` as measured, and ``held``.
+        ports: ``wrench_measured``, ``tared``, ``sensor_fault``, ``tool_pose`` as measured, and
+            ``held``.
 
     Returns:
-        ``wrench_measured`` without the payload.
+        ``wrench_measured`` without the payload, and ``sensor_fault``, also of what is held.
     """
     plate = mounting.parameters
     center = np.array([0.0, 0.0, plate.size[2] / 2.0])
@@ -142,7 +143,9 @@ def add_payload(
     )
     inputs = {
         "wrench": "wrench_measured", "tool_pose": "tool_pose", "held": "held", "tared": "tared",
+        "sensor_fault": "sensor_fault",
     }  # fmt: skip
     for name, signal in inputs.items():
         builder.Connect(ports[signal], system.GetInputPort(name))
-    return {"wrench_measured": system.GetOutputPort("payload_free")}
+    outputs = {"wrench_measured": "payload_free", "sensor_fault": "fault"}
+    return {name: system.GetOutputPort(port) for name, port in outputs.items()}

@@ -1,5 +1,7 @@
 """Path following of a user's own plant: one call, a diagram, and what it refuses."""
 
+import subprocess
+
 import numpy as np
 import pytest
 from pydrake.multibody.parsing import Parser
@@ -19,6 +21,7 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
+from tests.compilers import needs_gcc
 
 POINTS = [[0.9, -0.3, 0.8], [1.0, 0.0, 0.9], [0.9, 0.3, 0.8], [0.8, 0.0, 0.75]]
 
@@ -198,3 +201,16 @@ def test_the_door_is_open():
         assert getattr(pfsc_drake, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'window'"):
         pfsc_drake.window  # noqa: B018
+
+
+@needs_gcc
+def test_the_same_in_c(path, tmp_path):
+    """Which repeats what the controller makes of a robot that is pushed about a little."""
+    plant = load(DiagramBuilder(), "comau_racer_1_4")
+    follower = add_path_following(DiagramBuilder(), plant, "tool_point", path, "rigid")
+    moved = 1e-5 * np.cumsum(np.random.default_rng(3).normal(size=(30, 12)), axis=0)
+    pfsc_drake.export(follower, tmp_path, {"plant_state": follower.start_state + moved})
+    subprocess.run(["make", "--silent", "OPTIMIZATION=-O0", "replay"], cwd=tmp_path, check=True)
+    command = ["./replay", "replay.bin", "10"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "ticks 30 differing 0 " in done.stdout

@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import where
+from pfsc_drake.control.cases import is_finite, where
+from pfsc_drake.control.compliance.tool_compensation import SensorFault
 
 
 class PayloadCompensation(Block):
@@ -22,7 +23,9 @@ class PayloadCompensation(Block):
         tool_pose (input): ``[y_t, R_e by rows]`` as measured, shape (12,).
         held (input): Share that is held, 0 to 1, shape (1,).
         tared (input): Above 0.5 once the sensor is tared, shape (1,).
+        sensor_fault (input): A :class:`SensorFault`, shape (1,).
         payload_free (output): The wrench without the payload, shape (6,) [N, Nm].
+        fault (output): The sensor's, which is lost too where the share is no number, shape (1,).
 
     State:
         Share that was held when the sensor was tared (``at_taring``).
@@ -40,15 +43,19 @@ class PayloadCompensation(Block):
             "tool_pose": Port(12, "m, 1"),
             "held": Port(1),
             "tared": Port(1),
+            "sensor_fault": Port(1),
         }
-        self.outputs = {"payload_free": Port(6, "N, Nm")}
+        self.outputs = {"payload_free": Port(6, "N, Nm"), "fault": Port(1)}
         self.states = {"at_taring": 1}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
         R_e = ca.reshape(u.tool_pose[3:], 3, 3).T
         load = ca.vertcat(self._weight, ca.cross(R_e @ self._p_TC, self._weight))
-        return {"payload_free": u.wrench - (u.held - x.at_taring) * load}
+        return {
+            "payload_free": u.wrench - (u.held - x.at_taring) * load,
+            "fault": where(is_finite(u.held), u.sensor_fault, float(SensorFault.LOST)),
+        }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""

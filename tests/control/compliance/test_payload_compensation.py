@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.payload_compensation import PayloadCompensation
+from pfsc_drake.control.compliance.tool_compensation import SensorFault
 
 MASS, CENTER, GRAVITY = 0.8, np.array([0.01, -0.02, 0.03]), np.array([0, 0, -9.81])
 R = Rotation.from_euler("ZYX", [20.0, 15.0, 170.0], degrees=True)
@@ -17,7 +18,7 @@ def compensated(held, tared):
     """Return the output at the last of some ticks."""
     stepper = Stepper(PayloadCompensation(MASS, CENTER, GRAVITY))
     outs = [
-        stepper.step(wrench=WRENCH, tool_pose=POSE, held=share, tared=done)
+        stepper.step(wrench=WRENCH, tool_pose=POSE, held=share, tared=done, sensor_fault=0.0)
         for share, done in zip(held, tared, strict=True)
     ]
     return outs[-1]["payload_free"]
@@ -47,3 +48,12 @@ def test_what_was_tared_is_not_taken_off_twice():
     # what is held at the tick of taring itself is not in the bias
     expected = WRENCH - load(1.0)
     np.testing.assert_allclose(compensated([0, 1, 1], [0, 1, 1]), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [np.nan, np.inf, -np.inf])
+def test_a_share_that_is_no_number_loses_the_sensor(share):
+    stepper = Stepper(PayloadCompensation(MASS, CENTER, GRAVITY))
+    given = {"wrench": WRENCH, "tool_pose": POSE, "tared": 1.0}
+    assert stepper.step(held=share, sensor_fault=0.0, **given)["fault"] == SensorFault.LOST
+    for fault in (SensorFault.NONE, SensorFault.SATURATED):
+        assert stepper.step(held=1.0, sensor_fault=fault, **given)["fault"] == fault
