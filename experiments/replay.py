@@ -25,7 +25,8 @@ _RESULT = re.compile(
 _TOOLS = ("gcc", "make")
 # a force sensor's, whatever led it to the controller
 _WRENCH, _WRENCH_SIZE = "wrench_sensor", 6
-_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
+_LINKS, _MOTORS = ("q_J", "v_J"), ("q_M", "v_M")
+_TORQUE = "drive_torque"
 _ROUNDING = 1e-6  # of a tick
 
 
@@ -144,6 +145,7 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
     said = _interface(folder)
     is_run = log.suffix.lower() in (".h5", ".hdf5")
     recorded = _of_run(log, said["inputs"]) if is_run else _of_csv(log, said["inputs"])
+    drives = said["outputs"][0]
     period = said["sampling_time"]
     ticks = int(np.floor((recorded.times[-1] - recorded.times[0]) / period + _ROUNDING)) + 1
     times = recorded.times[0] + period * np.arange(ticks)
@@ -156,10 +158,9 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
         port["name"]: outputs[:, a:b]
         for port, a, b in zip(said["outputs"], ends, ends[1:], strict=False)
     }
-    drives = said["outputs"][0]
     told, faults = parts[drives["name"]], np.flatnonzero(parts["fault"][:, 0])
     difference = None
-    if recorded.told is not None and recorded.told.shape[1] == told.shape[1]:
+    if recorded.told is not None and drives["name"] == _TORQUE:
         difference = np.abs(told - recorded.told[row]).max(axis=0)
     names = [f"{port['name']}_{i + 1}" for port in said["outputs"] for i in range(port["size"])]
     file = folder / COMMANDS
@@ -218,7 +219,9 @@ def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
     for port in inputs:
         if port["name"] == "joint_state":
             seen = "_measured" if "q_J_measured" in run else ""
-            columns += [found(f"{name}{seen}") for name in _JOINT_STATE]
+            # motors of rigid joints move as the links do, and are not logged
+            sides = _LINKS + (_MOTORS if f"q_M{seen}" in run else _LINKS)
+            columns += [found(f"{name}{seen}") for name in sides]
         else:
             is_sensor = port["name"] not in run and port["size"] == _WRENCH_SIZE
             columns.append(found(_WRENCH if is_sensor else port["name"]))

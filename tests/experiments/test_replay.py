@@ -47,6 +47,21 @@ def test_the_log_of_a_run(exported, tmp_path):
     np.testing.assert_allclose(table["drive_torque_3"], commands.told[:, 2], rtol=1e-11)
 
 
+@needs_gcc
+def test_a_log_without_motors_is_one_of_rigid_joints(exported, tmp_path):
+    folder, recorded = exported
+    inputs = recorded[:, : 2 * N]
+    log = RunLog(1e-3 * np.arange(TICKS))
+    for name, values in zip(("q_J", "v_J"), np.hsplit(inputs, 2), strict=True):
+        log.add(f"{name}_measured", values, "rad")
+        log.add(name, np.zeros((TICKS, N)), "rad")
+    log.write(tmp_path / "log.h5")
+    commands = replay_log(folder, tmp_path / "log.h5", quiet)
+    table = write_csv(tmp_path / "same.csv", log.time, np.hstack([inputs, inputs]))
+    np.testing.assert_array_equal(commands.told, replay_log(folder, tmp_path / table, quiet).told)
+    assert commands.difference is None
+
+
 def write_csv(file, times, inputs, labels=LABELS):
     rows = np.column_stack([times, inputs])
     np.savetxt(file, rows, "%.17g", ",", header=",".join(["t", *labels]), comments="")
