@@ -53,7 +53,7 @@ def build_station(
     scenario: Scenario,
     folder: FilePath,
     progress: Progress | None = None,
-    task: Task | None = None,
+    like: Station | None = None,
     *,
     with_slope: bool = False,
 ) -> Station:
@@ -63,7 +63,8 @@ def build_station(
         scenario: The scenario.
         folder: Where the scenario's relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
-        task: The scenario's task, if it has been made before.
+        like: The same but for what is believed and how it is integrated, if it has been built: its
+            task and its start are taken.
         with_slope: Whether a workpiece that is pressed on is a spring, with the stiffness that
             contact has there, and the plant continuous.
 
@@ -73,13 +74,20 @@ def build_station(
     Raises:
         InputError: If the scenario cannot be built.
     """
-    builder, task = DiagramBuilder(), task or make_task(scenario, folder, progress)
+    builder = DiagramBuilder()
+    task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = _workpiece(scenario, task), make_mounting(scenario, task)
     spring = _spring(scenario, workpiece) if with_slope else None
     part = _add_robot(builder, scenario, folder, workpiece if spring is None else None)
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
-    begin = cache(lambda: _start(scenario, task, part, workpiece, mounting))
+    begin = cache(
+        lambda: (
+            _start(scenario, task, part, workpiece, mounting)
+            if like is None
+            else (like.start, like.initial_state)
+        )
+    )
     rest = cache(lambda: _rest(task, part, *begin()))
     law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
     start, initial_state = begin()
@@ -121,6 +129,20 @@ def build_station(
     measured = joint_state.get_system().get_name(), joint_state.get_name()
     if scenario.simulation.fused:
         fuse_blocks(builder)
+    planned = [] if task.drive_plan is None else task.drive_plan.said
+
+    def warn() -> list[str]:
+        return (
+            task.warnings
+            + scenario.model_error.warnings
+            + planned
+            + part.start_warnings(scenario.start, start_posture, start.target)
+            + law_warnings(scenario, believed, law, link_state, rest())
+            + stiff_regions(scenario)
+            + sensor_warnings(scenario)
+            + _load_warnings(scenario, part, law, rest)
+        )
+
     diagram = builder.Build()
     diagram.set_name(scenario.name or "station")
     return Station(
@@ -133,17 +155,10 @@ def build_station(
         servo,
         log,
         initial_state,
-        start.place,
+        start,
         on_motors,
         measured,
-        task.warnings
-        + scenario.model_error.warnings
-        + ([] if task.drive_plan is None else task.drive_plan.said)
-        + part.start_warnings(scenario.start, start_posture, start.target)
-        + law_warnings(scenario, believed, law, link_state, rest())
-        + stiff_regions(scenario)
-        + sensor_warnings(scenario)
-        + _load_warnings(scenario, part, law, rest),
+        warn,
         workpiece,
         operator,
         MODES if "mode" in signals else (),

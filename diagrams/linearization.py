@@ -6,7 +6,7 @@ they are wired. So nothing of the controller is modelled a second time.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,10 +36,12 @@ class RestSlope:
         of_inputs: Of what it gives the blocks at that tick, by its variables and by what the
             blocks put out.
         of_own: The same of its variables.
+        given: What it gives each system of blocks at that tick, by input.
     """
 
     of_inputs: tuple[np.ndarray, np.ndarray]
     of_own: tuple[np.ndarray, np.ndarray]
+    given: Sequence[Mapping[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,13 @@ class PeriodDerivative:
             prefix = "" if system.block is None else f"{system.get_name()}."
             self.states |= {f"{prefix}{name}": where for name, where in rows.items()}
         self._find_wires(diagram)
+        # with the same variables and the same rest, whatever blocks do at their ticks, the rest
+        # arrives at the same
+        self._is_led_by_states = (
+            self._intervals == 1
+            and not self._direct
+            and all(name in self._blocks[k].network.shown for k, name in self._leading)
+        )
 
     def at(
         self,
@@ -119,11 +128,18 @@ class PeriodDerivative:
         """
         A, start, made = np.eye(self._map.size), section, []
         for interval in range(self._intervals):
-            made.append(rest[interval] if rest else self._slope_of_rest(start))
-            self._free.approach(start)
-            points = self._points(self._free.as_sampled())
+            tick = self._free.next_tick(start)
+            if rest and self._is_led_by_states:  # what is no block arrives where it did
+                points = self._points(start, rest[interval].given, tick)
+                made.append(rest[interval])
+            else:
+                self._free.approach(start)
+                sampled = self._free.as_sampled()
+                given = self._given_at(sampled)
+                points = self._points(sampled, given, tick)
+                made.append(rest[interval] if rest else self._slope_of_rest(start, sampled, given))
             wanted = chosen if self._intervals == 1 else None
-            A = self._joined(points, made[-1], wanted) @ A
+            A = self._joined(points, made[-1], tick, wanted) @ A
             if interval + 1 < self._intervals:
                 self._free.pass_tick()
                 start = self._free.context.Clone()
@@ -137,7 +153,8 @@ class PeriodDerivative:
             section: Context right after a tick; unchanged.
         """
         self._map.approach(section)
-        return self._wires(self._points(self._map.as_sampled()))
+        sampled = self._map.as_sampled()
+        return self._wires(self._points(sampled, self._given_at(sampled), sampled.get_time()))
 
     def _wires(self, points: Sequence[SlopeAt]) -> dict[str, np.ndarray]:
         found: dict[str, np.ndarray] = {}
@@ -153,10 +170,15 @@ class PeriodDerivative:
         self._num_inputs = self._num_outputs = 0
         # from blocks to the rest, from the rest to blocks, from blocks to blocks
         self._fed: list[tuple[np.ndarray, InputPort]] = []
+        self._leading: set[tuple[int, str]] = set()
         self._given: list[InputPort] = []
         self._direct: list[tuple[np.ndarray, np.ndarray]] = []
         numbers = {system: k for k, system in enumerate(self._blocks)}
-        for (target, i), (source, o) in diagram.connection_map().items():
+        connections = diagram.connection_map()
+        place = {system: k for k, system in enumerate(diagram.GetSystems())}
+        # the map's own order is that of addresses, and not the same in two equal diagrams
+        for target, i in sorted(connections, key=lambda key: (place[key[0]], int(key[1]))):
+            source, o = connections[target, i]
             port, output = target.get_input_port(i), source.get_output_port(o)
             if target not in numbers and not target.num_output_ports():
                 continue  # a log
@@ -167,6 +189,7 @@ class PeriodDerivative:
                     self._num_outputs += port.size()
                 if target not in numbers:
                     self._fed.append((self._outputs[key], port))
+                    self._leading.add(key)
             if target in numbers:
                 into = self._num_inputs + np.arange(port.size())
                 self._inputs[numbers[target], port.get_name()] = into
@@ -175,19 +198,31 @@ class PeriodDerivative:
                 if source in numbers:
                     self._direct.append((into, self._outputs[key]))
 
-    def _points(self, root: Context) -> list[SlopeAt]:
+    def _given_at(self, root: Context) -> list[dict[str, np.ndarray]]:
+        """Return the inputs of all blocks."""
+        return [
+            {
+                name: system.GetInputPort(name).Eval(system.GetMyContextFromRoot(root))
+                for name in system.network.inputs
+            }
+            for system in self._blocks
+        ]
+
+    def _points(
+        self, root: Context, given: Sequence[Mapping[str, np.ndarray]], time: float
+    ) -> list[SlopeAt]:
         """Return the derivatives of all blocks at a tick that is not made yet."""
         points = []
-        for system, slope in zip(self._blocks, self._slopes, strict=True):
+        for system, slope, u in zip(self._blocks, self._slopes, given, strict=True):
             own = system.GetMyContextFromRoot(root)
             x = {name: system.state(own, name) for name in system.states}
-            u = {name: system.GetInputPort(name).Eval(own) for name in slope.network.inputs}
-            points.append(slope.at(x, u, math.floor(_ticks(root, system) + _ROUNDING_OF_TIME)))
+            tick = math.floor(time / system.period + _ROUNDING_OF_TIME)
+            points.append(slope.at(x, u, tick))
         return points
 
-    def _slope_of_rest(self, start: Context) -> RestSlope:
-        self._free.approach(start)
-        sampled = self._free.as_sampled()
+    def _slope_of_rest(
+        self, start: Context, sampled: Context, given: Sequence[Mapping[str, np.ndarray]]
+    ) -> RestSlope:
         put_out = np.zeros(self._num_outputs)
         for (k, name), part in self._outputs.items():
             own = self._blocks[k].GetMyContextFromRoot(sampled)
@@ -212,7 +247,7 @@ class PeriodDerivative:
             is_smooth = bend <= _BEND * scale + _ROUNDING * np.maximum(1.0, np.abs(middle[finite]))
             if np.all(is_smooth) or column >= n or self._smooth[column]:
                 slope[finite, column] = (forward - backward) / (2.0 * delta)
-        return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]))
+        return RestSlope((slope[:m, :n], slope[:m, n:]), (slope[m:, :n], slope[m:, n:]), given)
 
     def _moved(self, start: Context, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return what blocks are fed with and the rest's variables, one interval later."""
@@ -228,7 +263,7 @@ class PeriodDerivative:
         return np.concatenate([*given, arrived[self.rest]])
 
     def _joined(
-        self, points: Sequence[SlopeAt], rest: RestSlope, chosen: np.ndarray | None
+        self, points: Sequence[SlopeAt], rest: RestSlope, time: float, chosen: np.ndarray | None
     ) -> np.ndarray:
         """Return the derivative over one interval, shape (size, size)."""
         size = self._map.size
@@ -243,7 +278,7 @@ class PeriodDerivative:
                 names = [name for name in states if np.isin(states[name], chosen).any()]
             elif self._intervals == 1:
                 names = point.reaching(wires)
-            ticks = _ticks(self._free.context, system)
+            ticks = time / system.period
             if abs(ticks - round(ticks)) > _ROUNDING_OF_TIME:  # remembers what it did
                 D[self._memory[k], self._memory[k]], names = 1.0, []
             rows = [states[name] for name in names]
@@ -268,8 +303,3 @@ class PeriodDerivative:
         A[np.ix_(own, own)] += rest.of_own[0]
         A[own] += rest.of_own[1] @ (y_x + y_u @ u_x)
         return A
-
-
-def _ticks(root: Context, system: BlockSystem) -> float:
-    """Return the time in sampling intervals of a system."""
-    return root.get_time() / system.period

@@ -98,6 +98,15 @@ class OnePeriodMap:
         self._simulator.AdvancePendingEvents()
         return self.variables(self.context)
 
+    def next_tick(self, section: Context) -> float:
+        """Return the time of the next tick [s].
+
+        Args:
+            section: Context right after a tick.
+        """
+        # a product as in Drake's own schedule, so that rounding does not lose the tick
+        return (round(section.get_time() / self.period) + 1) * self.period
+
     def approach(self, section: Context, x: np.ndarray | None = None) -> None:
         """Go to the next tick, which is not made yet.
 
@@ -109,15 +118,13 @@ class OnePeriodMap:
             x: Variables in place of its own, shape (size,).
         """
         context, time = self.context, section.get_time()
-        # a product as in Drake's own schedule, so that rounding does not lose the tick
-        next_tick = (round(time / self.period) + 1) * self.period
         context.SetTimeStateAndParametersFrom(section)
         if x is not None:
             for part in self._parts:
                 self._set_part(context, part, x[part])
         context.SetTime(time + _BEHIND)
         self._simulator.Initialize(self._silent)
-        self._simulator.AdvanceTo(next_tick)
+        self._simulator.AdvanceTo(self.next_tick(section))
 
     def as_sampled(self) -> Context:
         """Return the context at the tick that was approached, as what samples finds it.

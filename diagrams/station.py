@@ -1,6 +1,6 @@
 """What running, logging and measuring need to know of a station."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from diagrams.signal_log import SignalLog
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
-from diagrams.tasks.task import Task
+from diagrams.tasks.task import StartPoint, Task
 from diagrams.workpiece import FurtherLength, Workpiece
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -55,11 +55,11 @@ class Station:
             ``drive_torque``, with friction ``friction_torque``. With imperfect encoders
             ``joint_state`` is the truth, and the law was given ``joint_state_measured``.
         initial_state: State of the robot's model at the start.
-        initial_place: Place on the manifold at the start, as the projector remembers it.
+        start: Where the tool is at the start.
         on_motors: Whether the law acts on the tool pose of the motors, not of the links.
         measured: System and port that the measured joint state comes from, by name, as they were
             before blocks were fused.
-        warnings: What may not go as well as hoped, one sentence each.
+        warn: Tells what may not go as well as hoped, one sentence each.
         workpiece: What the tool may touch, if anything.
         operator: Who guides the tool while the robot moves, if anybody does.
         mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
@@ -75,10 +75,10 @@ class Station:
     servo: ServoAccess | None
     log: SignalLog
     initial_state: np.ndarray
-    initial_place: np.ndarray
+    start: StartPoint
     on_motors: bool
     measured: tuple[str, str]
-    warnings: list[str]
+    warn: Callable[[], list[str]]
     workpiece: Workpiece | None = None
     operator: Operator | None = None
     mode_labels: Sequence[str] = ()
@@ -88,6 +88,16 @@ class Station:
     def robot(self) -> RobotModel:
         """The robot as it is."""
         return self.part.robot
+
+    @property
+    def initial_place(self) -> np.ndarray:
+        """Place on the manifold at the start, as the projector remembers it."""
+        return self.start.place
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What may not go as well as hoped, one sentence each."""
+        return self.warn()
 
     @cached_property
     def blocks(self) -> BlockAccess:

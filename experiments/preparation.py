@@ -80,8 +80,8 @@ def prepare(
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
         drawing = draw_station(settings, folder, station) if recording else None
+        warnings = station.warnings + (drawing.warnings if drawing else [])
     resolve_files(settings, folder)
-    warnings = station.warnings + (drawing.warnings if drawing else [])
     text = dump_typed(settings)
     return PreparedRun(settings, text, station, integration, drawing, warnings)
 
@@ -102,7 +102,7 @@ def _integrated(settings: Scenario, folder: Path, station: Station) -> tuple[Sta
     longest = min(settings.simulation.max_step, station.controller.period)
     settings.simulation = integration.applied_to(settings.simulation)
     if integration.step < longest:  # friction is made for the step
-        station = build_station(settings, folder, task=station.task)
+        station = build_station(settings, folder, like=station)
     return station, integration
 
 

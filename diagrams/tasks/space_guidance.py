@@ -1,6 +1,7 @@
 """Leading a tool through space by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
 
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -89,6 +90,11 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         return SpaceDrawing(self.fixtures, self.place)
 
+    @cached_property
+    def _projector(self) -> Projector:
+        """What finds the place; its functions are made once for all stations with this task."""
+        return Projector(self.place)
+
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -99,7 +105,7 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "tool_place",
-            BlockSystem(Projector(self.place), period),
+            BlockSystem(self._projector, period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

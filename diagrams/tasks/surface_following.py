@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -93,6 +94,11 @@ class SurfaceTask(Task):
         """See :class:`Task`."""
         return SurfaceDrawing(self.surface, self.place)
 
+    @cached_property
+    def _projector(self) -> Projector:
+        """What finds the place; its functions are made once for all stations with this task."""
+        return Projector(self._evaluator)
+
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -103,7 +109,7 @@ class SurfaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "surface_projector",
-            BlockSystem(Projector(self._evaluator), period),
+            BlockSystem(self._projector, period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

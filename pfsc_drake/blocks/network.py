@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 
@@ -24,6 +25,8 @@ class Source(NamedTuple):
 
 
 TICK = Source("tick", "tick")
+# of blocks with all inputs: one that stands in several diagrams is made once
+_made: WeakKeyDictionary[Block, "Network"] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -79,8 +82,14 @@ class Network:
         Raises:
             ValueError: If the block's methods return what it has not declared.
         """
-        if unconnected and like is None:
-            like = cls.of(block)
+        if not unconnected:
+            if block not in _made:
+                _made[block] = cls._of(block, (), None)
+            return _made[block]
+        return cls._of(block, unconnected, cls.of(block) if like is None else like)
+
+    @classmethod
+    def _of(cls, block: Block, unconnected: Collection[str], like: "Network | None") -> "Network":
         # the same nodes whatever is connected
         groups = [] if like is None else [node.results for node in like.nodes]
         inputs = {name: p for name, p in block.inputs.items() if name not in unconnected}

@@ -25,7 +25,6 @@ from diagrams.robots.arm import add_arm
 from diagrams.robots.drives import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from diagrams.tasks.make import make_task
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY, find_scenario
 from experiments.simulation import configure
 from pfsc_drake.systems.plants.link_pushes import LinkPushes
@@ -150,11 +149,10 @@ def machine() -> float:
 def compare(name: str) -> dict[str, float]:
     """Return the medians of a scenario's paces."""
     settings = load_file(Scenario, find_scenario(name))
-    task = make_task(settings, SCENARIO_DIRECTORY)
-    stations = {}
+    stations: dict[str, Station] = {}
     for key, fused in (("systems", False), ("fused", True)):
         settings.simulation.fused = fused
-        stations[key] = build_station(settings, SCENARIO_DIRECTORY, task=task)
+        stations[key] = build_station(settings, SCENARIO_DIRECTORY, like=stations.get("systems"))
     starts = {
         key: lambda station=station: of_station(settings, station)
         for key, station in stations.items()

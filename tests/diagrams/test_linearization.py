@@ -15,6 +15,7 @@ from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.cases import where
 from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.fuse import fuse_blocks
 
 T = 0.01
 F, B = np.array([[0.0, 1.0], [-40.0, -0.5]]), np.array([[0.0], [2.0]])
@@ -54,12 +55,13 @@ class Controller(LeafSystem):
 class ControllerBlock(Block):
     """The same as a block, whose last x is known by name."""
 
-    def __init__(self):
+    def __init__(self, share=1.0):
+        self._gain = share * ca.DM(GAIN)
         self.inputs, self.outputs = {"motion": Port(2)}, {"told": Port(1)}
         self.states = {"last": 2, "count": 1, "stopped": 1}
 
     def output(self, x, u, t):
-        told = -ca.DM(GAIN) @ (u.motion + 0.1 * x.last)
+        told = -self._gain @ (u.motion + 0.1 * x.last)
         return {"told": where(x.stopped, 0.0, told)}
 
     def update(self, x, u, y, t):
@@ -78,7 +80,7 @@ class FirstHalf(Block):
         return {"s": 0.3 * y.y}
 
 
-def make_loop(controller, hold, *between):
+def make_loop(controller, hold, *between, fused=False):
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", LinearSystem(F, B, np.eye(2), np.zeros((2, 1))))
     output = plant.get_output_port()
@@ -87,6 +89,8 @@ def make_loop(controller, hold, *between):
         builder.Connect(output, system.get_input_port(0))
         output = system.get_output_port(0)
     builder.Connect(output, plant.get_input_port())
+    if fused:
+        fuse_blocks(builder)
     diagram = builder.Build()
     one_period = OnePeriodMap(diagram, T, integrate)
     return diagram, one_period, plant, hold, PeriodDerivative(one_period, diagram, integrate)
@@ -185,6 +189,24 @@ def test_a_choice_of_variables_is_a_part_of_the_whole():
     whole = derivative.at(section)
     part = derivative.at(section, chosen, whole.rest)
     np.testing.assert_array_equal(part.A, whole.A[np.ix_(chosen, chosen)])
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_what_is_no_block_is_the_same_for_other_blocks(fused):
+    def loop_of(share):
+        controller = BlockSystem(ControllerBlock(share), T)
+        return make_loop(controller, BlockSystem(Hold(1), T), fused=fused)
+
+    diagram, _, _, _, derivative = loop_of(1.0)
+    _, other_period, _, _, other = loop_of(0.7)
+    known = {ticks: derivative.at(after_ticks(diagram, ticks)).rest for ticks in (3, 8)}
+    for ticks, rest in known.items():
+        section = other_period.adopted(after_ticks(diagram, ticks))
+        own, reused = other.at(section), other.at(section, None, rest)
+        # steps of differences are relative to what is put out
+        np.testing.assert_allclose(reused.A, own.A, rtol=1e-9, atol=1e-9)
+        for name, value in own.wires.items():
+            np.testing.assert_allclose(reused.wires[name], value, rtol=1e-12)
 
 
 def test_it_tells_what_blocks_put_out():

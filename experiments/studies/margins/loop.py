@@ -52,8 +52,8 @@ class StationLoop:
     def __init__(self, settings: Scenario, folder: Path, like: "StationLoop | None" = None) -> None:
         # blocks as one are simulated three times as fast
         settings = replace(settings, simulation=replace(settings.simulation, fused=True))
-        task = None if like is None else like.station.task
-        self.station: Station = build_station(settings, folder, task=task, with_slope=True)
+        built = None if like is None else like.station
+        self.station: Station = build_station(settings, folder, like=built, with_slope=True)
         diagram, period = self.station.diagram, self.station.controller.period
         self.spring = _only(diagram, SurfaceSpring)
         self._has_sensor = settings.needs_sensor

@@ -1,5 +1,7 @@
 """The following law as a function of measurement, manifold point and reference."""
 
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 
@@ -144,7 +146,6 @@ class FollowingLaw:
             linearization.num_outputs if inverse.damped_below else 0,
         )
         self.function = self._compose(max_alpha)
-        self._bound = BoundFunction(self._whole())
 
     def _compose(self, max_alpha: float) -> ca.Function:
         """Return the law as one function: inputs by :class:`LawInputs`, results by the layout."""
@@ -179,8 +180,9 @@ class FollowingLaw:
             ["result"],
         )
 
-    def _whole(self) -> ca.Function:
-        """Return the law with what it rests on, of the arguments of :meth:`evaluate`."""
+    @cached_property
+    def _bound(self) -> BoundFunction:
+        """The law with what it rests on, of the arguments of :meth:`evaluate`."""
         has_posture = self.posture is not None
         u = LawInputs.symbols(self.linearization, has_posture=has_posture)
         told = u._asdict()
@@ -196,7 +198,8 @@ class FollowingLaw:
         )
         result = self.function(**told | relation)["result"]
         del told["relation"]
-        return ca.Function("whole_law", list(told.values()), [result], list(told), ["result"])
+        whole = ca.Function("whole_law", list(told.values()), [result], list(told), ["result"])
+        return BoundFunction(whole)
 
     def _reference_velocity(self, u: LawInputs, aim: Aim, spare: Spare | None) -> ca.SX:
         """Return the joint velocities that the reference asks for, shape (N,)."""

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from diagrams.tasks.make import make_task
+from diagrams.station import Station
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY, find_scenario, scenario_names
 from experiments.simulation import configure
 from pfsc_drake.yaml.typed import load_file
@@ -20,25 +20,27 @@ from tests.deferred_code import compiled_at_once
 pytestmark = pytest.mark.slow
 
 DURATION = 0.1
+Log = dict[str, np.ndarray]
 
 
-def log_of(settings: Scenario, fused: bool, task) -> dict[str, np.ndarray]:
-    """Return the log of a scenario's first ticks, with whether it ended in a fault."""
+def run(settings: Scenario, fused: bool, like: Station | None = None) -> tuple[Station, Log]:
+    """Return a station, and the log of its first ticks with whether it ended in a fault."""
     settings.simulation.fused = fused
     with compiled_at_once() if fused else nullcontext():
-        station = build_station(settings, SCENARIO_DIRECTORY, task=task)
+        station = build_station(settings, SCENARIO_DIRECTORY, like=like)
         simulator = Simulator(station.diagram)
         configure(simulator, "runge_kutta3", settings.controller.sampling_time)
         root = simulator.get_mutable_context()
         station.set_start(root)
         simulator.AdvanceTo(DURATION)
-    return station.log.read(root)[1] | {"stopped": np.array(station.fault(root) is not None)}
+    log = station.log.read(root)[1] | {"stopped": np.array(station.fault(root) is not None)}
+    return station, log
 
 
-def compare(settings: Scenario) -> dict[str, np.ndarray]:
+def compare(settings: Scenario) -> Log:
     """Refuse logs that differ, and return the fused one."""
-    task = make_task(settings, SCENARIO_DIRECTORY)
-    fused, one_by_one = (log_of(settings, kind, task) for kind in (True, False))
+    station, fused = run(settings, True)
+    _, one_by_one = run(settings, False, station)
     assert fused.keys() == one_by_one.keys()
     for name, values in fused.items():
         np.testing.assert_array_equal(values, one_by_one[name], err_msg=name)
