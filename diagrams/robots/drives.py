@@ -151,19 +151,20 @@ def add_friction(
             f"rotor inertia in every drive, not so {without}: "
             "write robot.elastic.rotor_inertia (kg m^2) and robot.elastic.gear_ratio"
         )
-    velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(np.eye(4 * n)[3 * n :]))
-    builder.Connect(joint_state, velocity.get_input_port())
+    motors = np.eye(4 * n)[3 * n :]
     resistances, signals = [], {}
     if coefficients is not None:
         bristles = _bristles(scenario, *coefficients, drives)
         friction = builder.AddNamedSystem(
-            "joint_friction", JointFriction(bristles, scenario.friction.drift)
+            "joint_friction", JointFriction(bristles, scenario.friction.drift, motors)
         )
-        builder.Connect(velocity.get_output_port(), friction.GetInputPort("velocity"))
+        builder.Connect(joint_state, friction.GetInputPort("velocity"))
         resistances.append(friction.GetOutputPort("resistance"))
         signals["friction_torque"] = friction.GetOutputPort("friction_torque")
     if brakes is not None:
         holding = _add_brakes(builder, part, scenario, brakes, faults)
+        velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(motors))
+        builder.Connect(joint_state, velocity.get_input_port())
         builder.Connect(velocity.get_output_port(), holding.GetInputPort("velocity"))
         resistances.append(holding.GetOutputPort("resistance"))
     part.connect_resistance(builder, _sum(builder, resistances))

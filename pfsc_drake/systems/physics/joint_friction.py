@@ -9,7 +9,13 @@ from pydrake.systems.framework import (
     LeafSystem,
     OutputPort,
 )
-from pydrake.systems.primitives import Adder, FirstOrderLowPassFilter, Gain, Saturation
+from pydrake.systems.primitives import (
+    Adder,
+    FirstOrderLowPassFilter,
+    Gain,
+    MatrixGain,
+    Saturation,
+)
 
 from pfsc_drake.physics.friction import BristleFriction, FrictionDrift
 
@@ -31,7 +37,7 @@ class JointFriction(Diagram):
     discrete plant s is integrated between its ticks; choose the bristles accordingly.
 
     Ports:
-        velocity (input): ``v`` [rad/s or m/s], shape (N,).
+        velocity (input): ``v`` [rad/s or m/s], shape (N,), or what it is rows of, shape (M,).
         friction_torque (output): ``tau_f`` [Nm or N], shape (N,).
         resistance (output): ``-tau_f``, the generalized force on the joints, shape (N,).
 
@@ -42,12 +48,19 @@ class JointFriction(Diagram):
     Args:
         friction: The law with its parameters, N joints.
         drift: How all of ``tau_f`` changes with time, if it does.
+        rows: ``v`` is these times the input, shape (N, M); the input itself by default.
     """
 
-    def __init__(self, friction: BristleFriction, drift: FrictionDrift | None = None) -> None:
+    def __init__(
+        self,
+        friction: BristleFriction,
+        drift: FrictionDrift | None = None,
+        rows: np.ndarray | None = None,
+    ) -> None:
         super().__init__()
         self._friction, self._drift = friction, drift
         n = friction.dimension
+        rows = np.eye(n) if rows is None else rows
         builder = DiagramBuilder()
 
         def added(name: str, system: LeafSystem, *sources: OutputPort) -> OutputPort:
@@ -58,17 +71,19 @@ class JointFriction(Diagram):
 
         # (sat(s + tau v / delta) - s) / tau is what a low pass does with sat(s + tau v / delta)
         bristles = FirstOrderLowPassFilter(time_constants=friction.relaxation)
-        tips = Gain(k=friction.relaxation / friction.presliding)
-        viscous = Gain(k=friction.viscous)
+        tips = MatrixGain((friction.relaxation / friction.presliding)[:, None] * rows)
+        # with the sign of the resistance, which is read more often than the friction
+        viscous = MatrixGain(-friction.viscous[:, None] * rows)
         s = added("deflection", bristles)
         sum_ = added("undeflected", Adder(2, n), s, added("tips", tips))
         bent = added("limit", Saturation(np.full(n, -1.0), np.ones(n)), sum_)
         builder.Connect(bent, bristles.get_input_port())
-        dry = added("dry", Gain(k=friction.coulomb), bent)
-        torque = added("sum", Adder(2, n), dry, added("viscous", viscous))
+        dry = added("dry", Gain(k=-friction.coulomb), bent)
+        resistance = added("sum", Adder(2, n), dry, added("viscous", viscous))
         if drift is not None:
-            torque = added("drift", _Drifting(n, drift), torque)
-        resistance = added("sign", Gain(k=np.full(n, -1.0)), torque)
+            resistance = added("drift", _Drifting(n, drift), resistance)
+        # as a matrix, for a sum does not end as -0
+        torque = added("sign", MatrixGain(-np.eye(n)), resistance)
         builder.ExportInput(tips.get_input_port(), "velocity")
         builder.ConnectInput("velocity", viscous.get_input_port())
         builder.ExportOutput(torque, "friction_torque")

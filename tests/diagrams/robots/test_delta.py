@@ -49,9 +49,8 @@ def test_friction_is_beside_the_drives():
     behind = sources(build_analytic("simulation.fused=false").diagram)
     assert behind["plant", "actuation"] == ("hold", "held")
     assert behind["plant", "resistance"] == ("joint_friction", "resistance")
-    assert behind["joint_friction", "velocity"] == ("motor_velocity", "y0")
     # the true velocity, whatever the encoders say
-    assert behind["motor_velocity", "u0"] == ("joint_encoders", "y0")
+    assert behind["joint_friction", "velocity"] == ("joint_encoders", "y0")
 
 
 def test_without_friction_the_held_force_drives_the_plant():

@@ -284,6 +284,34 @@ def test_it_is_the_law():
         assert np.array_equal(rate, law.rate(s, v), equal_nan=True)
 
 
+def test_velocity_as_rows_of_what_is_read():
+    """As rows that another system takes, to the last bit."""
+    rng = np.random.default_rng(6)
+    law = BristleFriction([2.0, 0.7], [1.0, 3.0], [1e-5, 1e-4], [2e-3, 3e-3])
+    rows, whole = np.eye(5)[[3, 1]], rng.uniform(-0.1, 0.1, 5)
+    found = []
+    for system, value in (
+        (JointFriction(law, rows=rows), whole),
+        (JointFriction(law), whole[[3, 1]]),
+    ):
+        context = system.CreateDefaultContext()
+        context.SetContinuousState([0.3, -0.2])
+        system.GetInputPort("velocity").FixValue(context, value)
+        outputs = [system.GetOutputPort(k).Eval(context) for k in ("friction_torque", "resistance")]
+        found.append([*outputs, system.EvalTimeDerivatives(context).CopyToVector()])
+    assert np.array_equal(*found)
+    assert np.array_equal(found[0][0], law.torque(np.array([0.3, -0.2]), whole[[3, 1]]))
+
+
+def test_without_velocity_its_zero_has_no_sign():
+    system = JointFriction(BristleFriction([2.0], [1.0], [1e-5], [2e-3]))
+    context = system.CreateDefaultContext()
+    system.GetInputPort("velocity").FixValue(context, [0.0])
+    (torque,) = system.GetOutputPort("friction_torque").Eval(context)
+    assert torque == 0.0
+    assert not np.signbit(torque)
+
+
 def test_drift():
     law = BristleFriction([2.0, 0.0], [1.0, 3.0], [1e-5, 1e-5], [2e-3, 2e-3])
     system = JointFriction(law, FrictionDrift(1.5, 2.0, 4.0))
