@@ -36,7 +36,7 @@ from experiments.results.run_signals import collect_log
 from experiments.results.shape_metrics import shape_metrics
 from experiments.results.tick import measure_tick
 from experiments.simulation import SimulationResult
-from experiments.studies.margins.analysis import MarginAnalysis
+from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
 from pfsc_drake.following.fixtures import free_motion
 from reporting.folder import ResultsFolder

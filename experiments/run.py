@@ -6,8 +6,9 @@ from experiments.catalog.scenario_file import ScenarioFile
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.preparation import PreparedRun, prepare
 from experiments.simulation import simulate
-from experiments.studies.margins.analysis import MarginAnalysis, analyse
+from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box
+from experiments.studies.margins.result import MarginAnalysis
 from reporting.folder import check_folder, open_results
 from reporting.interruption import noticed_interruption
 from reporting.progress import ProgressListener

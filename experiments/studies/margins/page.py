@@ -6,9 +6,10 @@ from pathlib import Path
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.preparation import naming
-from experiments.studies.margins.analysis import MarginAnalysis, analyse
+from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.picture import draw_margins
+from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import margins_json, metrics_of, sentences
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.typed import load_typed

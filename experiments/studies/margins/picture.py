@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from experiments.studies.margins.analysis import Case, MarginAnalysis
+from experiments.studies.margins.result import Case, MarginAnalysis
 from experiments.studies.margins.words import GOOD_DAMPING, GOOD_DISC
 from reporting.style import (
     ALERT,

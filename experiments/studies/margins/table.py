@@ -5,7 +5,7 @@ import math
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.studies.margins.analysis import MarginAnalysis
+from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import sentences
 
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.studies.margins.analysis import (
+from experiments.studies.margins.loop import STIFFEST
+from experiments.studies.margins.result import (
     Case,
     MarginAnalysis,
     Place,
 )
-from experiments.studies.margins.loop import STIFFEST
 from experiments.studies.margins.touched import TouchedSurface
 from pfsc_drake.control.margins.disc import DiscMargin
 from reporting.metrics import Metrics

@@ -9,8 +9,9 @@ import pytest
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
-from experiments.studies.margins.analysis import MarginAnalysis, analyse
+from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box, Error, corners, single_errors
+from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.smooth import smooth
 from experiments.studies.margins.words import one_line, sentences
 from pfsc_drake.errors import InputError
