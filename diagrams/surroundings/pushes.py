@@ -12,6 +12,7 @@ from diagrams.tasks.task import Task
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import ForceProfile
+from pfsc_drake.physics.link_forces import LinkForces
 from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
 from pfsc_drake.physics.scripted_force import ScriptedForce
 from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
@@ -58,14 +59,18 @@ def add_pushes(
     period = scenario.controller.sampling_time
     system = LinkPushes(part.robot, [push.place for push in found])
     builder.AddNamedSystem("link_pushes", system)
-    points, size = system.GetOutputPort("points"), len(found)
+    size = len(found)
+    told = LinkForces(part.robot, [(push.place.link, push.place.p_LQ) for push in found])
+    forces = builder.AddNamedSystem("link_forces", BlockSystem(told, period))
+    points = forces.GetOutputPort("points")
     collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
     wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
     # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
     hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
-    builder.Connect(ports["joint_state"], system.GetInputPort("joint_state"))
     builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
-    builder.Connect(hold.GetOutputPort("held"), system.GetInputPort("wrenches"))
+    for pushed in (system, forces):
+        builder.Connect(ports["joint_state"], pushed.GetInputPort("joint_state"))
+        builder.Connect(hold.GetOutputPort("held"), pushed.GetInputPort("wrenches"))
     for k, push in enumerate(found):
         if push.hand is not None:
             source = builder.AddNamedSystem(
@@ -87,7 +92,7 @@ def add_pushes(
     return system, {
         "push_wrench": hold.GetOutputPort("held"),
         "push_point": points,
-        "push_torque": system.GetOutputPort("tau_ext"),
+        "push_torque": forces.GetOutputPort("tau_ext"),
     }
 
 

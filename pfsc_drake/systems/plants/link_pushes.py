@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.physics.link_forces import link_points_function, link_torque_function
+from pfsc_drake.physics.link_forces import link_torque_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.link_places import LinkPlace
 
@@ -26,8 +25,8 @@ class LinkPushes(LeafSystem):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,); not needed for the next.
         applied_spatial_force (output): For the port of that name of a plant, abstract; without
             points at which nothing acts.
-        tau_ext (output): External torques on the link side, shape (N,) [Nm or N].
-        points (output): Where the points are in the world, shape (3K,) [m].
+        tau_ext (output): External torques on the link side, shape (N,) [Nm or N], for plants that
+            bear no forces on bodies.
 
     Args:
         chain: The arm, N joints.
@@ -39,7 +38,6 @@ class LinkPushes(LeafSystem):
         self.places = tuple(places)
         n, size = chain.dimension, len(self.places)
         points = [(place.link, place.p_LQ) for place in self.places]
-        self._points_of = BoundFunction(link_points_function(chain, points))
         self._torque_of = BoundFunction(link_torque_function(chain, points))
         self._wrenches = self.DeclareVectorInputPort("wrenches", 6 * size)
         self._joint_state = self.DeclareVectorInputPort("joint_state", 4 * n)
@@ -55,19 +53,12 @@ class LinkPushes(LeafSystem):
             self._calc_tau_ext,
             prerequisites_of_calc={self._wrenches.ticket(), self._joint_state.ticket()},
         )
-        self.DeclareVectorOutputPort(
-            "points",
-            3 * size,
-            self._calc_points,
-            prerequisites_of_calc={self._joint_state.ticket()},
-        )
 
     def _calc_applied(self, context: Context, output: Value) -> None:
-        applied = []
-        for place, wrench in zip(
-            self.places, self._wrenches.Eval(context).reshape(-1, 6), strict=True
-        ):
-            if not wrench.any():
+        applied, wrenches = [], self._wrenches.Eval(context)
+        for k, place in enumerate(self.places):
+            wrench = wrenches[6 * k : 6 * k + 6]
+            if not any(wrench.tolist()):
                 continue
             force = ExternallyAppliedSpatialForce()
             force.body_index, force.p_BoBq_B = place.body, place.p_BQ
@@ -77,18 +68,11 @@ class LinkPushes(LeafSystem):
 
     def _calc_tau_ext(self, context: Context, output: BasicVector) -> None:
         wrenches = self._wrenches.Eval(context)
-        if not wrenches.any():
+        if not any(wrenches.tolist()):
             output.SetZero()
             return
-        self._torque_of.arguments["q"][:] = self._q_J(context)
-        self._torque_of.arguments["wrenches"][:] = wrenches
+        arguments = self._torque_of.arguments
+        arguments["q"][:] = self._joint_state.Eval(context)[: len(arguments["q"])]
+        arguments["wrenches"][:] = wrenches
         self._torque_of.evaluate()
         output.SetFromVector(self._torque_of.results["tau_ext"])
-
-    def _calc_points(self, context: Context, output: BasicVector) -> None:
-        self._points_of.arguments["q"][:] = self._q_J(context)
-        self._points_of.evaluate()
-        output.SetFromVector(self._points_of.results["points"])
-
-    def _q_J(self, context: Context) -> np.ndarray:
-        return self._joint_state.Eval(context)[: len(self._points_of.arguments["q"])]

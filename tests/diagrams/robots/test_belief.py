@@ -98,7 +98,7 @@ def test_a_posture_yields_to_what_is_observed_of_forces(load_scenario):
     """Told of them, the law knew what no machine measures."""
     settings = load_scenario("pfc_elbow_7r")
     crossings = _crossings(_build(settings)) - {"reference_generator"}
-    assert crossings - MEASUREMENTS == {"link_pushes"}
+    assert crossings - MEASUREMENTS == {"link_forces"}
     settings.controller.posture.yields = "observed"
     settings.controller.external_torque.source = "observed"
     station = _build(settings)
