@@ -10,6 +10,7 @@ from diagrams.scenario import Scenario
 from diagrams.tasks.drive_plan import DrivePlan
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.control.planning.course import CourseFinder, CourseStart
@@ -92,6 +93,7 @@ class _Planner:
         of_speeds = reserve if law.linearization.relative_degree == 1 else _SPEED_RESERVE
         self._reserve = np.repeat([reserve, of_speeds], self.robot.dimension)
 
+    @once_per_content()
     def plan(self) -> DrivePlan:
         """Return a plan of the motion as it was asked for, or of a slower one."""
         try:

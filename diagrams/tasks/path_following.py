@@ -197,9 +197,10 @@ class PathTask(Task):
         begin, end = min(points), max(points)
         if self.path.closed:  # every round is the same
             end = min(end, begin + self.path.length)
-        for eta in np.linspace(begin, end, 2 + int((end - begin) / _SPACING)):
-            theta = np.array([self.path.arc_length.parameter(eta)])
-            yield self.path.position.derivatives(theta, 0)[0, 0], f"path at eta = {eta:.4g} m"
+        places = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
+        theta = np.array([self.path.arc_length.parameter(eta) for eta in places])
+        for eta, position in zip(places, self.path.position.derivatives(theta, 0), strict=True):
+            yield position[0], f"path at eta = {eta:.4g} m"
 
     def target(self) -> PathTarget:
         """See :class:`Task`."""

@@ -63,5 +63,5 @@ def _momentum(station: Station, state: FloatArray) -> FloatArray:
     """Return the momenta on which friction acts, shape (samples, N), of App. A's ``D(q) q'``."""
     if len(state) == 0:
         return np.zeros((0, station.robot.dimension))
-    function = drive_momentum(station.robot).function().map(len(state))
+    function = drive_momentum(station.robot).function.map(len(state))
     return np.array(function(state.T)[0]).T

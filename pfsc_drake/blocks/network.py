@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.compiled.dependencies import dependencies
 
 
@@ -92,6 +93,14 @@ class Network:
     def _of(cls, block: Block, unconnected: Collection[str], like: "Network | None") -> "Network":
         # the same nodes whatever is connected
         groups = [] if like is None else [node.results for node in like.nodes]
+        return cls._grouped(block, frozenset(unconnected), groups)
+
+    @classmethod
+    @once_per_content(300)
+    def _grouped(
+        cls, block: Block, unconnected: frozenset[str], groups: list[tuple[str, ...]]
+    ) -> "Network":
+        """Return the network of a block whose nodes are known, or are to be found if none is."""
         inputs = {name: p for name, p in block.inputs.items() if name not in unconnected}
         x, u = _symbols(block.states), _symbols({name: p.size for name, p in inputs.items()})
         sizes = {name: p.size for name, p in block.outputs.items()} | dict(block.inner)

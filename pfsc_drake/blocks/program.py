@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 
 Needs = frozenset[Source]
@@ -61,7 +62,8 @@ class Program:
     """
 
     def __init__(self, network: Network, like: "Program | None" = None) -> None:
-        self.network = network
+        self.network, self._like = network, like
+        self._with_update: dict[int, Stage] = {}
         shown = set(network.shown.values())
         sizes = dict(sorted(network.states.items(), key=lambda item: item[0] in shown))
         self.states = _slices(sizes)
@@ -82,6 +84,24 @@ class Program:
         self._make_update()
         self.update_stage = self._place_of_update()
         self._make_initial()
+
+    @classmethod
+    @once_per_content()
+    def of(cls, network: Network, like: "Program | None" = None) -> "Program":
+        """Return the program of a network, the same one for an equal network.
+
+        Args:
+            network: The network.
+            like: Program of the same block with more inputs, whose stages this one is to have.
+
+        Raises:
+            InputError: If outputs depend on themselves within a tick.
+        """
+        return cls(network, like)
+
+    def __content__(self) -> object:
+        """Return what decides over all functions."""
+        return self.network, self._like
 
     def output(self, output: str) -> tuple[int, slice]:
         """Return the stage that evaluates an output at the border, and where it is in it.
@@ -131,6 +151,11 @@ class Program:
         Args:
             k: The stage, :attr:`update_stage` of this program or of one with more inputs.
         """
+        if k not in self._with_update:
+            self._with_update[k] = self._made_with_update(k)
+        return self._with_update[k]
+
+    def _made_with_update(self, k: int) -> Stage:
         stage = self.stages[k]
         arguments = {*stage.function.name_in(), *self.update.name_in()}
         inputs = {name: symbol for name, symbol in self._u.items() if name in arguments}

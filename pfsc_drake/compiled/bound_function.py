@@ -44,11 +44,16 @@ class BoundFunction:
             for i, name in enumerate(function.name_out())
         }
         self.evaluate: Callable[[], None]
+        self._function = function
         code = native_code(function)
         if code is None:
             self.evaluate = self._interpreted(function)
         else:
             self.evaluate = code.bind([*self.arguments.values()], [*self.results.values()])
+
+    def __content__(self) -> ca.Function:
+        """Return what decides over it: the arrays are written before every use."""
+        return self._function
 
     def _interpreted(self, function: ca.Function) -> Callable[[], None]:
         buffer, evaluate = function.buffer()

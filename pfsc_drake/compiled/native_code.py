@@ -19,6 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import function_digest
 from pfsc_drake.compiled.object_store import user_store
 from pfsc_drake.compiled.operations import Untranslatable, function_symbols
 from pfsc_drake.compiled.translation import translate
@@ -101,7 +102,7 @@ def why_not(function: ca.Function) -> str | None:
 
 
 def _made(function: ca.Function) -> NativeCode | str:
-    key = hashlib.sha256(function.serialize().encode()).hexdigest()
+    key = function_digest(function).hex()
     made = _compiled.pop(key, None)
     if made is None:
         made = _new(function, key)

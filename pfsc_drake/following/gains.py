@@ -3,6 +3,7 @@
 import dataclasses as dc
 from collections.abc import Callable
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.posture import Posture
@@ -105,6 +106,7 @@ def _joint_gains(by_kind: LawGains, relative_degree: int, law: str) -> Coordinat
     return gains
 
 
+@once_per_content()
 def sampled_robot(
     parameters: ControllerParameters,
     robot: RobotModel,

@@ -6,6 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.geometry.curves.piecewise_fit import fit_pieces
 from pfsc_drake.physics.force_profile import smooth_step, smooth_step_slope
 
@@ -81,6 +82,7 @@ class HandWay:
         return values[:3], rate * values[3:]
 
 
+@once_per_content()
 def _fitted(positions: np.ndarray, ways: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
     """Return polynomials of place and slope over the number of the leg plus the share of it."""
     last = len(positions) - 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import any_of, where
 from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -57,6 +58,7 @@ class LinkForces(Block):
         }
 
 
+@once_per_content()
 def link_points_function(chain: SerialChain, points: Points) -> ca.Function:
     """Return ``q -> points``, where K points of links are in the world, as numbers.
 
@@ -73,6 +75,7 @@ def link_points_function(chain: SerialChain, points: Points) -> ca.Function:
     return ca.Function("link_points", [q], [ca.densify(ca.vertcat(*places))], ["q"], ["points"])
 
 
+@once_per_content()
 def link_torque_function(chain: SerialChain, points: Points) -> ca.Function:
     """Return ``(q, wrenches) -> tau_ext``, the sum of ``J_k^T wrench_k``, see (2.11).
 

@@ -11,7 +11,7 @@ from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function, mass_function
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +111,8 @@ def joint_inertia(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
     Returns:
         Shape (N,) [kg m^2 or kg].
     """
-    q = ca.SX.sym("q", robot.dimension)
-    D_E = np.array(ca.Function("D_E", [q], [ca.diag(robot.mass_matrix(q))])(q_J)).ravel()
-    return D_E + robot.D_M
+    D_E = np.array(mass_function(robot)(q_J))
+    return np.diag(D_E) + robot.D_M
 
 
 class VelocityServoLaw:

@@ -1,9 +1,8 @@
 """Resonances of elastic joints, which decide what law suits a sampling time."""
 
-import casadi as ca
 import numpy as np
 
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, mass_function
 
 
 def joint_resonances(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
@@ -18,8 +17,7 @@ def joint_resonances(robot: RobotModel, q_J: np.ndarray) -> np.ndarray:
     Returns:
         Angular frequencies in increasing order [rad/s], shape (N,).
     """
-    q = ca.SX.sym("q", robot.dimension)
-    D_E = np.array(ca.Function("D_E", [q], [robot.mass_matrix(q)])(q_J))
+    D_E = np.array(mass_function(robot)(q_J))
     compliance = np.linalg.inv(D_E) + np.diag(1.0 / robot.D_M)
     # K^1/2 C K^1/2 has the eigenvalues of K C and is symmetric
     root = np.sqrt(robot.K_s)

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.jets import Jet
 
 
@@ -97,12 +98,21 @@ def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
     return ca.vertcat(*[tau.coefficients[0] for tau in robot.inverse_dynamics(at_rest)])
 
 
+@once_per_content()
 def gravity_function(robot: RobotModel) -> ca.Function:
     """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
     q = ca.SX.sym("q", robot.dimension)
     return ca.Function("gravity", [q], [ca.densify(gravity_torque(robot, q))], ["q"], ["tau"])
 
 
+@once_per_content()
+def mass_function(robot: RobotModel) -> ca.Function:
+    """Return ``D_E(q)`` without rotors as a function of numbers, (N,) to (N, N)."""
+    q = ca.SX.sym("q", robot.dimension)
+    return ca.Function("D_E", [q], [robot.mass_matrix(q)], ["q"], ["D_E"])
+
+
+@once_per_content()
 def pose_function(robot: RobotModel) -> ca.Function:
     """Return the direct kinematics ``q -> [y_t, R_e by rows]``, shapes (N,) and (12,)."""
     q = ca.SX.sym("q", robot.dimension)
@@ -111,6 +121,7 @@ def pose_function(robot: RobotModel) -> ca.Function:
     return ca.Function("tool_pose", [q], [ca.densify(ca.vertcat(y, ca.vec(R.T)))], ["q"], ["pose"])
 
 
+@once_per_content()
 def tool_motion_function(robot: RobotModel) -> ca.Function:
     """Return direct kinematics (2.5) and its rates (2.11), shapes (N,), (N,) and (18,).
 

@@ -61,7 +61,7 @@ class BlockSystem(LeafSystem):
         self.block = block if isinstance(block, Block) else None
         self.period = period
         whole = self.network = block if isinstance(block, Network) else Network.of(block)
-        declared = Program(whole)
+        declared = Program.of(whole)
         self._programs: dict[frozenset[str], _Functions] = {}
         self._declared = declared
         # [started, which are set, states], of these in groups of their own what is shown
@@ -210,7 +210,7 @@ class BlockSystem(LeafSystem):
             program = self._declared
             if left:
                 assert self.block is not None  # a network leaves no input open
-                program = Program(Network.of(self.block, left, self.network), self._declared)
+                program = Program.of(Network.of(self.block, left, self.network), self._declared)
             self._programs[left] = _Functions(program, self._declared.update_stage)
         return self._programs[left]
 

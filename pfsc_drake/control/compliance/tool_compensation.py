@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.control.compliance.still_components import (
     STILL_TIME,
@@ -83,6 +84,7 @@ def _require_sign(key: str, value: float, *, zero_allowed: bool) -> None:
         raise InputError(f"{key} = {value}: must be {allowed} and finite")
 
 
+@once_per_content()
 def compensation_function(
     robot: RobotModel,
     load: ToolLoad,

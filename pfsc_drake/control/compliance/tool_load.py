@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 
@@ -72,6 +73,7 @@ def dead_band(vector: ca.SX, width: float) -> ca.SX:
     return vector * ca.fmax(norm - width, 0.0) / ca.fmax(norm, _SMALLEST_NORM)
 
 
+@once_per_content()
 def joint_torque_function(robot: RobotModel) -> ca.Function:
     """Return ``(q, wrench) -> tau_ext = J_g^T wrench``, (2.11), as a function of numbers.
 

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.compliance.null_space_impedance import NullSpaceImpedance
 from pfsc_drake.control.law.decoupling import free_torque, scale_of
@@ -108,6 +109,7 @@ class YieldingPosture(Block):
         return {"motion": self._impedance.update(x.motion, free, x.goal)}
 
 
+@once_per_content()
 def _free_torques_function(
     robot: RobotModel, manifold: Manifold, posture: Posture, potential: str, stiffness: float
 ) -> ca.Function:

@@ -121,7 +121,7 @@ class FrictionKalmanFilter(Block):
         if not 0.0 <= resting_velocity < np.inf:
             raise InputError(f"resting_velocity = {resting_velocity}: must be zero or positive")
         require_smoothing(smoothing)
-        self._model, self._period, self._momentum = model, period, model.function()
+        self._model, self._period, self._momentum = model, period, model.function
         self._first, self._noise, self._smoothing = ca.DM(first.ravel()), noise, smoothing
         self._mean = intervals == "mean"
         self._resting = resting_velocity if self._mean else -1.0

@@ -7,11 +7,13 @@ no acceleration, and a difference of momenta tells the mean of all that acted in
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
 
 
@@ -80,8 +82,13 @@ class MomentumModel:
         """
         return acting + self.delay / period * (acted - acting)
 
+    def __content__(self) -> object:
+        """Return what decides over it."""
+        return self.function, self.drive_weight, self.known_weight, self.sign, self.delay
+
+    @cached_property
     def function(self) -> ca.Function:
-        """Return ``state -> (p, f)``, shapes (4N,), (N,), (N,)."""
+        """``state -> (p, f)``, shapes (4N,), (N,), (N,)."""
         return ca.Function(
             "momentum",
             [self.state],
@@ -91,6 +98,7 @@ class MomentumModel:
         )
 
 
+@once_per_content()
 def drive_momentum(robot: RobotModel) -> MomentumModel:
     """Return the momenta on which friction of the drives acts; z is the friction torque.
 
@@ -119,6 +127,7 @@ def drive_momentum(robot: RobotModel) -> MomentumModel:
     )
 
 
+@once_per_content()
 def link_momentum(robot: RobotModel) -> MomentumModel:
     """Return the momenta on which forces on the tool act; z is the external torque.
 

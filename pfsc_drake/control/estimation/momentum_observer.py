@@ -59,7 +59,7 @@ class MomentumObserver(Block):
         n, values = model.dimension, (num_derivatives + 1) * model.dimension
         self._filter = SignalDerivatives(num_derivatives, rate, period)
         self._model, self._period = model, period
-        self._momentum = model.function()
+        self._momentum = model.function
         self.inputs = {
             "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
             "drive_torque": Port(n, "Nm or N"),

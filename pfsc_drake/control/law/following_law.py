@@ -7,6 +7,7 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Values
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import all_finite
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
@@ -147,6 +148,7 @@ class FollowingLaw:
         )
         self.function = self._compose(max_alpha)
 
+    @once_per_content()
     def _compose(self, max_alpha: float) -> ca.Function:
         """Return the law as one function: inputs by :class:`LawInputs`, results by the layout."""
         linearization, inverse = self.linearization, self.inverse

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
 from pfsc_drake.control.manifolds.manifold import Kind, Manifold
@@ -114,6 +115,19 @@ def linearize(
         raise InputError(
             f"law '{law}': {n} joints for {m} outputs ({names}); there must be as many or more"
         )
+    ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
+    on_motors = law == "rigid" and not robot.is_rigid
+    velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
+    function = _linearizing_function(robot, law, manifold, options)
+    return Linearization(function, r, manifold, n, ahead, velocity)
+
+
+@once_per_content()
+def _linearizing_function(
+    robot: RobotModel, law: str, manifold: Manifold, options: ActuationOptions
+) -> ca.Function:
+    """Return the function of a :class:`Linearization`."""
+    r, n = RELATIVE_DEGREE[law], robot.dimension
     state, tau_ext = ca.SX.sym("state", 4 * n), ca.SX.sym("tau_ext", n * max(r - 1, 0))
     point = ca.SX.sym("manifold_point", manifold.layout.size)
     progress = ca.SX.sym("progress", (r + 1) * tangential_count(manifold))
@@ -135,19 +149,16 @@ def linearize(
     slopes = ca.vertcat(*[y.coefficients[1] for y in virtual_output([motion.q[0], rate])])
     A = ca.jacobian(slopes, rate)
     results = [Y, A, b, motion.gain, motion.drift, motion.offset, ca.horzcat(*motion.q)]
-    function = ca.Function(
+    return ca.Function(
         f"{manifold.name}_{law}",
         [state, tau_ext, point, *([progress] if manifold.follows_time else [])],
         [ca.densify(e) for e in ca.cse(results)],
         ["state", "tau_ext", "manifold_point", *(["progress"] if manifold.follows_time else [])],
         ["Y", "A", "b", "gain", "drift", "offset", "motion"],
     )
-    ahead = _LEAD.get(law, 0.0) if options.sampling_time > 0.0 else 0.0
-    on_motors = law == "rigid" and not robot.is_rigid
-    velocity = slice(3 * n, 4 * n) if on_motors else slice(n, 2 * n)
-    return Linearization(function, r, manifold, n, ahead, velocity)
 
 
+@once_per_content()
 def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     """Return the decoupling matrix ``A = d yhat / dq`` (3.22) of any posture.
 
@@ -168,6 +179,7 @@ def decoupling_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     )
 
 
+@once_per_content()
 def virtual_output_function(robot: RobotModel, manifold: Manifold) -> ca.Function:
     """Return the virtual output and its rate of any joint motion.
 

@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
 from pfsc_drake.control.law.linearization import Linearization, tangential_count
 from pfsc_drake.control.law.posture import Posture, posture_expressions
@@ -67,10 +68,7 @@ class LoopAtRest:
         n = robot.dimension
         self._robot, self._n, self._period = robot, n, period
         self._elastic = np.isfinite(robot.K_s)
-        q = ca.SX.sym("q", n)
-        weight = gravity_torque(robot, q)
-        dynamics = ca.Function("rest", [q], [robot.mass_matrix(q), weight, ca.jacobian(weight, q)])
-        self._D_E, g, self._G = (np.array(x) for x in dynamics(rest.q_J))
+        self._D_E, g, self._G = (np.array(x) for x in _dynamics_at_rest(robot)(rest.q_J))
         self._lead = linearization.lead
         q_M = rest.q_J + g.ravel() / robot.K_s
         zero = np.zeros(n)
@@ -242,3 +240,11 @@ class LoopAtRest:
             ]
         )
         return F, B, B_ext, C
+
+
+@once_per_content()
+def _dynamics_at_rest(robot: RobotModel) -> ca.Function:
+    """Return ``q -> (D_E, g, dg/dq)`` of the links, shapes (N, N), (N,) and (N, N)."""
+    q = ca.SX.sym("q", robot.dimension)
+    weight = gravity_torque(robot, q)
+    return ca.Function("rest", [q], [robot.mass_matrix(q), weight, ca.jacobian(weight, q)])

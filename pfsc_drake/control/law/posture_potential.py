@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.linearization import decoupling_function
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.robot.inverse_kinematics import UNLIMITED
@@ -17,6 +18,7 @@ _STEEPENING = 0.5
 _LARGEST_PULL = 1.0
 
 
+@once_per_content()
 def free_motion_function(
     robot: RobotModel, manifold: Manifold, potential: str = "", *, inertial: bool = False
 ) -> ca.Function:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest
 from pfsc_drake.control.law.stabilization import LoopGains
 from pfsc_drake.control.margins.modes import modes
@@ -68,6 +69,7 @@ class SampledRobot:
     period: float
     is_elastic: bool
 
+    @once_per_content()
     def rate(self, gains: LoopGains, error: RobotError) -> float:
         """Return the rate of the slowest or of the fastest growing mode [1/s].
 

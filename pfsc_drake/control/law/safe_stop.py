@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import is_finite, where
 from pfsc_drake.control.law.stopping_step import (
     Joints,
@@ -159,6 +160,7 @@ class SafeStop(Block):
         return dict(zip(self._sizes, ca.vertsplit(memory, ends), strict=True))
 
 
+@once_per_content()
 def starting_function(
     robot: RobotModel, joints: Joints, effort_share: float, period: float
 ) -> ca.Function:

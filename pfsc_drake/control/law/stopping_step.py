@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import is_finite
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
@@ -100,6 +101,7 @@ class Joints(NamedTuple):
         return cls(*[ca.DM(np.asarray(x, dtype=float)) for x in (elastic, *constants)])
 
 
+@once_per_content()
 def stopping_step(
     robot: RobotModel, joints: Joints, bandwidth: float, period: float
 ) -> ca.Function:

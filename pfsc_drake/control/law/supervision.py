@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.cases import any_of, first_of, is_finite, where
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
@@ -136,6 +137,7 @@ class Supervision(Block):
         return {"last": u.joint_state, "known": 1.0, "sums": y.sums, "unchanged": y.unchanged}
 
 
+@once_per_content()
 def _supervision_function(
     robot: RobotModel,
     limits: np.ndarray,

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare, scale_of
 from pfsc_drake.control.law.posture import Posture, posture_expressions
@@ -150,6 +151,7 @@ def _advance(order: int, step: float) -> np.ndarray:
     )
 
 
+@once_per_content()
 def _correction_function(
     robot: RobotModel,
     manifold: PlaceManifold,

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
@@ -77,31 +78,9 @@ class DriveDemand:
         boundary_layer_damping: np.ndarray | None = None,
     ) -> None:
         self.derivatives = _DERIVATIVES[law]
-        n = robot.dimension
-        motion = ca.SX.sym("motion", (self.derivatives + 1) * n)
-        q = ca.vertsplit(motion, n)
-        jets = robot.inverse_dynamics(joint_jets(q))
-        tau_J = [
-            ca.vertcat(*[tau.derivative(k) for tau in jets]) for k in range(self.derivatives - 1)
-        ]
-        velocity, acceleration, fast = q[1], q[2], ca.SX(n, 1)
-        if law in ("visco_elastic", "elastic"):
-            K_s = ca.DM(robot.K_s)
-            velocity, acceleration = velocity + tau_J[1] / K_s, acceleration + tau_J[2] / K_s
-        elif law == "singular_perturbation":
-            assert boundary_layer_damping is not None  # the law has refused that
-            elastic = np.isfinite(robot.K_s)
-            fast = -ca.DM(np.where(elastic, boundary_layer_damping, 0.0)) * tau_J[1]
-        damping = robot.viscous_damping + (np.zeros(n) if viscous is None else viscous)
-        torque = tau_J[0] + ca.DM(robot.D_M) * acceleration + ca.DM(damping) * velocity + fast
-        function = ca.Function(
-            "drive_demand",
-            [motion],
-            [ca.densify(e) for e in ca.cse([ca.vertcat(torque, q[1])])],
-            ["motion"],
-            ["demand"],
+        self._function = BoundFunction(
+            _demand_function(robot, law, viscous, boundary_layer_damping)
         )
-        self._function = BoundFunction(function)
 
     def of(self, motion: np.ndarray) -> np.ndarray:
         """Return ``[tau_d, q']`` of every sample, shape (samples, 2N).
@@ -133,6 +112,38 @@ class DriveDemand:
         values = np.array([self.of(course * power[:, None]) for power in powers])
         through = np.linalg.inv(np.vander(paces, increasing=True))
         return np.einsum("kp,psn->skn", through, values)
+
+
+@once_per_content()
+def _demand_function(
+    robot: RobotModel,
+    law: str,
+    viscous: np.ndarray | None,
+    boundary_layer_damping: np.ndarray | None,
+) -> ca.Function:
+    """Return ``motion -> demand``, see :class:`DriveDemand`, shapes ((K + 1) N,) and (2N,)."""
+    derivatives, n = _DERIVATIVES[law], robot.dimension
+    motion = ca.SX.sym("motion", (derivatives + 1) * n)
+    q = ca.vertsplit(motion, n)
+    jets = robot.inverse_dynamics(joint_jets(q))
+    tau_J = [ca.vertcat(*[tau.derivative(k) for tau in jets]) for k in range(derivatives - 1)]
+    velocity, acceleration, fast = q[1], q[2], ca.SX(n, 1)
+    if law in ("visco_elastic", "elastic"):
+        K_s = ca.DM(robot.K_s)
+        velocity, acceleration = velocity + tau_J[1] / K_s, acceleration + tau_J[2] / K_s
+    elif law == "singular_perturbation":
+        assert boundary_layer_damping is not None  # the law has refused that
+        elastic = np.isfinite(robot.K_s)
+        fast = -ca.DM(np.where(elastic, boundary_layer_damping, 0.0)) * tau_J[1]
+    damping = robot.viscous_damping + (np.zeros(n) if viscous is None else viscous)
+    torque = tau_J[0] + ca.DM(robot.D_M) * acceleration + ca.DM(damping) * velocity + fast
+    return ca.Function(
+        "drive_demand",
+        [motion],
+        [ca.densify(e) for e in ca.cse([ca.vertcat(torque, q[1])])],
+        ["motion"],
+        ["demand"],
+    )
 
 
 def with_pace(course: np.ndarray, pace: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
@@ -64,11 +65,9 @@ class PathEvaluator:
         frame: Frame,
         order: int,
     ) -> None:
+        self._made_of = position, orientation, arc_length, frame, order
         self.layout = PathPointLayout(order, orientation is not None, frame.turns)
-        table = tabulate(position, orientation, arc_length, frame, self.layout)
-        if not position.closed:
-            before, after = continuations(position, orientation, arc_length, frame, order)
-            table = _extended(before, table, after, self.layout)
+        table = _whole_table(position, orientation, arc_length, frame, self.layout)
         self._table = PieceTable(table.breakpoints, table.rows)
         self._domain, self._closed = position.domain, position.closed
         # Of the table, which may be one or two laps long.
@@ -79,21 +78,33 @@ class PathEvaluator:
         self._finder = FootFinder(
             self._position_terms, [(self._begin, self._end)], [position.closed], _LONGEST_STEP
         )
+        self.evaluate, self.at = self._functions()
+
+    def __content__(self) -> object:
+        """Return what decides over it."""
+        return self._made_of
+
+    @once_per_content()
+    def _functions(self) -> tuple[ca.Function, ca.Function]:
+        """Return :attr:`evaluate` and :attr:`at`."""
         y, theta = ca.MX.sym("y_t", 3), ca.MX.sym("memory")
-        self.evaluate = ca.Function(
+        evaluate = ca.Function(
             "path_point",
             [y, theta],
             [self._at_foot(y, theta)],
             ["y_t", "memory"],
             ["manifold_point"],
         )
-        self.at = ca.Function(
-            "path_at", [theta], [self._on_path(theta)], ["memory"], ["manifold_point"]
-        )
+        at = ca.Function("path_at", [theta], [self._on_path(theta)], ["memory"], ["manifold_point"])
+        return evaluate, at
 
     @cached_property
     def find(self) -> ca.Function:
         """``y_t -> memory``, the nearest point of the whole path, on the first lap if closed."""
+        return self._find_function()
+
+    @once_per_content()
+    def _find_function(self) -> ca.Function:
         y, apart = ca.MX.sym("y_t", 3), np.array([_VALLEY * self._position.period])
         starts = nearest_samples(y, *_samples(self._position), apart)
         nearest = self._finder.nearest(y, starts)
@@ -202,6 +213,22 @@ class PathEvaluator:
         kept[self.layout.turn] = 0.0
         still = point * kept
         return ca.vertcat(still[0], still[1] + along, still[2:])
+
+
+@once_per_content()
+def _whole_table(
+    position: Curve,
+    orientation: OrientationCurve | None,
+    arc_length: ArcLength,
+    frame: Frame,
+    layout: PathPointLayout,
+) -> PathTable:
+    """Return the table of a path, and of what an open one goes on to at its ends."""
+    table = tabulate(position, orientation, arc_length, frame, layout)
+    if not position.closed:
+        before, after = continuations(position, orientation, arc_length, frame, layout.order)
+        table = _extended(before, table, after, layout)
+    return table
 
 
 def _samples(position: Curve) -> tuple[np.ndarray, np.ndarray]:

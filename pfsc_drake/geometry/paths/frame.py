@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.piecewise_fit import chebyshev_nodes, power_coefficients
@@ -97,6 +98,7 @@ class ParallelTransportFrame:
         return np.zeros((*np.shape(theta), order))
 
 
+@once_per_content()
 def _transport(curve: Curve, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Solution of (3.4): breakpoints, power coefficients, and e_perp at the last end."""
     sample = curve.flat_sampler(2)

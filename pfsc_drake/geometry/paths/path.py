@@ -78,6 +78,10 @@ class Path:
         self.frame = frame or ParallelTransportFrame(position, initial_normal)
         self._evaluators: dict[int, PathEvaluator] = {}
 
+    def __content__(self) -> object:
+        """Return what decides over it."""
+        return self.position, self.orientation, self.frame, self.waypoints
+
     @property
     def closed(self) -> bool:
         """True if the path is closed."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import Foot, FootFinder
 from pfsc_drake.geometry.foot_step import first_and_bend, largest_eigenvalue
@@ -64,6 +65,7 @@ class SurfaceEvaluator:
     """
 
     def __init__(self, surface: Surface, order: int, orientation: ArrayLike | None = None) -> None:
+        self._made_of = surface, order, orientation
         self.layout = SurfacePointLayout(order, orientation is not None)
         if surface.smoothness < order + 1:
             raise InputError(
@@ -80,8 +82,17 @@ class SurfaceEvaluator:
         self._finder = FootFinder(self._terms, whole.domain, whole.closed, LONGEST_STEP)
         self._lengths = np.array([ends.length for ends in surface.domain])
         self._way = TangentialLength(self._terms, self._lengths)
+        self.evaluate, self.at = self._functions(order)
+
+    def __content__(self) -> object:
+        """Return what decides over it."""
+        return self._made_of
+
+    @once_per_content()
+    def _functions(self, order: int) -> tuple[ca.Function, ca.Function]:
+        """Return :attr:`evaluate` and :attr:`at`."""
         y, memory = ca.MX.sym("y_t", 3), ca.MX.sym("memory", 4)
-        self.evaluate = ca.Function(
+        evaluate = ca.Function(
             "surface_point",
             [y, memory],
             [self._at_foot(y, memory)],
@@ -90,11 +101,16 @@ class SurfaceEvaluator:
         )
         rows = ca.vec(self._table(memory[:2], order + 1))
         point = ca.vertcat(memory, 0.0, float(ProjectionStatus.OK), rows, self._quaternion)
-        self.at = ca.Function("surface_at", [memory], [point], ["memory"], ["manifold_point"])
+        at = ca.Function("surface_at", [memory], [point], ["memory"], ["manifold_point"])
+        return evaluate, at
 
     @cached_property
     def find(self) -> ca.Function:
         """``y_t -> memory``, the nearest place of the whole surface, with eta zero."""
+        return self._find_function()
+
+    @once_per_content()
+    def _find_function(self) -> ca.Function:
         y, grid = ca.MX.sym("y_t", 3), self._global.grid
         starts = nearest_samples(
             y, grid.theta.reshape(-1, 2), grid.position.reshape(-1, 3), _VALLEY * self._lengths

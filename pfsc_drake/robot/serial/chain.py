@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -21,7 +22,7 @@ class SerialChain(Linkage, RobotModel):
         """Number of joints N."""
         return len(self.links)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """How far the tool point can be from the origin of the first joint at most [m]."""
         offsets = [np.linalg.norm(link.p_PF) for link in self.links[1:]]

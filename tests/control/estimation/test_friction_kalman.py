@@ -76,7 +76,7 @@ def test_is_the_filter_of_the_appendix(drake_arm):
     kalman = FrictionKalmanFilter(model, start, covariance, PERIOD, intervals="begin")
     ours = estimate(kalman, states, drives)[:, n:]
 
-    function, eye, zero = model.function(), np.eye(n), np.zeros((n, n))
+    function, eye, zero = model.function, np.eye(n), np.zeros((n, n))
     Q = np.diag(np.concatenate([covariance.momentum, covariance.coulomb, covariance.viscous]))
     R, C = np.diag(covariance.measurement), np.hstack([eye, zero, zero])
     p, f = (np.array(x).ravel() for x in function(states[0]))

@@ -27,7 +27,7 @@ def test_a_momentum_changes_by_what_acts_on_it(drake_arm, kind, momentum):
     if momentum is link_momentum:
         unknown, known = TAU_EXT, FRICTION
     rates = arm.rates(state, DRIVE, FRICTION, TAU_EXT)
-    function = model.function()
+    function = model.function
     forces = np.array(function(state)[1]).ravel()
     told = forces + model.drive_weight * DRIVE + model.known_weight * known
     found = model.sign * (derivative(function, state, rates) - told)
@@ -38,7 +38,7 @@ def test_friction_of_elastic_joints_is_told_by_the_motors_alone(drake_arm):
     arm = drake_arm("elastic")
     model, state = drive_momentum(arm.chain), arm.state()
     assert not model.known_weight.any()
-    momentum = np.array(model.function()(state)[0]).ravel()
+    momentum = np.array(model.function(state)[0]).ravel()
     np.testing.assert_allclose(momentum, arm.chain.D_M * state[9:], rtol=1e-14)
     assert not link_momentum(arm.chain).drive_weight.any()
 
@@ -53,7 +53,7 @@ def test_of_a_closed_chain():
     ).ravel()
     model = drive_momentum(robot)
     state, rates = np.tile(np.concatenate([q, v]), 2), np.tile(np.append(v, acceleration), 2)
-    function = model.function()
+    function = model.function
     tau_ext = np.array(ca.DM(robot.jacobian(ca.SX(q)))).T @ push
     told = np.array(function(state)[1]).ravel() + force + model.known_weight * tau_ext
     np.testing.assert_allclose(derivative(function, state, rates), told, rtol=0, atol=1e-6)
@@ -67,13 +67,13 @@ def test_old_velocities_take_back_the_positions_of_links_and_motors(drake_arm, m
     q_J, v_J, q_M, v_M = np.split(state, 4)
     assert np.abs(v_M - v_J).min() > 1e-3
     then = np.concatenate([q_J - delay * v_J, v_J, q_M - delay * v_M, v_M])
-    expected = [np.array(part).ravel() for part in model.function()(then)]
+    expected = [np.array(part).ravel() for part in model.function(then)]
     late = model.with_delay(delay)
-    found = [np.array(part).ravel() for part in late.function()(state)]
+    found = [np.array(part).ravel() for part in late.function(state)]
     assert late.delay == delay
     np.testing.assert_allclose(found[0], expected[0], rtol=1e-13)
     np.testing.assert_allclose(found[1], expected[1], rtol=1e-11, atol=1e-9)
     if momentum is drive_momentum:
-        now = np.array(model.function()(state)[1]).ravel()
+        now = np.array(model.function(state)[1]).ravel()
         springs = arm.chain.K_s * delay * (v_M - v_J)
         np.testing.assert_allclose(found[1] - now, springs, rtol=1e-9)

@@ -1,0 +1,255 @@
+"""What is made of the same content is made once per process.
+
+Setting up functions takes most of the time that building a station takes, and most stations of a
+process, those of a sweep or of a study of margins, have most of their parts in common. What is
+decorated with :func:`once_per_content` must be a function of its arguments alone, and what it
+returns must never be changed by anybody: CasADi functions, frozen dataclasses of them, tuples,
+arrays, which are made read-only.
+"""
+
+import enum
+import functools
+import hashlib
+import struct
+import threading
+import types
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import PurePath
+from typing import Any, ParamSpec, TypeVar
+
+import casadi as ca
+import numpy as np
+
+__all__ = ["NoContentError", "content", "function_digest", "once_per_content"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# of many functions in a process, those whose digests are kept
+_MOST_FUNCTIONS = 1000
+# bytes, up to which nothing is hashed
+_SHORT = 200
+
+
+class NoContentError(TypeError):
+    """What an object is cannot be told from what it holds."""
+
+
+def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator by which a function returns what it returned for the same content.
+
+    The same content is the same types and the same values to the last bit, however deep. Where an
+    argument holds what has no content, a Drake system for example, the function is called anew.
+
+    Args:
+        most_kept: Of how many contents results are kept, those asked for last.
+    """
+
+    def decorator(function: Callable[P, R]) -> Callable[P, R]:
+        kept: OrderedDict[Any, R] = OrderedDict()
+        lock = threading.Lock()
+
+        @functools.wraps(function)
+        def once(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                key = content((args, sorted(kwargs.items())))
+            except NoContentError:
+                return function(*args, **kwargs)
+            with lock:
+                if key in kept:
+                    kept.move_to_end(key)
+                    return kept[key]
+            made = function(*args, **kwargs)
+            for part in made if isinstance(made, tuple) else (made,):
+                if isinstance(part, np.ndarray):
+                    part.flags.writeable = False
+            with lock:
+                # what another thread was first to make has been handed out
+                made = kept.setdefault(key, made)
+                kept.move_to_end(key)
+                while len(kept) > most_kept:
+                    kept.popitem(last=False)
+            return made
+
+        return once
+
+    return decorator
+
+
+def content(value: Any) -> tuple[bytes, tuple[Any, ...]]:
+    """Return a key that is equal for equal content, and for nothing else.
+
+    Numbers, text, arrays, containers and CasADi functions are told by their values; objects by
+    their type and attributes, those left out that a ``cached_property`` has found. An object that
+    less decides over says what by a method ``__content__``. Types and functions of Python are
+    themselves; of closures and bound methods what they hold counts as well.
+
+    Args:
+        value: Anything.
+
+    Returns:
+        A digest, and the types and functions that it rests on.
+
+    Raises:
+        NoContentError: If something in it has no such content.
+    """
+    walk = _Walk()
+    return walk.digest(value), tuple(walk.met)
+
+
+def function_digest(function: ca.Function) -> bytes:
+    """Return a digest of what a CasADi function does.
+
+    Args:
+        function: Any function.
+    """
+    key = function.__hash__()
+    found = _digests.get(key)
+    if found is None:
+        found = function, hashlib.sha256(function.serialize().encode()).digest()
+        with _digests_lock:
+            # the function is kept, for the key is its address
+            _digests[key] = found
+            while len(_digests) > _MOST_FUNCTIONS:
+                _digests.popitem(last=False)
+    return found[1]
+
+
+_digests: OrderedDict[int, tuple[ca.Function, bytes]] = OrderedDict()
+_digests_lock = threading.Lock()
+
+
+class _Walk:
+    """A walk through a value and all that it holds, each object once."""
+
+    def __init__(self) -> None:
+        self.met: dict[Any, int] = {}
+        # the objects are kept, for the keys are their addresses; None of those not left yet
+        self._known: dict[int, tuple[Any, bytes | None]] = {}
+
+    def digest(self, value: Any) -> bytes:
+        """Return the digest of a value."""
+        atom = _atom(value)
+        if atom is not None:
+            return atom
+        known = self._known.get(id(value))
+        if known is None:
+            self._known[id(value)] = value, None
+            tag, parts = self._parts(value)
+            found = _hash(tag, (self.digest(part) for part in parts))
+            self._known[id(value)] = value, found
+            return found
+        if known[1] is None:
+            raise NoContentError(f"{type(value).__name__}: holds itself")
+        return known[1]
+
+    def _met(self, thing: Any) -> bytes:
+        return b"m%d" % self.met.setdefault(thing, len(self.met))
+
+    def _parts(self, value: Any) -> tuple[bytes, Iterable[Any]]:
+        """Return what kind of object it is, and what it holds."""
+        if isinstance(value, ca.Function):
+            return b"function", [function_digest(value)]
+        if isinstance(value, type | types.BuiltinFunctionType | types.CodeType | np.ufunc):
+            return self._met(value), []
+        if isinstance(value, types.FunctionType):
+            held = [cell.cell_contents for cell in value.__closure__ or ()]
+            defaults = value.__defaults__, value.__kwdefaults__
+            return self._met(value.__code__), [value.__module__, held, *defaults]
+        if isinstance(value, types.MethodType):
+            return b"method", [value.__self__, value.__func__]
+        if isinstance(value, functools.partial):
+            return b"partial", [value.func, value.args, value.keywords]
+        kind = self._met(type(value))
+        if isinstance(value, enum.Enum):
+            return kind, [value.name]
+        if isinstance(value, np.ndarray | np.generic):
+            if value.dtype.hasobject:
+                raise NoContentError(f"array of {value.dtype}")
+            return kind, [value.dtype.str, value.shape, value.tobytes()]
+        if isinstance(value, ca.DM):
+            return kind, [value.sparsity(), np.array(value.nonzeros())]
+        if isinstance(value, ca.Sparsity):
+            return kind, [value.size1(), value.size2(), *value.get_triplet()]
+        if isinstance(value, ca.SX | ca.MX):
+            return kind, [_constant(value)]
+        if isinstance(value, PurePath):
+            return kind, [str(value)]
+        if isinstance(value, slice):
+            return kind, [value.start, value.stop, value.step]
+        if isinstance(value, set | frozenset):
+            return kind, sorted(self.digest(part) for part in value)
+        if isinstance(value, tuple | list):
+            return kind, value
+        if isinstance(value, Mapping):
+            return kind, [part for item in value.items() for part in item]
+        if hasattr(type(value), "__content__"):
+            return kind, [value.__content__()]
+        return kind, _reduced(value)
+
+
+def _atom(value: Any) -> bytes | None:
+    """Return a value's own digest if it holds nothing, None otherwise."""
+    kind = type(value)
+    if kind is float:
+        return b"f" + struct.pack("<d", value)
+    if kind is str:
+        return _short(b"s", value.encode("utf-8", "surrogatepass"))
+    if kind is int:
+        return b"i%d" % value
+    if kind is bool or value is None:
+        return b"n" if value is None else b"t" if value else b"0"
+    if kind is bytes:
+        return _short(b"b", value)
+    return None
+
+
+def _short(kind: bytes, value: bytes) -> bytes:
+    if len(value) < _SHORT:
+        return kind + value
+    return kind.upper() + hashlib.sha256(value).digest()
+
+
+def _constant(value: ca.SX | ca.MX) -> ca.Function:
+    """Return an expression without symbols as a function."""
+    try:
+        return ca.Function("constant", [], [value])
+    except RuntimeError:
+        raise NoContentError(f"{value}: has symbols") from None
+
+
+def _reduced(value: Any) -> list[Any]:
+    """Return what pickle would write of an object."""
+    try:
+        made = value.__reduce_ex__(2)
+    except Exception as error:
+        raise NoContentError(f"{type(value).__name__}: {error}") from None
+    if isinstance(made, str):
+        return [made]
+    maker, arguments, *rest = made
+    state, *items = [*rest, None][: len(rest) or 1]
+    parts = state if isinstance(state, tuple) else (state,)
+    return [
+        maker,
+        arguments,
+        *(_attributes(type(value), part) for part in parts),
+        *(None if part is None else list(part) for part in items[:2]),
+    ]
+
+
+def _attributes(kind: type, state: Any) -> Any:
+    """Return an object's attributes by name, without those that follow from others."""
+    if not isinstance(state, dict):
+        return state
+    return [
+        (name, state[name])
+        for name in sorted(state)
+        if not isinstance(getattr(kind, name, None), functools.cached_property)
+    ]
+
+
+def _hash(tag: bytes, parts: Iterable[bytes]) -> bytes:
+    """Return what tells several parts from all others: themselves if they are short."""
+    told = b"".join(b"%d:%s" % (len(part), part) for part in (tag, *parts))
+    return b"p" + told if len(told) < _SHORT else b"h" + hashlib.sha256(told).digest()
