@@ -68,6 +68,24 @@ def start(station):
     return simulator, simulator.get_mutable_context()
 
 
+def test_a_second_station_shares_functions_and_nothing_that_changes(settings, station):
+    again = build_station(settings, Path())
+    assert again.law.function is station.law.function
+    assert again.law is not station.law
+    assert again.diagram is not station.diagram
+
+
+def test_a_station_that_differs_in_one_number_has_functions_of_its_own(settings, station):
+    settings.controller.max_alpha = np.nextafter(settings.controller.max_alpha, 0.0)
+    other = build_station(settings, Path())
+    assert other.law.function is not station.law.function
+    # what that number does not enter is the same
+    assert other.law.linearization.function is station.law.linearization.function
+    settings.model_error.mass = [np.nextafter(1.0, 2.0), 1.0, 1.0]
+    heavier = build_station(settings, Path())
+    assert heavier.law.linearization.function is not other.law.linearization.function
+
+
 def test_wiring(station):
     assert wires(station.diagram) == WIRES
     assert station.diagram.get_name() == "pfc_elastic_3r"
