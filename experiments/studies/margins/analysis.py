@@ -176,7 +176,7 @@ class _Study:
         for instant in instants:
             self.progress(instant.time, f"linearizing, {error}")
             section = self.section(loop, instant, error.unknown_mass)
-            is_same = loop.plant_alone_remembers and error.unknown_mass == 0.0
+            is_same = loop.rest_is_physics and error.unknown_mass == 0.0
             plant = self.plants.get(instant.time, ()) if is_same else ()
             loops.append(linearize(loop, section, self.chosen, plant))
             if is_same and loops[-1] is not None:

@@ -72,10 +72,11 @@ class StationLoop:
         configure(simulator, _SCHEME, self._step)
 
     @property
-    def plant_alone_remembers(self) -> bool:
-        """Whether the plant, which no belief changes, is all that remembers beside blocks."""
-        plant = self.map.rows(self.station.part.plant)
-        return np.array_equal(self.derivative.rest, plant)
+    def rest_is_physics(self) -> bool:
+        """Whether beside blocks only the plant and a spring remember, which no belief changes."""
+        physics = [self.map.rows(self.station.part.plant)]
+        physics += [] if self.spring is None else [self.map.rows(self.spring)]
+        return np.array_equal(self.derivative.rest, np.sort(np.concatenate(physics)))
 
     def has_failed(self, root: Context) -> bool:
         """Return whether a system is in its safe state.

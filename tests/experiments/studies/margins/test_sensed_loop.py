@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import read_scenario
+from experiments.studies.margins.box import Error
 from experiments.studies.margins.loop import StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
 from pfsc_drake.control.margins.modes import Modes, modes
@@ -120,3 +121,22 @@ def test_what_is_pressed_on_is_a_spring_that_may_be_stiffer_but_not_at_will(ship
     assert linear_modes(loop, pressed, differences).is_stable
     found = linear_modes(loop, stiff, differences)
     assert not found.is_stable
+
+
+def test_plant_and_spring_are_the_same_for_a_loop_that_errs(shipped):
+    loop, section = shipped
+    assert loop.rest_is_physics
+    source = read_scenario("sfc_polish", [])
+    settings = without_error(smooth(load_typed(Scenario, source.data, "sfc_polish"))[0])
+    erring = Error((("mass", -0.05),)).applied_to(settings)
+    other = StationLoop(erring, Path(source.path).parent, loop)
+    sections = section.Clone(), other.map.adopted(section)
+    for one, pressed in zip((loop, other), sections, strict=True):
+        spring = one.spring.GetMyMutableContextFromRoot(pressed)
+        one.spring.set_stiffness(spring, one.spring.stiffness, FORCE)
+    chosen = loop.variables_in_loop([sections[0]])
+    known = linearize(loop, sections[0], chosen)
+    own = linearize(other, sections[1], chosen)
+    reused = linearize(other, sections[1], chosen, known.rest)
+    assert np.abs(own.A - known.A).max() > 1e-3
+    np.testing.assert_allclose(reused.A, own.A, rtol=1e-9, atol=1e-9)
