@@ -4,7 +4,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 
@@ -26,8 +25,6 @@ class Source(NamedTuple):
 
 
 TICK = Source("tick", "tick")
-# of blocks with all inputs: one that stands in several diagrams is made once
-_made: WeakKeyDictionary[Block, "Network"] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -83,14 +80,8 @@ class Network:
         Raises:
             ValueError: If the block's methods return what it has not declared.
         """
-        if not unconnected:
-            if block not in _made:
-                _made[block] = cls._of(block, (), None)
-            return _made[block]
-        return cls._of(block, unconnected, cls.of(block) if like is None else like)
-
-    @classmethod
-    def _of(cls, block: Block, unconnected: Collection[str], like: "Network | None") -> "Network":
+        if unconnected and like is None:
+            like = cls.of(block)
         # the same nodes whatever is connected
         groups = [] if like is None else [node.results for node in like.nodes]
         return cls._grouped(block, frozenset(unconnected), groups)
