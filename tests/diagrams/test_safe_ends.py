@@ -1,5 +1,7 @@
 """How runs end after a fault: they are simulated on, and the robot stands."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 SCENARIOS = find_scenario("pfc_compliant_6r").parent
 AFTER = 1.0
@@ -193,16 +196,14 @@ def test_a_joint_at_its_limit(six_axes, monkeypatch):
     six_axes.compliance = type(six_axes.compliance)()
     six_axes.sensor, six_axes.forces = None, []
     six_axes.reference.velocity = 0.5
-    station = build_station(six_axes, SCENARIOS)
-    kind = type(station.part.belief.robot)
-    limits = kind.gather(station.part.belief.robot, "position_limits").copy()
-    limits[0] = station.start_posture[0] + np.deg2rad([-4.0, 4.0])
-    gather = kind.gather
+    start = build_station(six_axes, SCENARIOS).start_posture[0]
 
-    def narrow(robot, attribute):
-        return limits if attribute == "position_limits" else gather(robot, attribute)
+    def narrow(plant, tool):
+        chain, coordinates = chain_from_plant(plant, tool)
+        first = replace(chain.links[0], position_limits=tuple(start + np.deg2rad([-4.0, 4.0])))
+        return replace(chain, links=(first, *chain.links[1:])), coordinates
 
-    monkeypatch.setattr(kind, "gather", narrow)
+    monkeypatch.setattr("diagrams.robots.arm_model.chain_from_plant", narrow)
     station, result, times, log = go_on(six_axes, 2.0)
     assert result.fault.startswith("joint 1 'joint_1' is at its limit of ")
     check_rest(station, result, times, log)
