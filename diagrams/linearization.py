@@ -5,7 +5,6 @@ differentiated by central differences, while what the blocks put out is held. Bo
 they are wired. So nothing of the controller is modelled a second time.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from pydrake.systems.framework import Context, Diagram, InputPort
 
 from diagrams.one_period_map import OnePeriodMap
 from pfsc_drake.blocks.slope import NetworkSlope, SlopeAt
-from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.block_system import BlockSystem, is_tick, last_tick
 
 # relative to a variable, or absolute if that is larger
 _DIFFERENCE = 1e-6
@@ -25,7 +24,6 @@ _DIFFERENCE_OF_OUTPUTS = 1e-2
 _BEND = 0.05
 # relative to a variable or 1; smaller changes are rounding
 _ROUNDING = 1e-11
-_ROUNDING_OF_TIME = 1e-6  # of a period
 
 
 @dataclass(frozen=True)
@@ -100,8 +98,7 @@ class PeriodDerivative:
         self._held = OnePeriodMap(diagram, step, configure)
         self.states: dict[str, np.ndarray] = {}
         for system, rows in zip(self._blocks, self._states, strict=True):
-            prefix = "" if system.block is None else f"{system.get_name()}."
-            self.states |= {f"{prefix}{name}": where for name, where in rows.items()}
+            self.states |= {system.full_name(name): where for name, where in rows.items()}
         self._find_wires(diagram)
         # with the same variables and the same rest, whatever blocks do at their ticks, the rest
         # arrives at the same
@@ -159,8 +156,7 @@ class PeriodDerivative:
     def _wires(self, points: Sequence[SlopeAt]) -> dict[str, np.ndarray]:
         found: dict[str, np.ndarray] = {}
         for system, point in zip(self._blocks, points, strict=True):
-            prefix = "" if system.block is None else f"{system.get_name()}."
-            found |= {f"{prefix}{name}": point.wire(name) for name in system.network.wires}
+            found |= {system.full_name(name): point.wire(name) for name in system.network.wires}
         return found
 
     def _find_wires(self, diagram: Diagram) -> None:
@@ -216,8 +212,7 @@ class PeriodDerivative:
         for system, slope, u in zip(self._blocks, self._slopes, given, strict=True):
             own = system.GetMyContextFromRoot(root)
             x = {name: system.state(own, name) for name in system.states}
-            tick = math.floor(time / system.period + _ROUNDING_OF_TIME)
-            points.append(slope.at(x, u, tick))
+            points.append(slope.at(x, u, last_tick(time, system.period)))
         return points
 
     def _slope_of_rest(
@@ -278,8 +273,7 @@ class PeriodDerivative:
                 names = [name for name in states if np.isin(states[name], chosen).any()]
             elif self._intervals == 1:
                 names = point.reaching(wires)
-            ticks = time / system.period
-            if abs(ticks - round(ticks)) > _ROUNDING_OF_TIME:  # remembers what it did
+            if not is_tick(time, system.period):  # remembers what it did
                 D[self._memory[k], self._memory[k]], names = 1.0, []
             rows = [states[name] for name in names]
             rows += [size + self._outputs[k, name] for name in ports]

@@ -12,7 +12,6 @@ from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.preparation import naming, prepare
 from experiments.simulation import configure
-from experiments.sweep.definition import fingerprint
 from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.codegen.project import write_project
 from reporting.progress import ProgressListener
@@ -45,7 +44,6 @@ def export_scenario(
     Raises:
         InputError: If the scenario is wrong, or something in its controller is no block.
     """
-    content = fingerprint(scenario)
     simulation = (scenario.data.get("simulation") or {}) | {"fused": False}
     whole = replace(scenario, data=scenario.data | {"simulation": simulation})
     prepared = prepare(whole, None, recording=False, progress=progress)
@@ -60,7 +58,7 @@ def export_scenario(
             title=f"Controller of {prepared.settings.name}",
             presets=part.presets(station, root),
             scenario=prepared.settings.name,
-            hash=content,
+            hash=scenario.fingerprint,
         )
         progress(0.0, "recording a run")
         recorded = record(station, part, prepared.settings.simulation, duration)

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -162,7 +163,7 @@ def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
     difference = None
     if recorded.told is not None and drives["name"] == _TORQUE:
         difference = np.abs(told - recorded.told[row]).max(axis=0)
-    names = [f"{port['name']}_{i + 1}" for port in said["outputs"] for i in range(port["size"])]
+    names = [n for port in said["outputs"] for n in _columns((port["name"],), port["size"])]
     file = folder / COMMANDS
     np.savetxt(
         file,
@@ -221,29 +222,23 @@ def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
             seen = "_measured" if "q_J_measured" in run else ""
             # motors of rigid joints move as the links do, and are not logged
             sides = _LINKS + (_MOTORS if f"q_M{seen}" in run else _LINKS)
-            columns += [found(f"{name}{seen}") for name in sides]
+            values = np.hstack([found(f"{name}{seen}") for name in sides])
         else:
             is_sensor = port["name"] not in run and port["size"] == _WRENCH_SIZE
-            columns.append(found(_WRENCH if is_sensor else port["name"]))
-        if sum(part.shape[1] for part in columns) != sum(
-            p["size"] for p in inputs[: inputs.index(port) + 1]
-        ):
+            values = found(_WRENCH if is_sensor else port["name"])
+        columns.append(values)
+        if values.shape[1] != port["size"]:
             raise InputError(f"{log}: not of this robot; {port['name']} has {port['size']} numbers")
     told = run["tau_d"].values if "tau_d" in run else None
     return _Recorded(run.time, np.hstack(columns), told)
 
 
 def _of_csv(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
-    joints = next((p["size"] // 4 for p in inputs if p["name"] == "joint_state"), 0)
-    motors = [f"{name}_{i + 1}" for name in ("q_M", "v_M") for i in range(joints)]
-    links = [f"{name}_{i + 1}" for name in ("q", "v") for i in range(joints)]
-    others = [
-        f"{port['name']}_{i + 1}"
-        for port in inputs
-        if port["name"] != "joint_state"
-        for i in range(port["size"])
-    ]
-    needed = ["t", *links, *others]
+    sizes = {port["name"]: port["size"] for port in inputs}
+    joints = sizes.get("joint_state", 0) // 4
+    motors, links = _columns(_MOTORS, joints), _columns(("q", "v"), joints)
+    others = {n: _columns((n,), size) for n, size in sizes.items() if n != "joint_state"}
+    needed = ["t", *links, *(column for names in others.values() for column in names)]
 
     def check(place: str, header: list[str]) -> None:
         lacking = [name for name in needed if name not in header]
@@ -257,16 +252,17 @@ def _of_csv(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
         late = table.lines[1 + int(np.argmax(np.diff(times) <= 0.0))]
         raise InputError(f"{log}, line {late}: t does not grow")
     has_motors = all(name in column for name in motors)
-    parts = []
-    for port in inputs:
-        if port["name"] == "joint_state":
-            parts += [column[name] for name in [*links, *(motors if has_motors else links)]]
-        else:
-            parts += [column[f"{port['name']}_{i + 1}"] for i in range(port["size"])]
+    others["joint_state"] = [*links, *(motors if has_motors else links)]
+    parts = [column[name] for port in sizes for name in others[port]]
     assumed = (
         "" if has_motors or not joints else "no q_M, v_M: motors are taken to be where q, v is"
     )
     return _Recorded(times, np.column_stack(parts), assumed=assumed)
+
+
+def _columns(names: Sequence[str], size: int) -> list[str]:
+    """Return ``name_1`` .. ``name_size`` of each name."""
+    return [f"{name}_{i + 1}" for name in names for i in range(size)]
 
 
 def _fed(folder: Path, inputs: np.ndarray, size: int) -> np.ndarray:

@@ -1,7 +1,6 @@
 """Following a path, and for comparison tracking a point that moves along it with time."""
 
 from collections.abc import Iterator
-from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -140,11 +139,6 @@ class PathTask(Task):
         rounding = 1e-9 * self.path.length
         return self.path.closed or -rounding <= eta <= self.path.length + rounding
 
-    @cached_property
-    def _projector(self) -> Projector:
-        """What finds the place; its functions are made once for all stations with this task."""
-        return Projector(self.path.evaluator(self.relative_degree))
-
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -155,7 +149,7 @@ class PathTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "path_projector",
-            BlockSystem(self._projector, period),
+            BlockSystem(Projector(self.path.evaluator(self.relative_degree)), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

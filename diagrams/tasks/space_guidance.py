@@ -1,7 +1,6 @@
 """Leading a tool through space by hand, within virtual fixtures (Sec. 5.1.1, 5.2.4)."""
 
 from collections.abc import Iterator
-from functools import cached_property
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -38,7 +37,6 @@ class SpaceTask(Task):
 
     Attributes:
         fixtures: The regions.
-        lead: What is between the velocity that is asked for and the tool.
         guided: All that it is led through.
 
     Raises:
@@ -64,13 +62,12 @@ class SpaceTask(Task):
         self.manifold = self.place
         given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
         require(bool(given), "start.position", given, allowed)
-        self._start = np.array(given, dtype=float)
-        self.lead = lead_of(scenario)
+        self._start, lead = np.array(given, dtype=float), lead_of(scenario)
         require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
         self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
         speeds = [fixture.largest_speed(self._start) for fixture in self.fixtures]
-        self.guided = Guided(self.place, self.fixtures, speeds, motion, self.lead, parameters)
+        self.guided = Guided(self.place, self.fixtures, speeds, motion, lead, parameters)
         if self.place.is_oriented:
             R_d = self.place.orientation(self.place.point(given)[None])
             self.warnings += euler_warnings(
@@ -90,11 +87,6 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         return SpaceDrawing(self.fixtures, self.place)
 
-    @cached_property
-    def _projector(self) -> Projector:
-        """What finds the place; its functions are made once for all stations with this task."""
-        return Projector(self.place)
-
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -105,7 +97,7 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "tool_place",
-            BlockSystem(self._projector, period),
+            BlockSystem(Projector(self.place), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -94,11 +93,6 @@ class SurfaceTask(Task):
         """See :class:`Task`."""
         return SurfaceDrawing(self.surface, self.place)
 
-    @cached_property
-    def _projector(self) -> Projector:
-        """What finds the place; its functions are made once for all stations with this task."""
-        return Projector(self._evaluator)
-
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -109,7 +103,7 @@ class SurfaceTask(Task):
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "surface_projector",
-            BlockSystem(self._projector, period),
+            BlockSystem(Projector(self._evaluator), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
         return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))

@@ -1,5 +1,7 @@
 """Reading a scenario file: YAML with typed mappings, and ``--set`` overrides on top."""
 
+import hashlib
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -38,6 +40,12 @@ class ScenarioFile:
         """Key ``name`` of the file, else the file's name without suffix, as text."""
         stem = os.fsencode(self.path.stem).decode("utf-8", "replace")
         return str(self.data.get("name", stem))
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of the content."""
+        text = json.dumps([self.name, self.data], sort_keys=True, default=str)
+        return hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()
 
     def inputs(self) -> list[Path]:
         """Returns the file itself and every path that a text in it may stand for."""

@@ -51,7 +51,7 @@ def add_guidance(
     log.add("near_regions", rows["near"], _SLOT_UNITS, slots)
     for name in ("labels", "evaluated", "on"):
         log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), "1", names)
-    distances = task.distances(y_t, region_times(log, task.lead.lag))
+    distances = task.distances(y_t, region_times(log, task.guided.lead.lag))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
     log.add("region_distance", distances, "m", names)
     kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)

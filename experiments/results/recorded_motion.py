@@ -58,7 +58,7 @@ def collect_motion(
 def _region_times(station: Station, log: RunLog, frames: NDArray[np.int_]) -> FloatArray | None:
     """Return the clock of moving regions that the tool meets, if there is one, shape (frames,)."""
     task = station.task
-    return region_times(log, task.lead.lag)[frames] if isinstance(task, SpaceTask) else None
+    return region_times(log, task.guided.lead.lag)[frames] if isinstance(task, SpaceTask) else None
 
 
 def _lifted(station: Station, y_t: FloatArray, points: FloatArray) -> FloatArray | None:

@@ -66,7 +66,7 @@ def _guidance(station: Station, root: Context) -> Callable[[np.ndarray], None]:
     task = station.task
     if not isinstance(task, SpaceTask):
         return lambda y_t: None
-    rest = task.lead.start
+    rest = task.guided.lead.start
     return lambda y_t: station.blocks.set_state(
         root, "fixture_guidance.lead", np.array(rest(y_t)).ravel()
     )

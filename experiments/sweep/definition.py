@@ -1,7 +1,6 @@
 """What makes a sweep the sweep it is, and the file that keeps it with its rows."""
 
 import dataclasses
-import hashlib
 import json
 import shlex
 import time
@@ -9,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.sweep.rows import RunRow
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.text_file import read_text
@@ -95,12 +93,6 @@ _SPOKEN = {
     "duration": "--duration {}",
     "content": "another scenario, or one that has changed since",
 }
-
-
-def fingerprint(scenario: ScenarioFile) -> str:
-    """Returns the SHA-256 of a scenario's content."""
-    text = json.dumps([scenario.name, scenario.data], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode("utf-8", "backslashreplace")).hexdigest()
 
 
 class SweepRecord:

@@ -10,7 +10,7 @@ from rich.console import Console
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
 from experiments.sweep.cluster import count_cores
-from experiments.sweep.definition import SweepDefinition, SweepRecord, fingerprint
+from experiments.sweep.definition import SweepDefinition, SweepRecord
 from experiments.sweep.figures import draw_sweep
 from experiments.sweep.many import run_many
 from experiments.sweep.progress import SweepProgress
@@ -125,7 +125,7 @@ def define_sweep(
         duration,
         samples,
         seed,
-        fingerprint(loaded),
+        loaded.fingerprint,
     )
     tasks = [RunTask.of(_varied(loaded, sample), duration) for sample in drawn]
     _check_keys(loaded, tasks)

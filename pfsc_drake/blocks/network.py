@@ -67,23 +67,18 @@ class Network:
     initials: tuple[Node, ...] = ()
 
     @classmethod
-    def of(
-        cls, block: Block, unconnected: Collection[str] = (), like: "Network | None" = None
-    ) -> "Network":
+    def of(cls, block: Block, unconnected: Collection[str] = ()) -> "Network":
         """Return the network that a block is.
 
         Args:
             block: The block.
             unconnected: Optional inputs that nothing is connected to.
-            like: The same block with all inputs, if it has been made, whose nodes this one has.
 
         Raises:
             ValueError: If the block's methods return what it has not declared.
         """
-        if unconnected and like is None:
-            like = cls.of(block)
         # the same nodes whatever is connected
-        groups = [] if like is None else [node.results for node in like.nodes]
+        groups = [node.results for node in cls.of(block).nodes] if unconnected else []
         return cls._grouped(block, frozenset(unconnected), groups)
 
     @classmethod

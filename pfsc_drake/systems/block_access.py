@@ -20,13 +20,14 @@ class BlockAccess:
 
     def _collect(self, diagram: Diagram, path: str) -> None:
         for system in diagram.GetSystems():
-            inner = f"{path}{system.get_name()}."
             if isinstance(system, BlockSystem):
-                prefix = path if system.block is None else inner
-                self._states |= {f"{prefix}{name}": (system, name) for name in system.states}
-                self._wires |= {f"{prefix}{name}": (system, name) for name in system.network.wires}
+                for found, names in (
+                    (self._states, system.states),
+                    (self._wires, system.network.wires),
+                ):
+                    found |= {f"{path}{system.full_name(name)}": (system, name) for name in names}
             elif isinstance(system, Diagram):
-                self._collect(system, inner)
+                self._collect(system, f"{path}{system.get_name()}.")
 
     def output(self, root: Context, name: str) -> np.ndarray:
         """Return what a block puts out.

@@ -23,7 +23,7 @@ from pfsc_drake.blocks.network import TICK, Network, Source
 from pfsc_drake.blocks.program import Needs, Program, Stage
 from pfsc_drake.compiled.bound_function import BoundFunction
 
-_ROUNDING = 1e-6  # of a period
+_ROUNDING = 1e-6  # of a period, by which a time may miss a tick
 _STARTED = 0
 _NOTHING: frozenset[str] = frozenset()
 
@@ -98,6 +98,14 @@ class BlockSystem(LeafSystem):
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         if declared.size:
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def full_name(self, name: str) -> str:
+        """Return ``block.name`` of a state or a wire; those of a network are called so already.
+
+        Args:
+            name: Of the state or wire.
+        """
+        return name if self.block is None else f"{self.get_name()}.{name}"
 
     def state(self, context: Context, name: str) -> np.ndarray:
         """Return a state, as it is set or remembered.
@@ -210,7 +218,7 @@ class BlockSystem(LeafSystem):
             program = self._declared
             if left:
                 assert self.block is not None  # a network leaves no input open
-                program = Program.of(Network.of(self.block, left, self.network), self._declared)
+                program = Program.of(Network.of(self.block, left), self._declared)
             self._programs[left] = _Functions(program, self._declared.update_stage)
         return self._programs[left]
 
@@ -242,7 +250,7 @@ class BlockSystem(LeafSystem):
                 functions.x[part] = state.value(group)
         else:
             functions.x[:] = self._begun(context, needs_at_start)[self._x]
-        functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
+        functions.t[0] = last_tick(context.get_time(), self.period)
         for name in inputs:
             functions.u[name][:] = self._inputs[name].Eval(context)
 
@@ -265,7 +273,7 @@ class BlockSystem(LeafSystem):
             functions.u[name][:] = value
         before = self._variables(context)
         functions.x[:], functions.preset[:] = before[self._x], before[self._preset]
-        functions.t[0] = math.floor(context.get_time() / self.period + _ROUNDING)
+        functions.t[0] = last_tick(context.get_time(), self.period)
         functions.initial.evaluate()
         begun = np.zeros(len(before))
         begun[_STARTED], begun[self._x] = 1.0, functions.initial.results["x_start"]
@@ -295,6 +303,29 @@ class BlockSystem(LeafSystem):
             functions.made[k][:] = values
         functions.update.evaluate()
         return functions.update.results["x_next"]
+
+
+def last_tick(time: float, period: float) -> int:
+    """Return the number of the last tick, that at time zero being 0.
+
+    Args:
+        time: The present instant [s], which may be a tick.
+        period: Sampling time [s].
+    """
+    return math.floor(time / period + _ROUNDING)
+
+
+def is_tick(time: float, period: float) -> bool:
+    """Return whether blocks sample at an instant.
+
+    Between two ticks they know their memory alone: what they would make of their inputs there,
+    which have moved on by part of a period, is nothing that they ever see.
+
+    Args:
+        time: The instant [s].
+        period: Sampling time [s].
+    """
+    return abs(time / period - round(time / period)) < _ROUNDING
 
 
 def _stages(program: Program, update_stage: int | None) -> list[Stage]:

@@ -5,8 +5,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.systems.block_access import BlockAccess
-
-_ROUNDING = 1e-6  # of a period
+from pfsc_drake.systems.block_system import is_tick
 
 
 class FaultAccess:
@@ -34,7 +33,7 @@ class FaultAccess:
             root: Context of the diagram.
         """
         latch = f"{self.name}.fault_latch.fault"
-        read = blocks.output if self._is_tick(root) else blocks.state
+        read = blocks.output if is_tick(root.get_time(), self.period) else blocks.state
         return Fault(int(read(root, latch)[0]))
 
     def suspects(self, blocks: BlockAccess, root: Context) -> np.ndarray:
@@ -45,15 +44,6 @@ class FaultAccess:
             root: Context of the diagram.
         """
         ignored = blocks.state(root, f"{self.name}.safe_stop.ignored")
-        if not (self._is_supervised and self._is_tick(root)):
+        if not (self._is_supervised and is_tick(root.get_time(), self.period)):
             return ignored
         return np.maximum(ignored, blocks.output(root, f"{self.name}.supervision.suspects"))
-
-    def _is_tick(self, root: Context) -> bool:
-        """Return whether blocks sample at the present instant.
-
-        Between two ticks they know their memory alone: what they would make of their inputs there,
-        which have moved on by part of a period, is nothing that they ever see.
-        """
-        ticks = root.get_time() / self.period
-        return abs(ticks - round(ticks)) < _ROUNDING

@@ -173,7 +173,7 @@ def network_of(system: System, unconnected: Collection[str] = ()) -> Network:
     if isinstance(system, BlockSystem):
         if system.block is None or not unconnected:
             return system.network
-        return Network.of(system.block, unconnected, system.network)
+        return Network.of(system.block, unconnected)
     assert isinstance(system, Diagram)
     wiring = Wiring()
     connections: Connections = system.connection_map()

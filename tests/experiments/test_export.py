@@ -10,7 +10,6 @@ import pytest
 from experiments.catalog.scenario_file import read_scenario
 from experiments.export import export_scenario
 from experiments.replay import check_export
-from experiments.sweep.definition import fingerprint
 from tests.compilers import needs_gcc
 
 TICKS = 40
@@ -41,7 +40,7 @@ def test_what_is_written_and_said(elastic):
     assert [(port["name"], port["size"]) for port in said["inputs"]] == [("joint_state", 24)]
     names = ["drive_torque", "manifold_state", "status", "fault", "reference"]
     assert [port["name"] for port in said["outputs"]] == names
-    assert (said["scenario"], said["hash"]) == (ARM, fingerprint(read_scenario(ARM, [])))
+    assert (said["scenario"], said["hash"]) == (ARM, read_scenario(ARM, []).fingerprint)
     assert recorded.shape == (TICKS, 24 + sum(port["size"] for port in said["outputs"]))
     assert "joint_state" in (folder / "README.md").read_text(encoding="utf-8")
 

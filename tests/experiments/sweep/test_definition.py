@@ -7,7 +7,7 @@ import shlex
 import pytest
 
 from experiments.catalog.scenario_file import read_scenario
-from experiments.sweep.definition import RECORD, SweepDefinition, SweepRecord, fingerprint
+from experiments.sweep.definition import RECORD, SweepDefinition, SweepRecord
 from experiments.sweep.rows import FAILED, RunRow
 from pfsc_drake import InputError
 from reporting.folder import open_results
@@ -104,6 +104,6 @@ def test_commands_can_be_typed():
 
 
 def test_the_fingerprint_is_of_the_content():
-    one, same = (fingerprint(read_scenario("pfc_elastic_3r", [])) for _ in range(2))
+    one, same = (read_scenario("pfc_elastic_3r", []).fingerprint for _ in range(2))
     assert one == same
-    assert fingerprint(read_scenario("pfc_elastic_3r", ["reference.dwell=0.4"])) != one
+    assert read_scenario("pfc_elastic_3r", ["reference.dwell=0.4"]).fingerprint != one
