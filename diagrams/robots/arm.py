@@ -30,13 +30,13 @@ from diagrams.scenario import Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import MULTIBODY
 from diagrams.workpiece import Workpiece
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, state_at_rest
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
+from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 from pfsc_drake.systems.plants.joint_reaction import reaction_index

@@ -11,7 +11,6 @@ from pydrake.multibody.tree import Frame, Joint
 from diagrams.robots.belief import Belief, naming_model_error
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters, Scenario
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
@@ -20,6 +19,7 @@ from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
+from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 
 

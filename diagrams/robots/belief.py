@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad
 
 
 @dataclass(frozen=True)

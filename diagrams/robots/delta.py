@@ -27,7 +27,6 @@ from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
 from diagrams.workpiece import Workpiece, upwards
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.believed_delta import believed_delta
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
@@ -40,6 +39,7 @@ from pfsc_drake.robot.delta.multibody import (
 from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 from pfsc_drake.systems.plants.joint_reaction import reaction_index

@@ -9,11 +9,11 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, Outpu
 
 from diagrams.robots.belief import Belief
 from diagrams.scenario import Scenario, StartParameters
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
+from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 
 # output ports by what they carry

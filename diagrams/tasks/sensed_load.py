@@ -10,12 +10,12 @@ from pfsc_drake.control.compliance.carried_inertia import (
     load_inertia,
 )
 from pfsc_drake.control.compliance.taring import TARING_BLOCK
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.manifold import Kind
 from pfsc_drake.physics.joint_encoders import encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad
 
 # of the inertia below the sensor at which the loop becomes unstable, up to which it is robust
 _ROBUST = 0.5

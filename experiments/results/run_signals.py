@@ -13,12 +13,12 @@ from experiments.results.posture_signals import add_posture, posture_signals
 from experiments.results.press_signals import add_pressing, is_pressed
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
-from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.manifolds.manifold import Kind, indices
 from pfsc_drake.robot.robot_model import pose_function
+from pfsc_drake.robot.tool_load import joint_torque_function
 
 
 def collect_log(station: Station, root: Context) -> RunLog:

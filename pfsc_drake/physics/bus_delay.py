@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_of, is_finite, where
+from pfsc_drake.blocks.cases import all_of, is_finite, where
 from pfsc_drake.errors import InputError
 
 MAX_PERIODS = 10_000  # in a delay; every sample of it is moved at every tick

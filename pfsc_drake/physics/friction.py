@@ -6,8 +6,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.checks import checked_vector
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.checks import checked_vector
 from pfsc_drake.errors import InputError
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.control.cases import where
+from pfsc_drake.blocks.cases import where
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.physics.force_profile import FRAMES, smooth_step
 from pfsc_drake.physics.hand_orientation import OrientationTarget, rotation_vector

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.cases import first_of, where
+from pfsc_drake.blocks.cases import first_of, where
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.physics.hand_way import Legs
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from pfsc_drake import jets
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import any_of, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import any_of, where
-from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import points_on_links
+from pfsc_drake.robot.tool_load import joint_torque_function
 
 # index of a link, and where on it [m], shape (3,)
 Points = Sequence[tuple[int, np.ndarray]]

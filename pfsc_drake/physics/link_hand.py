@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, all_of, any_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, where
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_profile import require_vector
 from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.block import Port, Values
-from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.physics.hand_model import HandParameters, limited, orientation
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_parameters import MountingHandParameters

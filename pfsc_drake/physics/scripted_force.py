@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.physics.force_profile import ForceProfile
 

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import where
+from pfsc_drake.blocks.cases import where
 from pfsc_drake.errors import InputError
 
 FailureKind = Literal["nan", "frozen", "jump"]

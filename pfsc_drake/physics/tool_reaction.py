@@ -2,9 +2,9 @@
 
 import casadi as ca
 
-from pfsc_drake.control.compliance.tool_load import ToolLoad, predicted_load
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
 
 
 def tool_reaction_function(robot: RobotModel, load: ToolLoad) -> ca.Function:

@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
-from pfsc_drake.control.checks import checked_vector
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.checks import checked_vector
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function, mass_function

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.block import Block, Port
+from pfsc_drake.blocks.cases import all_finite, latched, where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.control.cases import all_finite, latched, where
 from pfsc_drake.errors import InputError
 from tests.compilers import needs_gcc
 

@@ -12,8 +12,8 @@ from diagrams.linearization import PeriodDerivative
 from diagrams.one_period_map import OnePeriodMap
 from experiments.simulation import configure
 from pfsc_drake.blocks.block import Block, Port
+from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.wiring_blocks import Hold
-from pfsc_drake.control.cases import where
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import fuse_blocks
 

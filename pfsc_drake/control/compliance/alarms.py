@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import first_of
+from pfsc_drake.blocks.cases import first_of
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.control.law.fault import Fault
 

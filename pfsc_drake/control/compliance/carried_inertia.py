@@ -15,9 +15,9 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
 
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad
 
 
 def load_inertia(

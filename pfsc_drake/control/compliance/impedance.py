@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from pfsc_drake.control.cases import all_finite, all_of, first_of, is_finite, where
+from pfsc_drake.blocks.cases import all_finite, all_of, first_of, is_finite, where
 from pfsc_drake.control.compliance.impedance_transition import rates_of, transition_of
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices

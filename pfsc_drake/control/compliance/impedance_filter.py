@@ -6,7 +6,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, all_of, first_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, first_of, where
 from pfsc_drake.control.compliance.impedance import (
     STIFFNESS,
     ImpedanceLaw,

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from pfsc_drake.control.cases import where
+from pfsc_drake.blocks.cases import where
 
 # below these the roots of the characteristic polynomial lose digits that the series keeps
 _SERIES_DAMPING, _SERIES_STIFFNESS, _SERIES_TERMS = 0.5, 0.25, 20

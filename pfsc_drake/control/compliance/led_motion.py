@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, any_of, unit, where
+from pfsc_drake.blocks.cases import all_finite, any_of, unit, where
 from pfsc_drake.control.fixtures.program import SLOTS, program_function
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds, tightest_function
 from pfsc_drake.control.manifolds.manifold import Kind, Manifold, indices

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import companion, expm
 
-from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.errors import InputError
 
 

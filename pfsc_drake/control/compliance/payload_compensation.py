@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import is_finite, where
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 
 

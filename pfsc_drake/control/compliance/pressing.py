@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_of, where
+from pfsc_drake.blocks.cases import all_of, where
 
 
 class Pressing(Block):

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Values
-from pfsc_drake.control.cases import all_of, any_of, where
+from pfsc_drake.blocks.cases import all_of, any_of, where
 
 # s, over whose means a sensor is judged to be quiet
 TARING_BLOCK = 0.01

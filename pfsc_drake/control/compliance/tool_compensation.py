@@ -8,19 +8,19 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.control.compliance.still_components import (
     STILL_TIME,
     memory_size,
     stands_still,
 )
 from pfsc_drake.control.compliance.taring import TARING_BLOCK, Taring
-from pfsc_drake.control.compliance.tool_load import ToolLoad, dead_band, predicted_load
 from pfsc_drake.control.estimation.low_pass import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
 
 _INERTIA = ("none", "differentiated", "given")
 

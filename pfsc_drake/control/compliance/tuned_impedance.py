@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
+from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
 from pfsc_drake.errors import InputError

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import all_finite, where
 from pfsc_drake.control.compliance.null_space_impedance import NullSpaceImpedance
 from pfsc_drake.control.law.decoupling import free_torque, scale_of
 from pfsc_drake.control.law.posture import Posture

@@ -5,10 +5,10 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import all_finite, where
-from pfsc_drake.control.compliance.tool_load import joint_torque_function
+from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import joint_torque_function
 
 
 class ExternalTorque(Block):

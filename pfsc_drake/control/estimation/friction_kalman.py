@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import kept_if_finite, where
-from pfsc_drake.control.checks import checked_vector
+from pfsc_drake.blocks.cases import kept_if_finite, where
+from pfsc_drake.checks import checked_vector
 from pfsc_drake.control.estimation.friction_model import friction_torque, require_smoothing
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
 from pfsc_drake.errors import InputError

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.checks import checked_vector
+from pfsc_drake.checks import checked_vector
 from pfsc_drake.errors import InputError
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import kept_if_finite, where
+from pfsc_drake.blocks.cases import kept_if_finite, where
 from pfsc_drake.control.estimation.generalized_momentum import MomentumModel
 from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
 

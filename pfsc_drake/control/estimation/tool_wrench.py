@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.compliance.tool_load import dead_band, joint_torque_function
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import dead_band, joint_torque_function
 
 _POSITION_ONLY = 3
 

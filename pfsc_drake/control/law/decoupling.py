@@ -6,8 +6,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.control.cases import all_finite, where
-from pfsc_drake.control.linear_algebra import cholesky, householder, solve, solve_upper
+from pfsc_drake.blocks.cases import all_finite, where
+from pfsc_drake.blocks.linear_algebra import cholesky, householder, solve, solve_upper
 from pfsc_drake.errors import InputError
 
 # of a posture's coordinate, by which part of itself it must move with the outputs at rest

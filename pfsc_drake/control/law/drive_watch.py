@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import any_of, first_of, where
+from pfsc_drake.blocks.cases import any_of, first_of, where
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.supervision import SupervisionParameters
 

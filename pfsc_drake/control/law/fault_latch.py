@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import first_of, latched, where
+from pfsc_drake.blocks.cases import first_of, latched, where
 
 
 class FaultLatch(Block):

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Values
+from pfsc_drake.blocks.cases import all_finite
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import all_finite
 from pfsc_drake.control.law.decoupling import DecouplingInverse, Spare
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
 from pfsc_drake.control.law.law_functions import (

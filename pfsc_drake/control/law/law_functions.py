@@ -7,7 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.control.cases import all_finite, all_of, any_of, first_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.control.law.decoupling import DecouplingSolution, Restraint, Spare, scale_of
 from pfsc_drake.control.law.exact_linearization import Relation
 from pfsc_drake.control.law.fault import Fault

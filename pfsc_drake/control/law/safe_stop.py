@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import is_finite, where
 from pfsc_drake.control.law.stopping_step import (
     Joints,
     StopMemory,

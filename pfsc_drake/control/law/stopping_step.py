@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.cases import is_finite
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import is_finite
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.cases import is_finite, where
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.errors import require_positive
 
 

@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import any_of, first_of, is_finite, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.cases import any_of, first_of, is_finite, where
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import where
 from pfsc_drake.checks import require_positive
-from pfsc_drake.control.cases import where
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.piece_table import PieceTable
 from pfsc_drake.jets import Jet, compose

@@ -7,8 +7,8 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import joint_torque_function
 
 
 class ExternalWrench(LeafSystem):

@@ -3,8 +3,8 @@
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, JointIndex, RigidBody, SpatialInertia, WeldJoint
 
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.tool_load import ToolLoad
 
 
 def tool_load_from_plant(plant: MultibodyPlant, joint: Joint, tool_frame: Frame) -> ToolLoad:

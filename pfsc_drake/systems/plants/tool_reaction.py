@@ -3,9 +3,9 @@
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.control.compliance.tool_load import ToolLoad
 from pfsc_drake.physics.tool_reaction import tool_reaction_function
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad
 
 
 class ToolReaction(LeafSystem):

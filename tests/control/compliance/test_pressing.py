@@ -6,10 +6,10 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.cases import where
 from pfsc_drake.control.compliance.impedance import (
     CoordinateImpedance,
     ImpedanceLaw,

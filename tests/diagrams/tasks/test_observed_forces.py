@@ -7,8 +7,8 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, JointFrictionParameters
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from pfsc_drake.control.compliance.tool_load import joint_torque_function
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.tool_load import joint_torque_function
 
 
 def run(settings, duration):

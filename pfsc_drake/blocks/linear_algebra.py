@@ -9,7 +9,7 @@ import itertools
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.control.cases import all_finite, all_of, where
+from pfsc_drake.blocks.cases import all_finite, all_of, where
 
 _SWEEPS = 6
 

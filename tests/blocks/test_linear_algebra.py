@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from pfsc_drake.control import linear_algebra
+from pfsc_drake.blocks import linear_algebra
 
 NAN, INF = np.nan, np.inf
 

@@ -10,11 +10,11 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces, SpatialInertia
 
 from pfsc_drake.control.compliance.tool_compensation import compensation_function
-from pfsc_drake.control.compliance.tool_load import dead_band, joint_torque_function
 from pfsc_drake.control.estimation.low_pass import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
+from pfsc_drake.robot.tool_load import dead_band, joint_torque_function
 from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 
 PERIOD = 1e-3

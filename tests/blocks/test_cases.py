@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control import cases
+from pfsc_drake.blocks import cases
 
 NAN, INF = np.nan, np.inf
 
