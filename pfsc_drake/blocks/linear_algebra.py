@@ -110,7 +110,8 @@ def symmetric_eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
     for p, q in _SWEEPS * list(itertools.combinations(range(n), 2)):
         x, gap = A[p, q], A[q, q] - A[p, p]
         longer = gap + ca.copysign(ca.sqrt(gap**2 + 4.0 * x**2), gap)
-        t = where(x == 0.0, 0.0, 2.0 * x / longer)
+        # also what is so small that its square is zero
+        t = where(longer == 0.0, 0.0, 2.0 * x / longer)
         c = 1.0 / ca.sqrt(1.0 + t**2)
         for i in set(range(n)) - {p, q}:
             turned = c * (A[i, p] - t * A[i, q]), c * (A[i, q] + t * A[i, p])

@@ -133,6 +133,13 @@ def test_substitution(transposed):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize("tiny", [1e-170, 5e-324])
+def test_eigenvalues_where_the_squares_beside_the_diagonal_are_zero(tiny):
+    found, V = on_numbers("symmetric_eigen", np.eye(3) + tiny * (1.0 - np.eye(3)))
+    np.testing.assert_array_equal(found.ravel(), np.ones(3))
+    np.testing.assert_allclose(V.T @ V, np.eye(3), atol=1e-15)
+
+
 @pytest.mark.parametrize("n", [1, 2, 3, 6, 7])
 def test_eigenvalues_and_vectors(n):
     """Also where they are all the same, nearly the same, or some are zero."""
