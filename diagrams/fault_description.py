@@ -11,7 +11,8 @@ from diagrams.signal_log import SignalLog
 from diagrams.wording import coordinate_text, listed, posture_text
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.manifolds.manifold import Kind, PlaceManifold, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import PlaceManifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import euler_margin
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds

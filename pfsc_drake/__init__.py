@@ -32,7 +32,7 @@ _DOOR = {
     "ControllerParameters": "pfsc_drake.following.options.controller",
     "CoordinateImpedance": "pfsc_drake.control.compliance.impedance",
     "FaultParameters": "pfsc_drake.following.options.faults",
-    "Fixture": "pfsc_drake.control.fixtures.fixture",
+    "Fixture": "pfsc_drake.control.fixtures.parameters",
     "Follower": "pfsc_drake.following.follower",
     "FollowerOptions": "pfsc_drake.following.options.follower",
     "GainParameters": "pfsc_drake.following.options.controller",

@@ -15,7 +15,7 @@ from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold, Sum
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.tool_kinematics import ToolKinematics
+from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.physics.decoupled_force import DecoupledForce
 from pfsc_drake.physics.force_profile import ForceProfile
 from pfsc_drake.physics.scripted_force import ScriptedForce

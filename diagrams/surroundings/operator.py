@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator_file import columns, read_controls
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, WISHES
-from pfsc_drake.control.tool_kinematics import ToolKinematics
+from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import ASKED, LiveHand
 from pfsc_drake.robot.robot_model import RobotModel

@@ -12,7 +12,8 @@ from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.control.planning.course import CourseFinder, CourseStart
 from pfsc_drake.control.planning.drive_demand import DriveDemand, DriveLimits, with_pace
 from pfsc_drake.control.planning.pace import Clock, allowed_demand, find_pace

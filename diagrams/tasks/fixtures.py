@@ -12,7 +12,7 @@ from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.scenario.region import Box, RegionParameters
 from diagrams.tasks.region import make_region
 from diagrams.tasks.surface import surface_from_shape
-from pfsc_drake.control.fixtures.fixture import Fixture
+from pfsc_drake.control.fixtures.parameters import Fixture
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.checks import (

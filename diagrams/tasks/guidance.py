@@ -2,8 +2,8 @@
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.space_guidance import lead_of
-from pfsc_drake.control.fixtures.labels import Mode
-from pfsc_drake.control.fixtures.soft_region import bearable_stiffness
+from pfsc_drake.control.fixtures.parameters import bearable_stiffness
+from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.fixtures import free_motion
 

@@ -18,7 +18,8 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.following.gains import sampled_robot
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.resonance import joint_resonances

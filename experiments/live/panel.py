@@ -9,7 +9,7 @@ from diagrams.surroundings.operator import PULL, REGIONS, WISH, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.pages import Pages
 from pfsc_drake.control.compliance.tuned_impedance import wishes_of
-from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.control.manifolds.coordinate import Kind
 
 _DEAD_ZONE = 0.12  # of a stick
 _FARTHEST = 0.3  # m, of the place to hold at from where the hand took hold

@@ -14,7 +14,8 @@ from experiments.live.holding import (
 )
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 
 # below it, time is said to be slower than the clock
 _SLOW = 0.95

@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.station import Station
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.estimation.generalized_momentum import drive_momentum
+from pfsc_drake.control.estimation.momentum import drive_momentum
 
 
 def friction_signals(station: Station) -> set[str]:

@@ -5,8 +5,7 @@ import numpy as np
 from diagrams.station import Station
 from experiments.results.guidance_audit import AUDITED
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.fixtures.labels import Mode
-from pfsc_drake.control.fixtures.record import SLOT
+from pfsc_drake.control.fixtures.record import SLOT, Mode
 from reporting.metrics import Metrics
 
 

@@ -5,9 +5,8 @@ import numpy as np
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.control.fixtures.labels import Mode
 from pfsc_drake.control.fixtures.program import SLOTS
-from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord
+from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord, Mode
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 
 # of the record: log name, unit, labels

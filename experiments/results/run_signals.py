@@ -16,7 +16,8 @@ from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import virtual_output_function
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.tool_load import joint_torque_function
 

@@ -20,7 +20,8 @@ from pfsc_drake.control.compliance.pressing import Pressing
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, Manifold, indices
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.manifold import Manifold, indices
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.control.manifolds.surface import SurfaceManifold

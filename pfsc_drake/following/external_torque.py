@@ -2,7 +2,7 @@
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.estimation.external_torque import ExternalTorque
+from pfsc_drake.control.estimation.external_forces import ExternalTorque
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.robot.robot_model import RobotModel

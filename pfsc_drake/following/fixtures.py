@@ -10,13 +10,12 @@ from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
-from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
-from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.near_regions import ScheduledRegions, near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.fixtures.printed import PrintedGuidance
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits
-from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.compliance import force_ports
 from pfsc_drake.following.followed import Guided

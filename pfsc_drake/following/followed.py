@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
-from pfsc_drake.control.fixtures.fixture import Fixture
 from pfsc_drake.control.fixtures.lead import Lead
-from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold

@@ -3,10 +3,16 @@
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
-from pfsc_drake.control.estimation.friction_model import FrictionModel
-from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
-from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.control.estimation.friction import (
+    FrictionKalmanFilter,
+    FrictionModel,
+    FrictionNoise,
+)
+from pfsc_drake.control.estimation.momentum import (
+    MomentumModel,
+    MomentumObserver,
+    drive_momentum,
+)
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.believed import Believed, Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters

@@ -3,9 +3,8 @@
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.wiring_blocks import Constant, Rows
-from pfsc_drake.control.estimation.generalized_momentum import link_momentum
-from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
-from pfsc_drake.control.estimation.tool_wrench import ToolWrench
+from pfsc_drake.control.estimation.external_forces import ToolWrench
+from pfsc_drake.control.estimation.momentum import MomentumObserver, link_momentum
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.options.compliance import ObservedForceParameters

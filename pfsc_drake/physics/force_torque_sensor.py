@@ -8,7 +8,7 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import is_finite, where
-from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 
 # ticks whose noise is known at once

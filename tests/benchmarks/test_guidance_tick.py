@@ -20,7 +20,7 @@ from experiments.simulation import configure
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import ServoLead
-from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
+from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.geometry.regions.shapes import HalfSpace, SphereRegion
 from pfsc_drake.yaml.typed import load_file

@@ -13,8 +13,11 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 from scipy.optimize import least_squares
 
-from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, link_momentum
-from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.control.estimation.momentum import (
+    MomentumObserver,
+    drive_momentum,
+    link_momentum,
+)
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -26,8 +29,7 @@ from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector
-from pfsc_drake.control.tool_kinematics import ToolKinematics
+from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,

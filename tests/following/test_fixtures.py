@@ -3,9 +3,8 @@
 import casadi as ca
 import pytest
 
-from pfsc_drake.control.fixtures.fixture import Fixture
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
-from pfsc_drake.control.fixtures.parameters import Admittance
+from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import make_lead, near_expression
 from pfsc_drake.following.followed import Guided

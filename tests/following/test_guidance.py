@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake import Fixture, FollowerOptions, GuidanceOptions, SphereRegion, add_guidance
-from pfsc_drake.control.fixtures.labels import Mode
+from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError

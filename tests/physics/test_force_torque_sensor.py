@@ -13,7 +13,7 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
 from pfsc_drake.robot.models.files import resolve_model

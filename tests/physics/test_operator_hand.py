@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
-from pfsc_drake.control.tool_kinematics import ToolKinematics
+from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.operator_hand import OperatorHand

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces, SpatialInertia
 
 from pfsc_drake.control.compliance.tool_compensation import compensation_function
-from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

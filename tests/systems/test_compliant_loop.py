@@ -22,8 +22,7 @@ from pfsc_drake.control.compliance.impedance import (
 from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector
-from pfsc_drake.control.tool_kinematics import ToolKinematics
+from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.geometry import (
     Path,
     interpolate_orientation,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pfsc_drake.control.manifolds.trajectory_point import TrajectoryPoint
+from pfsc_drake.control.manifolds.moving_point import TrajectoryPoint
 from pfsc_drake.geometry import FourierCurve, Path
 from pfsc_drake.systems.block_system import BlockSystem
 

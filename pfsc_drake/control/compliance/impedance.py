@@ -13,7 +13,8 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from pfsc_drake.blocks.cases import all_finite, all_of, first_of, is_finite, where
 from pfsc_drake.control.compliance.impedance_transition import rates_of, transition_of
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.schema_check import REQUIRED
 

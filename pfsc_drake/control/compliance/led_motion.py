@@ -8,7 +8,8 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, any_of, unit, where
 from pfsc_drake.control.fixtures.program import SLOTS, program_function
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds, tightest_function
-from pfsc_drake.control.manifolds.manifold import Kind, Manifold, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import Manifold, indices
 
 # below it a limit does not depend on the motion along the manifold
 _ACROSS = 1e-6

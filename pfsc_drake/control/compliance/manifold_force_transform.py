@@ -5,7 +5,8 @@ from typing import Any
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.manifolds.manifold import Kind, Manifold, manifold_force_function
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import Manifold, manifold_force_function
 
 
 class ManifoldForceTransform(Block):

@@ -16,7 +16,7 @@ from pfsc_drake.control.compliance.still_components import (
     stands_still,
 )
 from pfsc_drake.control.compliance.taring import TARING_BLOCK, Taring
-from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel

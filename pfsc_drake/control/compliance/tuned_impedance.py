@@ -11,7 +11,7 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
 from pfsc_drake.control.compliance.impedance import ImpedanceLaw
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.errors import InputError
 
 # a wish that leaves a parameter as it would be without

@@ -7,7 +7,8 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 
 
 class Relation(NamedTuple):

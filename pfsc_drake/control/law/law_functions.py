@@ -14,7 +14,8 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import Linearization
 from pfsc_drake.control.law.posture import Posture, posture_expressions
 from pfsc_drake.control.law.stabilization import Stabilization
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.robot.robot_model import RobotModel
 

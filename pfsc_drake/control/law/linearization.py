@@ -8,7 +8,8 @@ import numpy as np
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law import actuation
 from pfsc_drake.control.law.actuation import DrivenMotion, DriveState, joint_jets
-from pfsc_drake.control.manifolds.manifold import Kind, Manifold
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel

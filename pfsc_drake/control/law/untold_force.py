@@ -7,7 +7,8 @@ import numpy as np
 from pfsc_drake.control.law.linearization import Linearization, decoupling_function
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import LoopGains
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 # s, for which a force is followed, and at how many instants it is looked at

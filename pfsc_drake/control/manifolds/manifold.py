@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
+from pfsc_drake.control.manifolds.orientation import ToolOrientation
 from pfsc_drake.jets import Jet
 
 __all__ = [

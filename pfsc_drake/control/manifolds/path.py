@@ -8,21 +8,18 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import quaternion_rotation
-from pfsc_drake.control.manifolds.orientation_force import (
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.forces import (
+    force_along_path,
     in_axes_of,
+    path_axes,
     quaternion_matrix,
     rotational_force,
     torque_across_axis,
-)
-from pfsc_drake.control.manifolds.path_force import (
-    frame_turning_force,
-    path_axes,
-    translational_force,
+    turning_along_path,
     turning_force,
 )
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
+from pfsc_drake.control.manifolds.orientation import ToolOrientation, quaternion_rotation
 from pfsc_drake.geometry import PathPointLayout, quaternion_to_matrix
 from pfsc_drake.jets import Jet
 
@@ -214,9 +211,9 @@ class PathManifold:
         the coordinates and has no part in the forces.
         """
         force, torque, layout = wrench[:3], wrench[3:], self.layout
-        translational = translational_force(force, point, layout)
+        translational = force_along_path(force, point, layout)
         if layout.turning:
-            translational[0] += frame_turning_force(force, point, layout, reference[1:3])
+            translational[0] += turning_along_path(force, point, layout, reference[1:3])
         if not layout.oriented:
             return translational
         torque, rotational = self.rotational_force(torque, point, reference[3:])

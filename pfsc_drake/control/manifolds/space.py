@@ -9,15 +9,14 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import quaternion_rotation
-from pfsc_drake.control.manifolds.orientation_force import (
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.forces import (
     in_axes_of,
     quaternion_matrix,
     rotational_force,
     torque_across_axis,
 )
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
+from pfsc_drake.control.manifolds.orientation import ToolOrientation, quaternion_rotation
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.jets import Jet

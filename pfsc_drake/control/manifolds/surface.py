@@ -8,21 +8,18 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
-from pfsc_drake.control.manifolds.orientation import quaternion_rotation
-from pfsc_drake.control.manifolds.orientation_force import (
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.forces import (
+    force_along_surface,
     quaternion_matrix,
-    rotational_force,
-    torque_across_axis,
-)
-from pfsc_drake.control.manifolds.surface_force import (
-    frame_turning_force,
     quaternion_turning_force,
+    rotational_force,
     surface_axes,
     tangent_plane,
-    translational_force,
+    torque_across_axis,
+    turning_along_surface,
 )
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
+from pfsc_drake.control.manifolds.orientation import ToolOrientation, quaternion_rotation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import check_rotation_matrix, quaternion_to_matrix
 from pfsc_drake.geometry.surfaces.partials import partial_index, partial_orders
@@ -267,7 +264,7 @@ class SurfaceManifold:
         """
         force, torque = wrench[:3], wrench[3:]
         plane = tangent_plane(point, self.layout)
-        translational = translational_force(force, plane, reference[2])
+        translational = force_along_surface(force, plane, reference[2])
         if len(self.coordinates) == 3:
             return translational
         phi, quaternion = reference[3:], point[self.layout.quaternion]
@@ -285,7 +282,7 @@ class SurfaceManifold:
             if self.offset is None:
                 turning = quaternion_turning_force(torque, plane, quaternion)
             else:
-                turning = frame_turning_force(torque, plane)
+                turning = turning_along_surface(torque, plane)
             translational[:2] += turning
         if rotational is None:
             rotational = rotational_force(R_d.T @ torque, phi, alignment)

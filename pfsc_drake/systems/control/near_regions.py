@@ -14,8 +14,7 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.control.fixtures.fixture_guidance import NEAR_COLUMNS
-from pfsc_drake.control.fixtures.near_rows import FAR, NOTHING
-from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.near_regions import FAR, NOTHING, ScheduledRegions
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.systems.optional_input import value_or_none
 

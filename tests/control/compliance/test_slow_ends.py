@@ -14,7 +14,7 @@ from pfsc_drake.control.compliance.impedance import (
     Profile,
 )
 from pfsc_drake.control.compliance.slow_ends import SlowEnds
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.errors import InputError
 from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 

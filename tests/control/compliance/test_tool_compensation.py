@@ -13,7 +13,7 @@ from pfsc_drake.control.compliance.tool_compensation import (
     ToolCompensationParameters,
     compensation_function,
 )
-from pfsc_drake.control.estimation.low_pass import LowPass
+from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

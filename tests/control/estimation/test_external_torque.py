@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.external_torque import ExternalTorque
+from pfsc_drake.control.estimation.external_forces import ExternalTorque
 from pfsc_drake.errors import InputError
 
 PERIOD = 1e-3

@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import quad
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.friction_kalman import FrictionKalmanFilter, FrictionNoise
-from pfsc_drake.control.estimation.generalized_momentum import MomentumModel, drive_momentum
+from pfsc_drake.control.estimation.friction import FrictionKalmanFilter, FrictionNoise
+from pfsc_drake.control.estimation.momentum import MomentumModel, drive_momentum
 from pfsc_drake.errors import InputError
 
 PERIOD, COUNT = 4e-3, 400

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control.estimation.generalized_momentum import drive_momentum, link_momentum
+from pfsc_drake.control.estimation.momentum import drive_momentum, link_momentum
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import load_delta_parameters
 

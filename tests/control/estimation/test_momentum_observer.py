@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.generalized_momentum import (
+from pfsc_drake.control.estimation.momentum import (
     MomentumModel,
+    MomentumObserver,
     drive_momentum,
     link_momentum,
 )
-from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
 from pfsc_drake.errors import InputError
 
 PERIOD, RATE, COUNT = 1e-3, 300.0, 25

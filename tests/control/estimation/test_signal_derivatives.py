@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
+from pfsc_drake.control.estimation.filters import SignalDerivatives
 from pfsc_drake.errors import InputError
 
 PERIOD = 1e-3

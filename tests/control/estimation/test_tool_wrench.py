@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.estimation.tool_wrench import ToolWrench
+from pfsc_drake.control.estimation.external_forces import ToolWrench
 from pfsc_drake.errors import InputError
 
 WRENCH = np.array([12.0, -7.0, 30.0, 1.5, -0.8, 0.6])

@@ -11,7 +11,7 @@ from pfsc_drake.control.law.linearization import (
 )
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
-from pfsc_drake.control.manifolds.manifold import Coordinate, Kind
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.geometry import PathPointLayout
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator

@@ -7,11 +7,14 @@ from pydrake.math import RollPitchYaw
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.linearization import decoupling_function
-from pfsc_drake.control.manifolds.euler_angles import euler_difference, euler_rates
-from pfsc_drake.control.manifolds.orientation import quaternion_rotation
+from pfsc_drake.control.manifolds.orientation import (
+    ToolOrientation,
+    euler_difference,
+    euler_rates,
+    quaternion_rotation,
+)
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import euler_margin, zyx_to_matrix, zyx_to_quaternion
 from pfsc_drake.geometry.rotation import zyz_to_matrix

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.manifolds.manifold import Kind, indices, manifold_force_function
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices, manifold_force_function
 from pfsc_drake.control.manifolds.moving_point import MovingPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import quaternion_to_matrix

@@ -7,12 +7,12 @@ from numpy.polynomial import Chebyshev
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.manifolds.orientation import (
+    ToolOrientation,
     orientation_error,
     quaternion_rotation,
     yaw_error,
 )
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import rotation_to_axis, turn_about
 from pfsc_drake.jets import Jet

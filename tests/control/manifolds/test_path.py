@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
+from pfsc_drake.control.manifolds.orientation import ToolOrientation
 from pfsc_drake.control.manifolds.path import PathGeometry, PathManifold, path_coordinates
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.manifolds.manifold import Kind, manifold_force_function
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import manifold_force_function
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.manifolds.manifold import Kind
+from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix

@@ -10,7 +10,8 @@ from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains
 from diagrams.tasks.make import make_task
 from experiments.catalog.scenario_catalog import find_scenario
-from pfsc_drake.control.manifolds.manifold import Kind, indices
+from pfsc_drake.control.manifolds.coordinate import Kind
+from pfsc_drake.control.manifolds.manifold import indices
 
 ARM = "pfc_elastic_3r"
 FAST, DWELL = 4.0, 0.1  # m/s, s

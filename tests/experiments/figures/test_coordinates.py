@@ -11,7 +11,7 @@ from experiments.figures.coordinates import (
     draw_progress,
     draw_transversal,
 )
-from pfsc_drake.control.manifolds.tool_orientation import ToolOrientation
+from pfsc_drake.control.manifolds.orientation import ToolOrientation
 
 
 def lines(panel):

@@ -9,7 +9,7 @@ import pytest
 from experiments.results.guidance_audit import AUDITED, Promise, audit
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
-from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.near_regions import ScheduledRegions
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR, SLOTS
 from pfsc_drake.control.fixtures.record import SLOT

@@ -11,7 +11,7 @@ from pydrake.systems.primitives import ZeroOrderHold
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
-from pfsc_drake.control.fixtures.near_rows import near_rows, reaches
+from pfsc_drake.control.fixtures.near_regions import near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameters
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.robot_model import tool_motion_function

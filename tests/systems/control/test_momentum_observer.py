@@ -6,8 +6,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain, ZeroOrderHold
 
-from pfsc_drake.control.estimation.generalized_momentum import drive_momentum
-from pfsc_drake.control.estimation.momentum_observer import MomentumObserver
+from pfsc_drake.control.estimation.momentum import MomentumObserver, drive_momentum
 from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD, RATE, FRICTION = 1e-3, 200.0, np.array([20.0, -35.0, 9.0])

@@ -5,8 +5,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from pfsc_drake.control.fixtures.fixture_guidance import NEAR_COLUMNS
-from pfsc_drake.control.fixtures.near_rows import NOTHING, near_rows, reaches
-from pfsc_drake.control.fixtures.nearby import ScheduledRegions
+from pfsc_drake.control.fixtures.near_regions import NOTHING, ScheduledRegions, near_rows, reaches
 from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.geometry.regions.moving import ShiftedRegion

@@ -1,14 +1,16 @@
-"""External joint torques, and how they change, from the wrench on the tool and more."""
+"""What acts on a robot from outside: joint torques of a wrench on the tool, and back."""
 
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.control.estimation.signal_derivatives import SignalDerivatives
+from pfsc_drake.control.estimation.filters import SignalDerivatives
+from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.robot.tool_load import joint_torque_function
+from pfsc_drake.robot.tool_load import dead_band, joint_torque_function
 
 
 class ExternalTorque(Block):
@@ -79,3 +81,70 @@ class ExternalTorque(Block):
             "predicted": where(good, predicted, x.predicted),
             "seen": where(good, 1.0, x.seen),
         }
+
+
+_POSITION_ONLY = 3
+
+
+class ToolWrench(Block):
+    """The wrench on the tool that torques in the joints tell of, the inverse of (2.11).
+
+    ``wrench = (J J^T + damping^2 I)^-1 J tau_ext`` of ``tau_ext = J_g^T wrench``: without damping
+    the inverse, or where there are more joints than components the least squares fit; with damping
+    what a singular posture does not tell is taken for zero instead of being blown up. Arms of
+    three joints tell a force, and are taken to bear no torque. Both parts are shortened by a dead
+    band. Values that are not finite come through.
+
+    Ports:
+        tau_ext (input): External torques in the joints [Nm or N], shape (N,).
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        wrench (output): ``[force, torque]`` on the tool at the tool point, world axes, shape
+            (6,) [N, Nm].
+
+    Args:
+        robot: The robot, N joints, three or at least six.
+        damping: Of the inverse, beside the singular values of J in m and rad.
+        dead_bands: Widths for force [N] and torque [Nm].
+
+    Raises:
+        InputError: If a number is out of range, or the robot has too few joints.
+    """
+
+    def __init__(
+        self, robot: RobotModel, damping: float = 0.0, dead_bands: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        n = robot.dimension
+        if n != _POSITION_ONLY and n < 6:
+            raise InputError(
+                f"forces on the tool from the torques in {n} joints: cannot be told; needs 3 "
+                "joints for a force, 6 or more for force and torque"
+            )
+        for name, value in (("damping", damping), ("dead bands", min(dead_bands))):
+            if not 0.0 <= value < np.inf:
+                raise InputError(f"{name} = {value}: must be zero or positive")
+        self._n, self._told = n, 3 if n == _POSITION_ONLY else 6
+        self._damping, self._dead_bands = damping, dead_bands
+        self._fit = self._fit_function(robot)
+        self.inputs = {
+            "tau_ext": Port(n, "Nm or N"),
+            "joint_state": Port(4 * n, "rad, rad/s or m, m/s"),
+        }
+        self.outputs, self.states = {"wrench": Port(6, "N, Nm")}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        found = self._fit(u.joint_state[: self._n], u.tau_ext)
+        force, torque = (
+            dead_band(part, width)
+            for part, width in zip(ca.vertsplit(found, 3), self._dead_bands, strict=True)
+        )
+        return {"wrench": ca.vertcat(force, torque)}
+
+    def _fit_function(self, robot: RobotModel) -> ca.Function:
+        """Return ``(q, tau_ext) -> wrench`` without dead bands."""
+        q, tau, wrench = ca.SX.sym("q", self._n), ca.SX.sym("tau", self._n), ca.SX.sym("wrench", 6)
+        J = ca.jacobian(joint_torque_function(robot)(q, wrench), wrench)[:, : self._told].T
+        square = J @ J.T + self._damping**2 * ca.SX.eye(self._told)
+        found = ca.ldl_solve(J @ tau, *ca.ldl(square))
+        found = ca.densify(ca.vertcat(found, ca.SX(6 - self._told, 1)))
+        return ca.Function("tool_wrench", [q, tau], [found])
