@@ -16,26 +16,20 @@ from diagrams.scenario import Scenario
 from diagrams.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
-from experiments.results.drive_metrics import saturation_warnings
-from experiments.results.friction_metrics import friction_metrics
+from experiments.results.drives import JointLimits, plan_metrics, saturation_warnings
+from experiments.results.friction import friction_metrics
+from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.guidance_audit import Promise, audit
-from experiments.results.guidance_metrics import guidance_metrics
-from experiments.results.guidance_warnings import guidance_warnings
-from experiments.results.joint_limits import JointLimits
-from experiments.results.limit_metrics import limit_metrics
-from experiments.results.link_signals import lap_length
-from experiments.results.mounting_metrics import mounting_metrics
-from experiments.results.path_metrics import path_following_metrics
-from experiments.results.plan_metrics import plan_metrics
-from experiments.results.posture_metrics import posture_metrics
-from experiments.results.press_metrics import press_metrics
+from experiments.results.mounting import mounting_metrics
+from experiments.results.path import path_following_metrics, shape_metrics
+from experiments.results.posture import posture_metrics
+from experiments.results.press import press_metrics
 from experiments.results.promises import broken_promises, set_promises, unpromised_distance
+from experiments.results.pushes import lap_length
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
-from experiments.results.shape_metrics import shape_metrics
-from experiments.results.tick import measure_tick
-from experiments.simulation import SimulationResult
+from experiments.simulation import SimulationResult, measure_tick
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import metrics_of, one_line
 from pfsc_drake.following.fixtures import free_motion

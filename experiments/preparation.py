@@ -14,7 +14,7 @@ from diagrams.station import Station
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
 from experiments.length import check_frames, check_length
-from experiments.results.targets import check_targets
+from experiments.results.promises import check_targets
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.files import resolve_files

@@ -11,14 +11,21 @@ from experiments.figures.coordinates import (
     draw_progress,
     draw_transversal,
 )
-from experiments.figures.damping import draw_damping, has_varying_damping
 from experiments.figures.drives import (
     draw_deflection,
     draw_efforts,
     draw_friction,
+    draw_pace,
     draw_velocities,
 )
-from experiments.figures.forces import draw_forces, has_forces
+from experiments.figures.forces import (
+    draw_damping,
+    draw_force_map,
+    draw_forces,
+    draw_pressing,
+    has_forces,
+    has_varying_damping,
+)
 from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
 from experiments.figures.guidance import (
     draw_contact,
@@ -31,19 +38,15 @@ from experiments.figures.guidance import (
     held_by_robot,
 )
 from experiments.figures.mounting import draw_mounting, draw_use_case
-from experiments.figures.notch import draw_notch_position
-from experiments.figures.pace import draw_pace
-from experiments.figures.path import draw_path
-from experiments.figures.polish import draw_force_map, draw_pressing
-from experiments.figures.positions import draw_positions
+from experiments.figures.path import draw_notch_position, draw_path, draw_surface_fit
 from experiments.figures.posture import (
     draw_conditioning,
+    draw_positions,
     draw_posture,
     draw_pushes,
     has_conditioning,
     has_pushes,
 )
-from experiments.figures.surface_fit import draw_surface_fit
 from experiments.figures.virtual_input import draw_virtual_input, has_virtual_input
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.results.friction_metrics import relative_errors
+from experiments.results.friction import relative_errors
 from experiments.results.run_log import RunLog
 from reporting.style import (
     BROAD,

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from experiments.figures.forces import shade_pushes
-from experiments.results.guidance_signals import slots_of
+from experiments.results.guidance import slots_of
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.record import SLOT
 from reporting.style import (

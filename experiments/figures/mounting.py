@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from experiments.results.mounting_metrics import time_to_frame, time_to_seat
+from experiments.results.mounting import time_to_frame, time_to_seat
 from experiments.results.run_log import RunLog
 from reporting.style import (
     COLOURS,

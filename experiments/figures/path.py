@@ -1,4 +1,4 @@
-"""The three-dimensional view of a path and of the way the tool point took."""
+"""A path or a surface in space and the way of the tool; in its notch; over points it fits."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,8 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from experiments.results.run_log import FloatArray, RunLog
-from reporting.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing
+from pfsc_drake.geometry.surfaces.residuals import Residuals
+from reporting.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing, fitting_unit
 
 ARROW_COUNT = 5
 ELEVATION = 28.0  # degrees, of the viewer
@@ -126,3 +127,72 @@ def _draw_direction(axes: Axes3D, output: FloatArray) -> None:
                 linewidth=2.0,
                 zorder=4,
             )
+
+
+_SIZE = 5.0  # inches
+_MARGIN = 1.25  # of the picture, beyond the farthest point
+
+
+def draw_notch_position(log: RunLog) -> Drawing:
+    """Way of the ball's centre in the notch, with the circle in which it touches nothing."""
+    signal = log["notch_position"]
+    left, above = 1e3 * signal.values.T
+    canvas = Canvas(figsize=(_SIZE, _SIZE))
+    panel = canvas.subplots()
+    panel.plot(-left, above, color=COLOURS[0], linewidth=1.0, label="centre of the ball")
+    panel.plot(-left[:1], above[:1], "o", color=COLOURS[2], label="start")
+    reach = float(np.nanmax(np.abs(signal.values))) * 1e3
+    if signal.limits is not None:
+        free = 1e3 * float(np.max(signal.limits))
+        angle = np.linspace(0.0, 2.0 * np.pi, 181)
+        panel.plot(
+            free * np.cos(angle), free * np.sin(angle), "--", color=INK, label="free of contact"
+        )
+        reach = max(reach, free)
+    for draw_axis in (panel.axhline, panel.axvline):
+        draw_axis(0.0, color=REFERENCE, linewidth=0.8)
+    span = _MARGIN * reach
+    panel.set(xlim=(-span, span), ylim=(-span, span), aspect="equal")
+    panel.set(xlabel="to the right of the notch's axis in mm", ylabel="above it in mm")
+    panel.set_title("Ball in the notch, seen along the path")
+    panel.legend(loc="upper right")
+    return Drawing(
+        "notch",
+        "Ball in the notch",
+        "Centre of the ball in the cross-section of the notch; outside the dashed circle its soft "
+        "shell is pressed.",
+        canvas,
+    )
+
+
+_BINS = 40
+_ROOM = 1.05  # of the largest distance
+
+
+def draw_surface_fit(fit: Residuals) -> Drawing:
+    """Distances of points from a surface: where over it, and how many of which size.
+
+    Args:
+        fit: Where the points stand.
+    """
+    scale, unit = fitting_unit(fit.distances, "m")
+    distances, reach = scale * fit.distances, _ROOM * scale * fit.largest or 1.0
+    canvas = Canvas(figsize=(WIDTH, 4.2))
+    over, counted = canvas.subplots(1, 2, width_ratios=(3, 2))
+    dots = over.scatter(
+        *fit.theta.T, c=distances, s=8.0, cmap="RdBu_r", vmin=-reach, vmax=reach, linewidths=0.0
+    )
+    canvas.colorbar(dots, ax=over, label=f"distance in {unit}")
+    over.set(xlabel=r"$\theta_1$", ylabel=r"$\theta_2$", title="Over the surface")
+    over.grid(visible=False)
+    counted.hist(distances, bins=_BINS, range=(-reach, reach), color=COLOURS[0])
+    for sign in (-1.0, 1.0):
+        label = f"root mean square {scale * fit.rms:.3g} {unit}" if sign > 0.0 else None
+        counted.axvline(sign * scale * fit.rms, linestyle="--", color=INK, label=label)
+    counted.set(xlabel=f"distance in {unit}", ylabel="points", title=" ")
+    counted.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    caption = (
+        f"Distances of {len(distances)} points from the surface fitted to them, along its normal, "
+        f"at most {np.abs(distances).max():.3g} {unit}; they should show no pattern."
+    )
+    return Drawing("surface_fit", "Points and the surface fitted to them", caption, canvas)

@@ -1,4 +1,4 @@
-"""What a run promises, and which of it was broken.
+"""What a run promises: targets checked before it, and which of them it broke.
 
 A promise is a metric with a target that can be compared: those that a scenario names in
 ``targets``, and those that every run makes. They are measured on the truth, not on what the
@@ -8,6 +8,17 @@ controller believes or asks for.
 import math
 
 from diagrams.scenario import Scenario
+from diagrams.station import Station
+from experiments.results.drives import JointLimits
+from experiments.results.friction import friction_metric_names
+from experiments.results.guidance import guidance_metric_names, limit_metric_names
+from experiments.results.mounting import mounting_metric_names
+from experiments.results.path import metric_names, shape_metrics
+from experiments.results.posture import posture_metric_names
+from experiments.results.press import press_metric_names
+from experiments.results.pushes import is_redundant
+from experiments.results.run_signals import optional_signals
+from pfsc_drake.errors import InputError
 from reporting.metrics import Metric, Metrics
 from reporting.units import format_quantity
 
@@ -80,3 +91,48 @@ def _phrase(name: str, metric: Metric) -> str:
     if math.isnan(metric.value):
         return f"{name} has no value, {target}"
     return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}"
+
+
+# signals that another law may log on the same robot
+_OF_OTHER_LAWS = {"xi_M"}
+# signals of an orientation, which may be no task
+_OF_ORIENTATIONS = {"phi"}
+# signals of an observer, which may be left out
+_OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
+
+
+def check_targets(settings: Scenario, station: Station) -> None:
+    """Refuse targets for metrics that a run with their law would not have.
+
+    Args:
+        settings: The scenario.
+        station: Its station.
+
+    Raises:
+        InputError: One line that names law, metric and the metrics that there are.
+    """
+    signals = optional_signals(station)
+    surface = settings.surface
+    if settings.path.orientation.task == "none" or (surface and surface.orientation.kind == "none"):
+        signals |= _OF_ORIENTATIONS
+    for law, targets in settings.targets.items():
+        other = set() if law == settings.controller.law else _OF_OTHER_LAWS
+        known = [
+            *metric_names(station.robot.dimension, signals | other),
+            *press_metric_names(signals),
+            *guidance_metric_names(station),
+            *limit_metric_names(station),
+            *mounting_metric_names(signals),
+            *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
+            *shape_metrics(station.task.shape, station.task.fit),
+            *JointLimits.of(station.robot).metric_names(),
+            *posture_metric_names(signals, is_redundant(station), station.task.lap is not None),
+            "real_time_factor",
+            "controller_tick_us",
+            "controller_tick_us_p99",
+        ]
+        for name in targets:
+            if name not in known:
+                raise InputError(
+                    f"targets.{law}.{name}: no such metric; allowed: {', '.join(known)}"
+                )

@@ -7,7 +7,7 @@ from pydrake.systems.framework import Context
 from diagrams.drawing.replay import RecordedDistance, RecordedMotion, RecordedPushes
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
-from experiments.results.guidance_signals import region_times
+from experiments.results.guidance import region_times
 from experiments.results.run_log import FloatArray, RunLog
 
 # of the tool's way over what it presses on, where it would be hidden [m]

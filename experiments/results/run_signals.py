@@ -4,13 +4,13 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
-from experiments.results.friction_signals import add_friction, friction_signals
-from experiments.results.guidance_signals import add_guidance
-from experiments.results.link_signals import add_link_signals
-from experiments.results.mounting_signals import PLATE_SIGNALS, add_mounting_signals
+from experiments.results.friction import add_friction, friction_signals
+from experiments.results.guidance import add_guidance
+from experiments.results.mounting import PLATE_SIGNALS, add_mounting_signals
 from experiments.results.orientation_signals import add_orientation
-from experiments.results.posture_signals import add_posture, posture_signals
-from experiments.results.press_signals import add_pressing, is_pressed
+from experiments.results.posture import add_posture, posture_signals
+from experiments.results.press import add_pressing, is_pressed
+from experiments.results.pushes import add_link_signals
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import read_scenario
 from experiments.preparation import prepare
-from experiments.results.guidance_metrics import guidance_metrics
+from experiments.results.guidance import guidance_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate

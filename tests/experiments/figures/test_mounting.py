@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.figures.all import draw_figures
-from experiments.figures.damping import draw_damping, has_varying_damping
+from experiments.figures.forces import draw_damping, has_varying_damping
 from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.results.run_log import RunLog
 

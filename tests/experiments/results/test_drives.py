@@ -8,7 +8,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import find_scenario
-from experiments.results.joint_limits import JointLimits
+from experiments.results.drives import JointLimits
 from experiments.results.run_log import RunLog
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink

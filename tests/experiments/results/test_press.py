@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.results.press_metrics import SETTLING, press_metric_names, press_metrics
+from experiments.results.press import SETTLING, press_metric_names, press_metrics
 from experiments.results.run_log import RunLog
 
 TIME = np.linspace(0.0, 4.0, 401)

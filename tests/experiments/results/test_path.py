@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.drive_metrics import peak_torque, saturation_count
-from experiments.results.path_metrics import (
+from experiments.results.drives import peak_torque, saturation_count
+from experiments.results.path import (
     max_distance_from_notch_axis,
     max_external_force,
     max_manifold_force,
@@ -21,10 +21,20 @@ from experiments.results.path_metrics import (
     peak_speed,
     rms_path_deviation,
     settling_time,
+    shape_metrics,
     static_path_deviation,
     tangential_error,
 )
 from experiments.results.run_log import RunLog
+from pfsc_drake.geometry import (
+    FourierCurve,
+    OrientationCurve,
+    Path,
+    PiecewisePolynomialCurve,
+    WaypointTable,
+    path_from_waypoints,
+    shape_report,
+)
 
 RATE = 8.0  # 1/s
 START = 0.01  # m
@@ -201,3 +211,21 @@ def test_collection_has_what_the_log_allows():
         START * math.exp(-RATE * 0.5)
     )
     assert metrics["settling_time"].unit == "s"
+
+
+def test_what_exists_is_given():
+    circle = Path(FourierCurve.circle([0, 0, 0], 0.2))
+    metrics = shape_metrics(shape_report(circle))
+    assert metrics["path_length"].value == pytest.approx(0.4 * np.pi)
+    assert metrics["path_smallest_radius"].value == pytest.approx(0.2)
+    assert {metric.unit for metric in metrics.values()} == {"m"}
+    assert set(metrics) == {"path_length", "path_smallest_radius", "path_smallest_radius_at"}
+    line = PiecewisePolynomialCurve.line([0, 0, 0], [1, 0, 0])
+    straight = Path(line, OrientationCurve.fixed([1, 0, 0, 0], line.domain))
+    assert set(shape_metrics(shape_report(straight))) == {"path_length", "path_angle_rate"}
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    path = path_from_waypoints(WaypointTable(points), smoothness=3, closed=True)
+    report = shape_report(path)
+    metrics = shape_metrics(report)
+    assert metrics["path_distance_from_points"].value == report.distance_from_points
+    assert metrics["path_distance_from_polygon"].value == report.distance_from_polygon

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.link_signals import lap_before
-from experiments.results.posture_metrics import (
+from experiments.results.posture import (
     elbow_shift,
     elbow_travel,
     posture_metric_names,
     posture_metrics,
 )
+from experiments.results.pushes import lap_before
 from experiments.results.run_log import RunLog
 
 LAP = 1.0

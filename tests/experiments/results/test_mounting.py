@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.mounting_metrics import mounting_metric_names, mounting_metrics
+from experiments.results.mounting import mounting_metric_names, mounting_metrics
 from experiments.results.run_log import RunLog
 
 TIME = np.linspace(0.0, 10.0, 1001)
