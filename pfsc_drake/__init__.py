@@ -42,7 +42,7 @@ _DOOR = {
     "Path": "pfsc_drake.geometry",
     "Profile": "pfsc_drake.control.compliance.impedance",
     "SphereRegion": "pfsc_drake.geometry.regions.shapes",
-    "StreamLimits": "pfsc_drake.control.law.streamed_reference",
+    "StreamLimits": "pfsc_drake.control.law.timed_reference",
     "WaypointTable": "pfsc_drake.geometry",
     "add_guidance": "pfsc_drake.following.guidance",
     "add_path_following": "pfsc_drake.following.path_following",

@@ -5,7 +5,7 @@ import dataclasses as dc
 import numpy as np
 
 from diagrams.scenario.checks import require, require_not_negative
-from pfsc_drake.control.compliance.still_components import STILL_TIME
+from pfsc_drake.control.compliance.taring import STILL_TIME
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 

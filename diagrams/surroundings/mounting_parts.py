@@ -11,7 +11,7 @@ from diagrams.surroundings.hand import connect_hand
 from diagrams.surroundings.mounting import Mounting, tool_transform
 from diagrams.surroundings.plate_plant import add_plate_plant
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.control.compliance.payload_compensation import PayloadCompensation
+from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand

@@ -8,12 +8,11 @@ import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.untold_forces import untold_forces, untold_friction
-from pfsc_drake.control.compliance.impedance import Profile
-from pfsc_drake.control.compliance.observed_inertia import (
+from pfsc_drake.control.compliance.bearable_inertia import (
     bearable_inertia_error,
     bearable_mass_error,
 )
-from pfsc_drake.control.compliance.slow_ends import SlowEnds
+from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot

@@ -18,8 +18,8 @@ from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Sphere, Torus
 from diagrams.tasks.surface import surface_from_shape
 from diagrams.tasks.surface_files import profile_from_file
-from pfsc_drake.control.fixtures.swinging_course import SwingingCourse
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.swing import SwingingCourse
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.regions.course import Course, CurveCourse

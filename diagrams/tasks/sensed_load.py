@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.law_warnings import least_of, slope_at_rest
-from pfsc_drake.control.compliance.carried_inertia import (
+from pfsc_drake.control.compliance.bearable_inertia import (
     bearable_share,
     carried_share,
     load_inertia,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, wishes_of
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.space import SpaceManifold

@@ -5,7 +5,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.wiring_blocks import Linear
-from pfsc_drake.control.compliance.impedance import Profile
+from pfsc_drake.control.compliance.impedance_parameters import Profile
 from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance

@@ -14,8 +14,7 @@ from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Linear
 from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
-from pfsc_drake.control.law.streamed_reference import StreamedReference
-from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.believed import Believed

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.compliance.null_space_impedance import (
+from pfsc_drake.control.compliance.posture_impedance import (
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
+    YieldingPosture,
 )
-from pfsc_drake.control.compliance.yielding_posture import YieldingPosture
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.posture import Posture, PostureCoordinate, range_weight

@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.wiring_blocks import Collect, Constant
 from pfsc_drake.control.law.linearization import Linearization
-from pfsc_drake.control.law.smooth_start import SmoothStart
+from pfsc_drake.control.law.reference import SmoothStart
 from pfsc_drake.following.compliance import add_compliance, has_impedance, reference_order
 from pfsc_drake.following.followed import Wanted
 from pfsc_drake.following.options.compliance import ComplianceParameters

@@ -22,9 +22,8 @@ from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, ActuationOptions, linearize
-from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.law.reference import SmoothStart, rest_to_rest
 from pfsc_drake.control.law.safe_stop import SafeState
-from pfsc_drake.control.law.smooth_start import SmoothStart
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.law.timed_reference import TimedReference

@@ -19,7 +19,7 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.notch import BallParameters, NotchParameters
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose

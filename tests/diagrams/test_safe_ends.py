@@ -9,7 +9,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import BrakeParameters, ForcePulse, GainParameters, LawGains
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.simulation import simulate
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.robot.robot_model import pose_function

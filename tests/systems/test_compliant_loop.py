@@ -13,14 +13,13 @@ from pydrake.systems.primitives import (
 )
 from scipy.spatial.transform import Rotation
 
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter, ManifoldForceTransform
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
-from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.geometry import (

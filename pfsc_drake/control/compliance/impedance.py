@@ -1,28 +1,24 @@
-"""Impedance filters: how the reference of the virtual output yields to forces."""
+"""The impedance of virtual outputs: how their reference yields to forces, solved exactly."""
 
 import enum
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Union
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from pfsc_drake.blocks.cases import all_finite, all_of, first_of, is_finite, where
-from pfsc_drake.control.compliance.impedance_transition import rates_of, transition_of
-from pfsc_drake.control.compliance.slow_ends import SlowEnds
+from pfsc_drake.blocks.cases import all_finite, all_of, is_finite, where
+from pfsc_drake.control.compliance.impedance_parameters import (
+    CoordinateImpedance,
+    ImpedanceParameters,
+)
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.schema_check import REQUIRED
 
 MASS, DAMPING, STIFFNESS = range(3)
 # what a profile over the size of all transversal coordinates goes over
 _ACROSS = Kind.TRANSVERSAL.value
-# relative; what misses the length of a lap by less is a lap
-_ROUNDING = 1e-6
 
 
 class ImpedanceStatus(enum.IntFlag):
@@ -32,163 +28,6 @@ class ImpedanceStatus(enum.IntFlag):
     FORCE_NOT_FINITE = 1
     IMPEDANCE_NOT_VALID = 2
     REFERENCE_NOT_FINITE = 4
-
-
-@dataclass
-class Profile:
-    """A parameter: constant, or cubic, C^1, monotone between breakpoints, constant outside.
-
-    Over the arc length of a closed path it is periodic instead: cubic, C^1 and monotone from the
-    last breakpoint to the first of the next lap, too.
-
-    Attributes:
-        value: The constant, if there are no breakpoints.
-        over: Name of a coordinate, e.g. ``eta`` [m], or ``xi`` for the size of all transversal
-            ones, e.g. ``|(xi_1, xi_2)|`` [m].
-        at: Breakpoints, increasing; none or at least two.
-        values: Values there.
-    """
-
-    value: float = 0.0
-    over: str = "eta"
-    at: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        if not self.value >= 0.0:
-            raise InputError(f"value: {self.value}; must be zero or a positive number")
-        if len(self.at) != len(self.values) or len(self.at) == 1:
-            counts = f"values: {len(self.values)} at {len(self.at)} breakpoints"
-            raise InputError(f"{counts}; as many, and none or at least two, are needed")
-        if not (np.all(np.isfinite(self.at)) and np.all(np.diff(self.at) > 0.0)):
-            raise InputError(f"at: {self.at}; must be finite and increasing")
-        if not all(math.isfinite(v) and v >= 0.0 for v in self.values):
-            raise InputError(f"values: {self.values}; must be finite, none negative")
-
-    @property
-    def varies(self) -> bool:
-        """Whether it is no constant."""
-        return bool(self.at)
-
-    def interpolant(self, lap: float | None = None) -> Callable[[Any], Any]:
-        """Return the parameter as a function of what it goes over, a number or an expression.
-
-        Args:
-            lap: Period of what it goes over, if it has one.
-
-        Raises:
-            InputError: If the breakpoints do not fit into a period, or the values at its two
-                ends differ.
-        """
-        if not self.at:
-            constant = self.value
-            return lambda _: constant
-        at, values = np.array(self.at), np.array(self.values)
-        if lap is None:
-            slopes = PchipInterpolator(at, values).derivative()(at)
-            slopes[[0, -1]] = 0.0
-        else:
-            at, values, slopes = self._periodic(at, values, lap)
-        pieces = CubicHermiteSpline(at, values, slopes).c.T
-        begins = [ca.DM([begin, *piece]) for begin, piece in zip(at, pieces, strict=False)]
-        ends, first, last, lowest = at[1:], float(at[0]), float(at[-1]), min(self.values)
-
-        def value(x: Any) -> Any:
-            if lap is not None:
-                x = x - lap * ca.floor((x - first) / lap)
-            x = first_of((x < first, first), (x > last, last), otherwise=x)
-            cases = zip([x < end for end in ends], begins, strict=True)
-            piece = first_of(*list(cases)[:-1], otherwise=begins[-1])
-            x = x - piece[0]
-            y = ((piece[1] * x + piece[2]) * x + piece[3]) * x + piece[4]
-            return where(y < lowest, lowest, y)
-
-        return value
-
-    def _periodic(
-        self, at: np.ndarray, values: np.ndarray, lap: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return breakpoints, values and slopes over one period, both its ends included."""
-        span, rounding = float(at[-1] - at[0]), _ROUNDING * lap
-        if span > lap + rounding:
-            raise InputError(f"at: {self.at}; the closed path is {lap:.6g} m long")
-        if span >= lap - rounding:
-            if abs(values[-1] - values[0]) > _ROUNDING * max(values[0], values[-1]):
-                raise InputError(
-                    f"values: {self.values}; the last must be the first one, a lap of "
-                    f"{lap:.6g} m later"
-                )
-            at, values = at[:-1], values[:-1]
-        # the laps around tell the slopes at the seam
-        around = np.concatenate([at - lap, at, at + lap])
-        slopes = PchipInterpolator(around, np.tile(values, 3)).derivative()(at)
-        return (
-            np.append(at, at[0] + lap),
-            np.append(values, values[0]),
-            np.append(slopes, slopes[0]),
-        )
-
-
-# the first is what one without a tag means
-Damping = Union[Profile, SlowEnds]  # noqa: UP007 (Drake's YAML needs it)
-
-
-@dataclass
-class CoordinateImpedance:
-    """Mass, damping and stiffness of one kind of coordinate.
-
-    Attributes:
-        mass: ``m`` [kg or kg m^2], positive.
-        damping: ``d`` [N s/m or Nm s/rad]; zero is allowed; ``!SlowEnds`` for (5.4).
-        stiffness: ``k`` [N/m or Nm/rad]; zero is allowed, and infinity is position
-            control: ``y_p = y_d``.
-    """
-
-    mass: Profile = field(default_factory=lambda: Profile(1.0), metadata=REQUIRED)
-    damping: Damping = field(default_factory=Profile, metadata=REQUIRED)
-    stiffness: Profile = field(default_factory=lambda: Profile(math.inf), metadata=REQUIRED)
-
-    def __post_init__(self) -> None:
-        masses = self.mass.values or [self.mass.value]
-        if not all(0.0 < mass < math.inf for mass in masses):
-            raise InputError(f"mass: {masses}; must be positive and finite")
-        # profiles themselves refuse the rest
-        if isinstance(self.damping, Profile) and not math.isfinite(self.damping.value):
-            raise InputError(f"damping: {self.damping.value}; must be finite")
-
-
-@dataclass
-class ImpedanceParameters:
-    """Impedance of all coordinates; those not given are position-controlled.
-
-    Attributes:
-        tangential: Of the tangential coordinates.
-        transversal: Of the transversal ones.
-        rotational: Of the angles.
-    """
-
-    tangential: CoordinateImpedance = field(default_factory=CoordinateImpedance)
-    transversal: CoordinateImpedance = field(default_factory=CoordinateImpedance)
-    rotational: CoordinateImpedance = field(default_factory=CoordinateImpedance)
-
-    def on_path(self, length: float) -> "ImpedanceParameters":
-        """Return them with the length of a path [m] where slow ends do not say one."""
-        kinds = (self.tangential, self.transversal, self.rotational)
-        return ImpedanceParameters(*(_on_path(kind, length) for kind in kinds))
-
-    def of(self, kind: Kind) -> CoordinateImpedance:
-        """Return the impedance of a kind of coordinates."""
-        return {
-            Kind.TANGENTIAL: self.tangential,
-            Kind.TRANSVERSAL: self.transversal,
-            Kind.ROTATIONAL: self.rotational,
-        }[kind]
-
-
-def _on_path(kind: CoordinateImpedance, length: float) -> CoordinateImpedance:
-    if isinstance(kind.damping, SlowEnds) and kind.damping.length == 0.0:
-        return replace(kind, damping=replace(kind.damping, length=length))
-    return kind
 
 
 class ImpedanceState(NamedTuple):
@@ -216,7 +55,7 @@ class ImpedanceLaw:
     e is formed anew at every tick and absorbs it. Hence no step in y_p or y_p'.
 
     Over an interval e obeys its differential equation with force and parameters held, solved
-    exactly (:mod:`~pfsc_drake.control.compliance.impedance_transition`); ``y_d`` goes on by its
+    exactly (:mod:`~pfsc_drake.control.compliance.impedance`); ``y_d`` goes on by its
     Taylor polynomial of order ``desired_order``. What that misses acts like a disturbance of e: on
     a sine of 1 m, 5 rad/s, 3e-5 m for order 2 and 6e-11 m for order 4 with Tab. 3.2, and
     5e-3 m and 1e-8 m for a free mass. Order 2 is the least, for (3.42) contains ``y_d''``.
@@ -408,3 +247,93 @@ class ImpedanceLaw:
             more = where(rates.yields, response[k], 0.0) if yielding else 0.0
             rows.append(y_d[k] + more)
         return ca.vertcat(*rows[: self.relative_degree + 1])
+
+
+# below these the roots of the characteristic polynomial lose digits that the series keeps
+_SERIES_DAMPING, _SERIES_STIFFNESS, _SERIES_TERMS = 0.5, 0.25, 20
+
+
+class Rates(NamedTuple):
+    """What an impedance is per mass.
+
+    Attributes:
+        damping: ``d / m``, shape (m,) [1/s].
+        stiffness: ``k / m``, zero where rigid, shape (m,) [1/s^2].
+        yields: Where it is not rigid, shape (m,).
+    """
+
+    damping: Any
+    stiffness: Any
+    yields: Any
+
+
+def rates_of(impedance: Any) -> Rates:
+    """Return dampings and stiffnesses per mass.
+
+    Args:
+        impedance: Rows mass, damping, stiffness, shape (3 m,).
+    """
+    mass, damping, stiffness = ca.vertsplit(impedance, impedance.numel() // 3)
+    yields = stiffness < ca.inf
+    return Rates(damping / mass, where(yields, stiffness, 0.0) / mass, yields)
+
+
+def transition_of(impedance: Any, time: float) -> tuple[tuple[Any, ...], Rates]:
+    """Return the :func:`transition` of all coordinates, and their rates.
+
+    Args:
+        impedance: Rows mass, damping, stiffness, shape (3 m,).
+        time: T [s].
+    """
+    rates = rates_of(impedance)
+    return transition(rates.damping, rates.stiffness, time), rates
+
+
+def transition(damping: Any, stiffness: Any, time: float) -> tuple[Any, ...]:
+    """Return the solution of ``e'' + damping e' + stiffness e = f``, f held, in closed form.
+
+    Args:
+        damping: ``d / m`` >= 0, shape (m,) [1/s].
+        stiffness: ``k / m`` >= 0, shape (m,) [1/s^2].
+        time: ``T`` > 0 [s].
+
+    Returns:
+        ``(a, b, c, d, p)`` with ``e(T) = a e + b e' + p f``, ``e'(T) = c e + d e' + b f``;
+        accurate to rounding for any damping ratio, and for zero stiffness and damping.
+    """
+    h = 0.5 * damping
+    square = h * h - stiffness
+    swings, w = square < 0.0, ca.sqrt(ca.fabs(square))
+    # two real roots, the slow one without a difference of what is nearly equal
+    slow = where(h > 0.0, -stiffness / (h + w), 0.0)
+    decay = ca.exp(slow * time)
+    b_real = decay * where(w > 0.0, -ca.expm1(-2.0 * w * time) / (2.0 * w), time)
+    a_real, d_real = decay - slow * b_real, decay - (h + w) * b_real
+    x = slow * time
+    p_real = (time * where(ca.fabs(x) > 0.0, ca.expm1(x) / x, 1.0) - b_real) / (h + w)
+    # two complex ones
+    decay = ca.exp(-h * time)
+    b_swing, cosine = decay * ca.sin(w * time) / w, decay * ca.cos(w * time)
+    a_swing, d_swing = cosine + h * b_swing, cosine - h * b_swing
+    p_swing = (1.0 - a_swing) / stiffness
+    a, b, d, p = (
+        where(swings, swing, real)
+        for swing, real in (
+            (a_swing, a_real),
+            (b_swing, b_real),
+            (d_swing, d_real),
+            (p_swing, p_real),
+        )
+    )
+    gentle = ca.logic_and(h * time < _SERIES_DAMPING, stiffness * time**2 < _SERIES_STIFFNESS)
+    series = _series(damping * time, stiffness * time**2) * time**2
+    return a, b, -stiffness * b, d, where(gentle, series, p)
+
+
+def _series(damping: Any, stiffness: Any) -> Any:
+    """Return e(1) from rest for f = 1, as a Taylor series."""
+    c_0, c_1, total = 0.0, 0.5, 0.5
+    for n in range(1, _SERIES_TERMS):
+        c_0, c_1 = c_1, -(damping * (n + 1) * c_1 + stiffness * c_0) / ((n + 1) * (n + 2))
+        total += c_1
+    return total

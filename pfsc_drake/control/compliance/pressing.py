@@ -1,13 +1,123 @@
-"""A force reference, added to the forces that a filter yields to."""
+"""A force with which a tool is to press on a surface, added to what a filter yields to."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_of, where
+from pfsc_drake.control.law.reference import Transition
+from pfsc_drake.errors import InputError
+
+# of the largest reference, by which the force may differ from it
+_ALLOWED = 1.5
+
+
+@dataclass
+class PressParameters:
+    """Force reference of the transversal coordinate, in place of a place.
+
+    With the impedance ``m xi'' + d xi' = tau_perp + f`` and no stiffness the tool moves at
+    ``|f| / d`` until the workpiece bears it, and then presses with ``|f|``: on the way to the
+    workpiece with little, to be slow without much damping, which would turn a slope of the
+    workpiece into a force; from touch-down with all of it; in the end the other way, off the
+    workpiece. A force that went on would carry the tool away for ever, and so would what is left
+    of the sensor's bias: the last part of the way off is led by a spring, which holds the tool
+    there.
+
+    Attributes:
+        force: With which it presses against the normal [N].
+        approach: The same until touch-down [N].
+        retreat: With which it is taken off along the normal [N], a positive number.
+        clearance: How far it is taken off from where it pressed [m], a positive number.
+        begin: When it sets off [s].
+        touching: From which measured force on the tool is on the workpiece [N]; the approach
+            must reach it.
+        retreat_time: How long before the end of the reference it is taken off [s].
+        ramp: Time of every change, which is C^4 [s].
+        limit: By how much the measured force may differ from its reference, either way, before
+            that is a fault [N]; 0 for one and a half times the largest reference. While the tool
+            moves free it differs by the reference itself.
+    """
+
+    force: float = 20.0
+    approach: float = 6.0
+    retreat: float = 6.0
+    clearance: float = 0.01
+    begin: float = 0.1
+    touching: float = 3.0
+    retreat_time: float = 0.5
+    ramp: float = 0.1
+    limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        for key in ("force", "approach", "begin", "retreat_time"):
+            self._require(key, 0.0 <= getattr(self, key) <= 1e6, "zero or a positive number")
+        # without it nothing would hold the tool once it does not press any more
+        self._require("retreat", 0.0 < self.retreat <= 1e6, "a positive number of newtons")
+        self._require("clearance", 0.0 < self.clearance <= 1e3, "a positive number of meters")
+        self._require("ramp", 0.0 < self.ramp <= 1e6, "a positive number of seconds")
+        if self.force > 0.0:
+            reached = 0.0 < self.touching < self.approach
+            allowed = f"a positive number below approach = {self.approach:g} N"
+            self._require("touching", reached, allowed)
+        wide = self.limit == 0.0 or self._largest < self.limit <= 1e6
+        allowed = f"0, or more than the largest reference of {self._largest:g} N"
+        self._require("limit", wide, allowed)
+
+    @property
+    def _largest(self) -> float:
+        """Largest magnitude of the reference [N]."""
+        return max(self.force, self.approach, self.retreat)
+
+    @property
+    def allowed_difference(self) -> float:
+        """By how much the measured force may differ from its reference [N]."""
+        return self.limit or _ALLOWED * self._largest
+
+    def _require(self, key: str, good: bool, allowed: str) -> None:
+        if not good:
+            raise InputError(f"{key} = {getattr(self, key)}: must be {allowed}")
+
+    def taken_off(self, end: float) -> float:
+        """Return from when on the tool is taken off [s].
+
+        Args:
+            end: When the reference ends [s].
+        """
+        return end - self.retreat_time
+
+    def over_time(self, end: float, stiffest: float) -> Callable[[Any, Any, Any], Any]:
+        """Return the force along the inward normal that the workpiece is to bear.
+
+        Args:
+            end: When the reference ends [s].
+            stiffest: Stiffness up to which the tool does not swing, ``d^2 / (4 m)`` [N/m]; that of
+                the spring in the end is half the clearance's for ``retreat``, or this if less.
+
+        Returns:
+            Function of the time, of the time of touch-down, infinite before it, and of how far the
+            tool is from where it was when it began to be taken off, [s], [s], [m] -> [N]; of
+            numbers or expressions.
+        """
+        rest, off = Transition(self.ramp, 0), self.taken_off(end)
+        stiffness = min(2.0 * self.retreat / self.clearance, stiffest)
+
+        def change(time: Any, begin: Any) -> Any:
+            return 1.0 - rest.at(time - begin)
+
+        def force(time: Any, touch_down: Any, lifted: Any) -> Any:
+            pressed = self.approach * change(time, self.begin)
+            pressed += (self.force - self.approach) * change(time, touch_down)
+            share_off = change(time, off)
+            spring = stiffness * (self.clearance - lifted)
+            lift = ca.fmax(-self.retreat, ca.fmin(self.retreat, spring))
+            return (1.0 - share_off) * pressed - share_off * lift
+
+        return force
 
 
 class Pressing(Block):

@@ -1,4 +1,4 @@
-"""Taking weight and inertia of the tool off a force/torque measurement, and taring it."""
+"""A tool's weight and inertia taken off a force/torque measurement; what a sensor stops for."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -10,13 +10,15 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.compliance.still_components import (
+from pfsc_drake.control.compliance.taring import (
     STILL_TIME,
+    TARING_BLOCK,
+    Taring,
     memory_size,
     stands_still,
 )
-from pfsc_drake.control.compliance.taring import TARING_BLOCK, Taring
 from pfsc_drake.control.estimation.filters import LowPass
+from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
 from pfsc_drake.robot.robot_model import RobotModel
@@ -281,3 +283,37 @@ class ToolCompensation(Block):
             name: where(tares, where(goes_on, getattr(stretch, name), 0.0), getattr(x, name))
             for name in Taring.states
         }
+
+
+class Alarms(Block):
+    """Turns what force sensor and compliance tell into a fault.
+
+    Ports:
+        alarms (input, optional): A
+            :class:`~pfsc_drake.control.compliance.tool_compensation.SensorFault`, whether the
+            sensor is tared, before which its range does not matter, an
+            :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`, and whether the
+            force with which the robot presses is lost, shape (4,).
+        fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
+    """
+
+    def __init__(self) -> None:
+        self.inputs = {"alarms": Port(4, optional=True)}
+        self.outputs, self.states = {"fault": Port(1)}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        if u.alarms is None:
+            return {"fault": ca.DM(Fault.NONE)}
+        sensor, tared, compliance, press_lost = ca.vertsplit(u.alarms)
+        fault = first_of(
+            (sensor == SensorFault.LOST, Fault.FORCE_SENSOR_LOST),
+            (
+                ca.logic_and(sensor == SensorFault.SATURATED, tared),
+                Fault.FORCE_SENSOR_SATURATED,
+            ),
+            (compliance, Fault.COMPLIANCE_INVALID),
+            (press_lost, Fault.PRESS_FORCE_LOST),
+            otherwise=Fault.NONE,
+        )
+        return {"fault": fault}

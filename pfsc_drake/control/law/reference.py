@@ -1,10 +1,14 @@
-"""Reference motions along a path."""
+"""Reference motions along a path, and a start at the tool without a jump."""
 
 from collections.abc import Sequence
 from math import comb
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 
@@ -171,3 +175,103 @@ def _checked_places(places: Sequence[Sequence[float]]) -> np.ndarray:
             "finite numbers each are needed"
         )
     return np.array(places, dtype=float)
+
+
+# from 0 to 1 on a unit interval with four derivatives that vanish at both ends, so that the
+# reference of the elastic law, which needs four (3.67), is steady
+_STEP = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
+_HIGHEST_ORDER = 4
+
+
+class Transition:
+    """What is left of the distance at the start, ``s(t)``, from 1 to 0 with derivatives.
+
+    A reference ``y_d(t) + s(t) (y(0) - y_d(0))`` starts where ``y(0)`` is, at rest if ``y_d`` is,
+    and is ``y_d`` from ``duration`` on.
+
+    Args:
+        duration: How long it takes [s].
+        order: Highest derivative that is needed, at most 4.
+
+    Attributes:
+        duration: How long it takes [s].
+        order: Highest derivative.
+
+    Raises:
+        InputError: If the duration is not positive or the order too high.
+    """
+
+    def __init__(self, duration: float, order: int) -> None:
+        if not (np.isfinite(duration) and duration > 0.0):
+            raise InputError(f"transition: {duration} s; must be a positive number")
+        if not 0 <= order <= _HIGHEST_ORDER:
+            raise InputError(f"transition: order {order}; must be 0 to {_HIGHEST_ORDER}")
+        self.duration, self.order = duration, order
+        rest = 1.0 - _STEP
+        # row k holds the coefficients of the k-th derivative, in real time
+        self._coefficients = np.zeros((order + 1, rest.coef.size))
+        for k in range(order + 1):
+            derivative = np.asarray((rest.deriv(k) if k else rest).coef, dtype=float)
+            self._coefficients[k, : derivative.size] = derivative / duration**k
+
+    def at(self, time: Any) -> Any:
+        """Return ``s`` and its derivatives, shape (order + 1,) [1, 1/s, ..].
+
+        Args:
+            time: Since the start [s], number or expression; earlier is the start, later than the
+                duration its end.
+        """
+        x = ca.fmin(ca.fmax(time / self.duration, 0.0), 1.0)
+        s = ca.DM.zeros(self.order + 1)
+        for coefficients in reversed(self._coefficients.T):
+            s = s * x + ca.DM(coefficients)
+        return s
+
+
+class SmoothStart(Block):
+    """Lets a reference start where the tool is, and go over to the wanted one, see Transition.
+
+        y_p(t) = y_d(t) + s(t) (y(0) - y_d(0))
+
+    Ports:
+        desired_reference (input): Derivatives 0..order of the wanted reference ``y_d`` by rows,
+            shape ((order + 1) m,).
+        manifold_state (input): Derivatives 0.. of the virtual output y by rows, m each, which is
+            read at the start only.
+        reference (output): Derivatives 0..order of ``y_p`` by rows, shape ((order + 1) m,).
+
+    State:
+        distance: ``y(0) - y_d(0)``, shape (m,); a tool that is nowhere has none. begin: Tick at
+        the start.
+
+    Args:
+        duration: How long the transition takes [s].
+        order: Highest derivative.
+        num_outputs: m.
+        state_size: Of ``manifold_state``.
+        period: Sampling time [s].
+
+    Raises:
+        InputError: If duration or order are out of range.
+    """
+
+    def __init__(
+        self, duration: float, order: int, num_outputs: int, state_size: int, period: float
+    ) -> None:
+        self._transition, self._m, self._period = Transition(duration, order), num_outputs, period
+        size = (order + 1) * num_outputs
+        self.inputs = {"desired_reference": Port(size), "manifold_state": Port(state_size)}
+        self.outputs = {"reference": Port(size)}
+        self.states = {"distance": num_outputs, "begin": 1}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        distance = u.manifold_state[: self._m] - u.desired_reference[: self._m]
+        return {"distance": where(is_finite(distance), distance, 0.0), "begin": t}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        elapsed = (t - x.begin) * self._period
+        left = ca.vec(x.distance @ self._transition.at(elapsed).T)
+        rest = where(elapsed < self._transition.duration, left, 0.0)
+        return {"reference": u.desired_reference + rest}

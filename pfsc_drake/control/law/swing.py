@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.control.law.transition import Transition
+from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.errors import InputError
 
 
@@ -118,3 +119,41 @@ class SwingingManifold(Block):
         """See :class:`Block`."""
         swings = self._swings.at(t * self._period)
         return {"reference": u.desired_reference + ca.vec(swings.T)}
+
+
+_SAMPLES = 2001
+
+
+class SwingingCourse:
+    """A course ``A s(t) sin(2 pi f (t - begin))`` over a region's clock, see :class:`Swing`.
+
+    Args:
+        amplitude: A [m], or [rad].
+        frequency: f [Hz].
+        begin: Until when it rests [s].
+        ramp: Time in which s rises from 0 to 1 [s].
+
+    Attributes:
+        largest_rate: A bound of its absolute rate [m/s], or [rad/s].
+
+    Raises:
+        InputError: A number that is none of a swing.
+    """
+
+    def __init__(
+        self, amplitude: float, frequency: float, *, begin: float = 0.0, ramp: float = 0.5
+    ) -> None:
+        unit = Swing(amplitude=1.0, frequency=frequency, begin=begin, ramp=ramp)
+        self._unit = SwingingReference([unit], first=0, transversal=1, outputs=1, order=0)
+        self._amplitude = amplitude
+        clock = ca.SX.sym("clock")
+        moving = SwingingReference([unit], first=0, transversal=1, outputs=1, order=2).at(clock)
+        times, step = np.linspace(begin, begin + ramp, _SAMPLES, retstep=True)
+        _, rates, bends = np.abs(ca.Function("moving", [clock], [moving])(times[None]).full())
+        # between two samples it changes by half a step at most
+        rising = float(rates.max() + 0.5 * step * bends.max())
+        self.largest_rate = abs(amplitude) * max(2.0 * math.pi * frequency, rising)
+
+    def at(self, clock: ca.MX) -> ca.MX:
+        """See :class:`~pfsc_drake.geometry.regions.course.Course`."""
+        return self._amplitude * self._unit.at(clock)

@@ -1,5 +1,7 @@
-"""Motion along a manifold over time, at the pace that an override asks for."""
+"""Motion along a manifold over time: planned, at the pace of an override, or streamed."""
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -7,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from pfsc_drake.blocks.block import Block, Port, Values
-from pfsc_drake.blocks.cases import where
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.checks import require_positive
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.piece_table import PieceTable
@@ -134,3 +136,132 @@ def _filter_step(order: int, bandwidth: float, period: float) -> np.ndarray:
     rates[order, 1 : order + 1] = -poles[:-1]
     rates[order, order + 1] = poles[0]
     return np.asarray(expm(period * rates)[: order + 1])
+
+
+@dataclass
+class StreamLimits:
+    """How fast a tool goes to way points that come one after the other.
+
+    Attributes:
+        velocity: Largest speed V [m/s].
+        acceleration: Largest acceleration A [m/s^2].
+        bandwidth: Of the filter that makes it smooth enough for the law [1/s].
+    """
+
+    velocity: float = 0.1
+    acceleration: float = 0.5
+    bandwidth: float = 20.0
+
+    def __post_init__(self) -> None:
+        for key in ("velocity", "acceleration", "bandwidth"):
+            require_positive(key, getattr(self, key))
+
+
+class StreamedReference(Block):
+    """Reference of the arc length towards the last way point that has come.
+
+    A point p on the path goes to the last way point g with a speed v that each tick changes by
+    ``A T`` at most, to the largest from which it can still stop there::
+
+        v+ = min(V, v + A T, A (sqrt(T^2 + 2 c / A) - T)),   c = g - p - T v / 2
+        p+ = p + T (v + v+) / 2
+
+    so that always ``p + T v / 2 + v^2 / (2 A) <= g``. The reference follows p through r equal lags,
+    ``(d/dt / bandwidth + 1)^r y = p``, exactly between ticks. Their impulse response is positive
+    and its integral is 1: y is a mean of where p has been, and so are its rates. Hence y has r
+    continuous derivatives whenever way points come, is never beyond the last one, nor faster than
+    V, nor accelerated more than A. When the stream runs dry it comes to rest there. Transversal and
+    rotational references are zero.
+
+    Ports:
+        goal (input): Arc length of the last way point [m], shape (1,). What is no number, or less
+            than one before, changes nothing: way points come one behind the other.
+        speed (input, optional): Largest speed from now on [m/s], shape (1,), limited to 0 .. V; V
+            if not connected. What is no number counts as 0.
+        reference (output): Derivatives 0..r of ``yhat_p`` by rows, shape ((r + 1) m,)
+            [m, m/s, ...].
+
+    State:
+        goal: g [m]. place: ``[p, v]`` [m, m/s]. filtered: Derivatives 0..r-1 of y, shape (r,).
+
+    Args:
+        limits: How fast it goes.
+        order: r, of the highest derivative.
+        num_outputs: m.
+        period: Sampling time T [s].
+        start: Where it rests at first [m].
+        end: Where the path ends [m]; way points beyond it are taken for its end.
+    """
+
+    def __init__(
+        self,
+        limits: StreamLimits,
+        order: int,
+        num_outputs: int,
+        period: float,
+        *,
+        start: float = 0.0,
+        end: float = math.inf,
+    ) -> None:
+        self._limits, self._order, self._m, self._period = limits, order, num_outputs, period
+        self._start, self._end = start, end
+        self._rates = _lags(order, limits.bandwidth)
+        self._step = ca.DM(expm(period * self._rates)[:-1])
+        self.inputs = {"goal": Port(1, "m"), "speed": Port(1, "m/s", optional=True)}
+        self.outputs = {"reference": Port((order + 1) * num_outputs, "m, m/s, ..")}
+        self.states = {"goal": 1, "place": 2, "filtered": order}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`; at rest."""
+        start = ca.DM(self._start)
+        rest = ca.DM.zeros(self._order - 1)
+        return {
+            "goal": start,
+            "place": ca.vertcat(start, 0.0),
+            "filtered": ca.vertcat(start, rest),
+        }
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        top = ca.DM(self._rates[self._order - 1, :-1]).T @ ca.vertcat(x.filtered, x.place)
+        eta = ca.vertcat(x.filtered, top)
+        rest = ca.MX(self._order + 1, self._m - 1)
+        return {"reference": ca.vec(ca.horzcat(eta, ca.densify(rest)).T)}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        goal = ca.fmax(x.goal, ca.fmin(where(is_finite(u.goal), u.goal, x.goal), self._end))
+        speed = self._speed(x, u, goal)
+        acceleration = (speed - x.place[1]) / self._period
+        after = self._step @ ca.vertcat(x.filtered, x.place, acceleration)
+        # rounding must not lead beyond it
+        place = ca.fmin(after[self._order], goal)
+        return {
+            "goal": goal,
+            "place": ca.vertcat(place, speed),
+            "filtered": after[: self._order],
+        }
+
+    def _speed(self, x: Values, u: Values, goal: Any) -> Any:
+        """Return ``v+``."""
+        A, T, fastest = self._limits.acceleration, self._period, ca.DM(self._limits.velocity)
+        if u.speed is not None:
+            asked = where(is_finite(u.speed), u.speed, 0.0)
+            fastest = ca.fmin(ca.fmax(asked, 0.0), fastest)
+        place, speed = ca.vertsplit(x.place)
+        left = ca.fmax(goal - place - T * speed / 2.0, 0.0)
+        # the difference of two roots, without cancellation
+        to_stop = 2.0 * left / (ca.sqrt(T**2 + 2.0 * left / A) + T)
+        wanted = ca.fmin(ca.fmin(fastest, speed + A * T), to_stop)
+        return ca.fmax(wanted, ca.fmax(speed - A * T, 0.0))
+
+
+def _lags(order: int, bandwidth: float) -> np.ndarray:
+    """Return the rates of ``[y, y', .., y^(r-1), p, v, a]``, shape (r + 3, r + 3)."""
+    poles = np.polynomial.polynomial.polyfromroots([-bandwidth] * order)
+    rates = np.zeros((order + 3, order + 3))
+    rates[: order - 1, 1:order] = np.eye(order - 1)
+    rates[order - 1, :order] = -poles[:-1]
+    rates[order - 1, order] = poles[0]
+    rates[order, order + 1] = rates[order + 1, order + 2] = 1.0
+    return rates

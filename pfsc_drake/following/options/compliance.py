@@ -5,9 +5,12 @@ import dataclasses as dc
 import numpy as np
 
 from pfsc_drake.checks import require, require_between, require_not_negative, require_positive
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, ImpedanceParameters
-from pfsc_drake.control.compliance.press import PressParameters
-from pfsc_drake.control.compliance.slow_ends import SlowEnds
+from pfsc_drake.control.compliance.impedance_parameters import (
+    CoordinateImpedance,
+    ImpedanceParameters,
+    SlowEnds,
+)
+from pfsc_drake.control.compliance.pressing import PressParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 
 SOURCES = ("sensor", "observed")

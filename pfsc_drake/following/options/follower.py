@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pfsc_drake.control.law.streamed_reference import StreamLimits
+from pfsc_drake.control.law.timed_reference import StreamLimits
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.faults import FaultParameters

@@ -5,14 +5,13 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPor
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant, Rows
-from pfsc_drake.control.compliance.alarms import Alarms
-from pfsc_drake.control.law.drive_watch import DriveWatch
+from pfsc_drake.control.compliance.tool_compensation import Alarms
 from pfsc_drake.control.law.exact_linearization import ExactLinearization
-from pfsc_drake.control.law.fault_latch import FaultLatch, FaultSwitch
+from pfsc_drake.control.law.fault import FaultLatch, FaultSwitch
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
-from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
+from pfsc_drake.control.law.supervision import DriveWatch, Supervision, SupervisionParameters
 from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fault_access import FaultAccess

@@ -7,7 +7,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant
-from pfsc_drake.control.law.fault_latch import FaultLatch, FaultSwitch
+from pfsc_drake.control.law.fault import FaultLatch, FaultSwitch
 from pfsc_drake.control.law.safe_stop import SafeState, SafeStop
 from pfsc_drake.control.law.supervision import Supervision, SupervisionParameters
 from pfsc_drake.physics.velocity_servo import SampledServo, VelocityServoLaw

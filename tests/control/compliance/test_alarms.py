@@ -3,8 +3,7 @@
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.alarms import Alarms
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.tool_compensation import Alarms, SensorFault
 from pfsc_drake.control.law.fault import Fault
 
 

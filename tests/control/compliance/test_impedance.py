@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance import ImpedanceStatus, transition
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
-    ImpedanceStatus,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_transition import transition
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed

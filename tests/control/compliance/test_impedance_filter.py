@@ -9,14 +9,13 @@ from pydrake.systems.primitives import (
     VectorLogSink,
 )
 
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw, ImpedanceStatus
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
-    ImpedanceStatus,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.path import PathManifold

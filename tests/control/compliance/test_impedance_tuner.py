@@ -6,14 +6,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
-from pfsc_drake.control.compliance.impedance import (
-    STIFFNESS,
+from pfsc_drake.control.compliance.impedance import STIFFNESS, ImpedanceLaw
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.systems.block_system import BlockSystem

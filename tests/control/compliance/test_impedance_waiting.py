@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.systems.block_system import BlockSystem
 

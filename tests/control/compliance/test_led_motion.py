@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
     Profile,

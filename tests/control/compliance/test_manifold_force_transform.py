@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.manifold_force_transform import ManifoldForceTransform
+from pfsc_drake.control.compliance.impedance_filter import ManifoldForceTransform
 from pfsc_drake.control.manifolds.manifold import manifold_force_function
 from pfsc_drake.control.manifolds.path import PathManifold
 

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control.compliance.press import PressParameters
+from pfsc_drake.control.compliance.pressing import PressParameters
 from pfsc_drake.errors import InputError
 
 END, STIFF = 5.0, 1e6

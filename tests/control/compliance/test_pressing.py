@@ -10,15 +10,14 @@ from pfsc_drake.blocks.cases import where
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.impedance import (
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
-    ImpedanceLaw,
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter
-from pfsc_drake.control.compliance.press import PressParameters
-from pfsc_drake.control.compliance.pressing import Pressing
+from pfsc_drake.control.compliance.pressing import Pressing, PressParameters
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.systems.block_system import BlockSystem
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.impedance import (
-    DAMPING,
-    STIFFNESS,
+from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
     Profile,

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.drive_watch import DriveWatch
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.supervision import SupervisionParameters
+from pfsc_drake.control.law.supervision import DriveWatch, SupervisionParameters
 
 PERIOD, LIMITS = 1e-3, np.array([10.0, 1800.0])
 

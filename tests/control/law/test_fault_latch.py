@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.control.law.fault_latch import FaultLatch, FaultSwitch
+from pfsc_drake.control.law.fault import Fault, FaultLatch, FaultSwitch
 
 
 def test_the_first_fault_stays():

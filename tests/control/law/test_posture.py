@@ -4,8 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.posture import Posture, posture_expressions
-from pfsc_drake.control.law.posture_potential import free_motion_function
+from pfsc_drake.control.law.posture import Posture, free_motion_function, posture_expressions
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 
 N = 3

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.law.smooth_start import SmoothStart
-from pfsc_drake.control.law.transition import Transition
+from pfsc_drake.control.law.reference import SmoothStart, Transition
 
 WANTED = np.array([0.5, 0.0, 0.1, 0.0, 0.0, 0.0])  # of two outputs with two derivatives
 PERIOD = 1e-3

@@ -7,7 +7,7 @@ from scipy.stats import gamma
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.reference import rest_to_rest
-from pfsc_drake.control.law.streamed_reference import StreamedReference, StreamLimits
+from pfsc_drake.control.law.timed_reference import StreamedReference, StreamLimits
 from pfsc_drake.errors import InputError
 
 PERIOD, M = 1e-3, 3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.law.transition import Transition
+from pfsc_drake.control.law.reference import Transition
 from pfsc_drake.errors import InputError
 
 DURATION = 0.4

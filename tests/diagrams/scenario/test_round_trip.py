@@ -12,7 +12,7 @@ import pytest
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_catalog import scenario_names
 from experiments.catalog.scenario_file import read_scenario
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.reading import parse_yaml

@@ -16,7 +16,7 @@ from diagrams.scenario import (
 from diagrams.tasks.make import make_task
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 

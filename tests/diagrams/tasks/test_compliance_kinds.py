@@ -10,7 +10,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, Scenario
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
-from pfsc_drake.control.compliance.impedance import CoordinateImpedance, Profile
+from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.geometry import quaternion_to_matrix
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from pfsc_drake.control.compliance.slow_ends import SlowEnds
+from pfsc_drake.control.compliance.impedance_parameters import SlowEnds
 
 # held above the bores, which are half as far beside the path, and looked at but shortly
 SHORTENED = (

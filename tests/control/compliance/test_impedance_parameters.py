@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pfsc_drake.control.compliance.impedance import (
-    DAMPING,
+from pfsc_drake.control.compliance.impedance import DAMPING
+from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
     Profile,
+    SlowEnds,
 )
-from pfsc_drake.control.compliance.slow_ends import SlowEnds
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.errors import InputError
 from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers

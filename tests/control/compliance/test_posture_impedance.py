@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pfsc_drake.control.compliance.null_space_impedance import (
+from pfsc_drake.control.compliance.posture_impedance import (
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
 )

@@ -8,14 +8,13 @@ import pytest
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.null_space_impedance import (
+from pfsc_drake.control.compliance.posture_impedance import (
     NullSpaceImpedance,
     NullSpaceImpedanceParameters,
+    YieldingPosture,
 )
-from pfsc_drake.control.compliance.yielding_posture import YieldingPosture
 from pfsc_drake.control.law.linearization import decoupling_function
-from pfsc_drake.control.law.posture import Posture
-from pfsc_drake.control.law.posture_potential import free_motion_function
+from pfsc_drake.control.law.posture import Posture, free_motion_function
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
