@@ -117,14 +117,11 @@ def _pace(override: Any) -> Any:
 def _derivatives(curve: PiecewisePolynomialCurve, order: int) -> PieceTable:
     """Return the table of derivatives 0..order of all coordinates, one coordinate after another."""
     pieces, powers, dimension = curve.coefficients.shape
-    table = np.zeros((pieces, dimension * (order + 1), powers))
-    for k in range(dimension):
-        for piece in range(pieces):
-            polynomial = np.polynomial.Polynomial(curve.coefficients[piece, :, k])
-            for j in range(order + 1):
-                coefficients = polynomial.deriv(j).coef if j else polynomial.coef
-                table[piece, k * (order + 1) + j, : coefficients.size] = coefficients
-    return PieceTable(curve.breakpoints, table)
+    table = np.zeros((pieces, dimension, order + 1, powers))
+    table[:, :, 0] = curve.coefficients.transpose(0, 2, 1)
+    for j in range(1, order + 1):
+        table[:, :, j, :-1] = np.arange(1, powers) * table[:, :, j - 1, 1:]
+    return PieceTable(curve.breakpoints, table.reshape(pieces, -1, powers))
 
 
 def _filter_step(order: int, bandwidth: float, period: float) -> np.ndarray:
