@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagrams.scenario import Scenario
-from pfsc_drake.following.believed import Believed, Coefficients
+from pfsc_drake.following.law import Believed, Coefficients
 from pfsc_drake.physics.joint_encoders import encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel
 

@@ -44,7 +44,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.systems.control.following_controller import ControllerAccess
+from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 

@@ -31,7 +31,7 @@ _DOOR = {
     "ComplianceParameters": "pfsc_drake.following.options.compliance",
     "ControllerParameters": "pfsc_drake.following.options.controller",
     "CoordinateImpedance": "pfsc_drake.control.compliance.impedance",
-    "FaultParameters": "pfsc_drake.following.options.faults",
+    "FaultParameters": "pfsc_drake.following.options.follower",
     "Fixture": "pfsc_drake.control.fixtures.parameters",
     "Follower": "pfsc_drake.following.follower",
     "FollowerOptions": "pfsc_drake.following.options.follower",

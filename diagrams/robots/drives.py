@@ -15,7 +15,7 @@ from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.safety import safe_state, supervision
+from pfsc_drake.following.law import safe_state, supervision
 from pfsc_drake.physics.bus_delay import BusDelay
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains

@@ -21,10 +21,14 @@ from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
 from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.following.options.compliance import ComplianceParameters
-from pfsc_drake.following.options.controller import ControllerParameters, GainParameters, LawGains
-from pfsc_drake.following.options.faults import BrakeParameters, FaultParameters
+from pfsc_drake.following.options.controller import (
+    ControllerParameters,
+    GainParameters,
+    LawGains,
+    PostureParameters,
+)
+from pfsc_drake.following.options.follower import BrakeParameters, FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
-from pfsc_drake.following.options.posture import PostureParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.joint_encoders import EncoderOptions

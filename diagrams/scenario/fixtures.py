@@ -5,7 +5,7 @@ import dataclasses as dc
 from diagrams.scenario.checks import require, require_between
 from diagrams.scenario.region import RegionParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
-from pfsc_drake.following.options.fixtures import FixtureOptions
+from pfsc_drake.following.options.follower import FixtureOptions
 
 _START = ("refuse", "move_out")
 

@@ -27,7 +27,7 @@ from diagrams.scenario.workpiece import WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters

@@ -18,15 +18,14 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.believed import Coefficients
 from pfsc_drake.following.compliance import reference_order
-from pfsc_drake.following.controller import add_controller
+from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Wanted
-from pfsc_drake.following.reference import add_reference
+from pfsc_drake.following.law import Coefficients
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.following_controller import FollowingController
 
 # what guidance tells, for the log
 _GUIDANCE = {"guidance": "record", "mode": "mode"}

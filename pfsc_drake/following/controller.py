@@ -1,18 +1,97 @@
-"""A law with all that tells it of forces and friction, and of where spare joints are to be."""
+"""A law with what tells it of its reference, of forces and friction, and of spare joints."""
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
+from pfsc_drake.blocks.wiring_blocks import Collect, Constant
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.following.believed import Believed
-from pfsc_drake.following.external_torque import add_external_torque
+from pfsc_drake.control.law.linearization import Linearization
+from pfsc_drake.control.law.reference import SmoothStart
+from pfsc_drake.following.compliance import add_compliance, has_impedance, reference_order
+from pfsc_drake.following.followed import Wanted
 from pfsc_drake.following.friction import add_friction_compensation
-from pfsc_drake.following.observed_forces import add_observed_forces
-from pfsc_drake.following.options.compliance import ObservedForceParameters
+from pfsc_drake.following.law import Believed, supervision
+from pfsc_drake.following.observed_forces import add_external_torque, add_observed_forces
+from pfsc_drake.following.options.compliance import ComplianceParameters, ObservedForceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import add_posture_reference
-from pfsc_drake.following.safety import supervision
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.following_controller import FollowingController
+
+# what stops the robot, in the order of the port that is told
+_ALARMS = ("sensor_fault", "tared", "compliance_status", "press_lost")
+
+
+def add_reference(
+    builder: DiagramBuilder,
+    controller: FollowingController,
+    linearization: Linearization,
+    robot: RobotModel,
+    compliance: ComplianceParameters,
+    wanted: Wanted,
+    ports: dict[str, OutputPort],
+) -> dict[str, OutputPort]:
+    """Connect ``reference`` and ``alarms`` of a controller.
+
+    Args:
+        builder: Builder of the diagram.
+        controller: The controller.
+        linearization: Of its law.
+        robot: The robot as it is believed, N joints.
+        compliance: How the tool yields.
+        wanted: What is wanted of the tool.
+        ports: ``desired_reference``, derivatives up to :func:`reference_order` by rows, and what
+            :func:`add_compliance` takes; of a force sensor ``sensor_fault`` and ``tared``.
+
+    Returns:
+        ``reference`` as the law is told, and what :func:`add_compliance` returns for the log.
+
+    Raises:
+        InputError: If the compliance does not suit the law.
+    """
+    m, period = linearization.num_outputs, controller.period
+    state, desired = controller.GetOutputPort("manifold_state"), ports["desired_reference"]
+    if wanted.transition > 0.0:
+        order = reference_order(compliance, linearization)
+        smooth = SmoothStart(wanted.transition, order, m, state.size(), period)
+        start = builder.AddNamedSystem("smooth_start", BlockSystem(smooth, period))
+        builder.Connect(desired, start.GetInputPort("desired_reference"))
+        builder.Connect(state, start.GetInputPort("manifold_state"))
+        desired = start.GetOutputPort("reference")
+    made = {"reference": desired}
+    if has_impedance(compliance, linearization.manifold):
+        told = ports | {"desired_reference": desired, "manifold_state": state}
+        made |= add_compliance(builder, compliance, linearization, robot, wanted, told, period)
+    _connect_alarms(builder, controller, ports, made)
+    builder.Connect(made["reference"], controller.GetInputPort("reference"))
+    return made
+
+
+def _connect_alarms(
+    builder: DiagramBuilder,
+    controller: FollowingController,
+    ports: dict[str, OutputPort],
+    made: dict[str, OutputPort],
+) -> None:
+    """Let the robot stop for faults of the force sensor and of the compliance, if there are any.
+
+    What compliance alone tells is taken out of what is made.
+    """
+    told = {name: ports[name] for name in _ALARMS if name in ports}
+    told |= {name: made.pop(name) for name in _ALARMS if name in made}
+    if not told:
+        return
+    period = controller.period
+    collect = Collect(dict.fromkeys(_ALARMS, 1))
+    alarms = builder.AddNamedSystem("alarms", BlockSystem(collect, period))
+    for name in _ALARMS:
+        if name not in told:
+            none = builder.AddNamedSystem(f"no_{name}", BlockSystem(Constant([0.0]), period))
+            told[name] = none.GetOutputPort("value")
+        builder.Connect(told[name], alarms.GetInputPort(name))
+    builder.Connect(alarms.GetOutputPort("all"), controller.GetInputPort("alarms"))
+
 
 # what an observer tells
 _OBSERVED = ("tau_ext_observed", "wrench_observed")

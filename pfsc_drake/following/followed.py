@@ -12,7 +12,7 @@ from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.options.fixtures import FixtureOptions
+from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 

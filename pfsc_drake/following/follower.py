@@ -17,19 +17,17 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
 from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.following.believed import Believed
 from pfsc_drake.following.compliance import reference_order
-from pfsc_drake.following.controller import add_controller
+from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Followed, Wanted
-from pfsc_drake.following.law import make_law
+from pfsc_drake.following.law import Believed, make_law
 from pfsc_drake.following.options.controller import (
     ControllerParameters,
     GainParameters,
     LawGains,
 )
 from pfsc_drake.following.options.follower import FollowerOptions
-from pfsc_drake.following.reference import add_reference
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest

@@ -14,11 +14,11 @@ from pfsc_drake.control.estimation.momentum import (
     drive_momentum,
 )
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.believed import Believed, Coefficients
+from pfsc_drake.following.law import Believed, Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.following_controller import FollowingController
 
 # by which part of itself a coefficient is thought to change from sample to sample
 _DRIFT = 1e-3

@@ -1,6 +1,7 @@
-"""The law of a controller."""
+"""The law of a controller, what it believes of the robot, and how it watches and stops it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,14 +13,83 @@ from pfsc_drake.control.law.linearization import (
     linearize,
 )
 from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.control.law.safe_stop import SafeState
+from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.gains import choose_poles, loop_gains
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.faults import FaultParameters
+from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import make_posture
-from pfsc_drake.following.safety import safe_state
 from pfsc_drake.robot.robot_model import RobotModel
+
+# f_c [Nm or N] and f_v [Nm s/rad or N s/m], each (N,)
+Coefficients = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Believed:
+    """A robot as its controller knows it, and how well its motion is measured.
+
+    Attributes:
+        robot: The robot, N joints.
+        friction: Coefficients f_c and f_v, if any are known.
+        resolution: Of the measured positions, shape (N,) [rad or m], or one for all.
+        velocity_delay: How old measured velocities are [s]; a difference quotient is that of
+            mid-interval.
+        filter_time: By how much measured velocities are smoothed besides [s].
+    """
+
+    robot: RobotModel
+    friction: Coefficients | None = None
+    resolution: np.ndarray | float = 0.0
+    velocity_delay: float = 0.0
+    filter_time: float = 0.0
+
+
+# s; a start beside the path takes a drive to its limit for some hundredths
+_SATURATION_TIME = 0.2
+
+
+def safe_state(
+    parameters: ControllerParameters, robot: RobotModel, faults: FaultParameters
+) -> SafeState:
+    """Return how a robot is stopped and held after a fault.
+
+    Args:
+        parameters: Of the controller.
+        robot: The robot as it is believed.
+        faults: What is a fault.
+    """
+    effort = robot.gather("effort_limit") * parameters.effort_scale
+    damping = parameters.brake_damping * np.where(np.isfinite(effort), effort, 0.0)
+    return SafeState(damping, faults.hold_bandwidth, faults.effort_share)
+
+
+def supervision(law: str, faults: FaultParameters, believed: Believed) -> SupervisionParameters:
+    """Return what is watched of a robot's joints.
+
+    Args:
+        law: Name of the law.
+        faults: What is a fault.
+        believed: The robot.
+    """
+    return SupervisionParameters(
+        tolerance=faults.plausibility,
+        resolution=np.broadcast_to(believed.resolution, believed.robot.dimension),
+        filter_time=believed.filter_time,
+        joint_limits=faults.joint_limits,
+        saturation_time=_saturation_time(law, faults.saturation_time),
+        chatter_turns=faults.chatter_turns,
+        overspeed=faults.overspeed,
+    )
+
+
+def _saturation_time(law: str, given: float | None) -> float:
+    """Return how long a drive may be at its limit [s]; 0 for ever."""
+    if given is not None:
+        return given
+    return 0.0 if RELATIVE_DEGREE[law] == 1 else _SATURATION_TIME
 
 
 def make_law(

@@ -15,13 +15,12 @@ from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.posture import Posture, PostureCoordinate, range_weight
 from pfsc_drake.control.law.stabilization import Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.following.options.posture import PostureParameters
+from pfsc_drake.following.options.controller import ControllerParameters, PostureParameters
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.following_controller import FollowingController
 
 _KEY = "controller.posture"
 # of the largest speed of a joint, what a posture may make of it together with the outputs

@@ -31,7 +31,7 @@ from pfsc_drake.geometry import (
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.following_controller import FollowingController
 
 PERIOD = 1e-3
 

@@ -13,7 +13,7 @@ from pfsc_drake.control.law.supervision import Supervision, SupervisionParameter
 from pfsc_drake.physics.velocity_servo import SampledServo, VelocityServoLaw
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.fault_access import FaultAccess
+from pfsc_drake.systems.following_controller import FaultAccess
 
 
 class VelocityServo(Diagram):

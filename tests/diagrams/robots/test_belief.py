@@ -50,7 +50,7 @@ def _is_control(system):
         return type(system.block).__module__.startswith("pfsc_drake.control")
     servo = module == "pfsc_drake.systems.physics.velocity_servo"
     # the surroundings look at the tool, too
-    return servo or module.startswith("pfsc_drake.systems.control")
+    return servo or module == "pfsc_drake.systems.near_regions"
 
 
 def _is_wire(system):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.control.law.fault import Fault
-from pfsc_drake.systems.control.following_controller import FollowingController
+from pfsc_drake.systems.following_controller import FollowingController
 
 PERIOD, THETA = 1e-3, 0.6
 FRICTION = np.array([30.0, -45.0, 12.0])

@@ -9,6 +9,7 @@ from pydrake.systems.framework import (
     Context,
     DiscreteValues,
     EventStatus,
+    InputPort,
     LeafSystem,
     ValueProducer,
 )
@@ -16,7 +17,6 @@ from pydrake.systems.framework import (
 from pfsc_drake.control.fixtures.fixture_guidance import NEAR_COLUMNS
 from pfsc_drake.control.fixtures.near_regions import FAR, NOTHING, ScheduledRegions
 from pfsc_drake.control.fixtures.program import MOST_NEAR
-from pfsc_drake.systems.optional_input import value_or_none
 
 
 class NearRegions(LeafSystem):
@@ -92,3 +92,15 @@ class NearRegions(LeafSystem):
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(self._seen.Eval(context)[1])
+
+
+def value_or_none(port: InputPort | None, context: Context) -> np.ndarray | None:
+    """Return the value of a vector input, None if nothing is connected or there is no port.
+
+    Args:
+        port: The port.
+        context: Of its system.
+    """
+    if port is None or not port.HasValue(context):
+        return None
+    return port.Eval(context)

@@ -10,7 +10,7 @@ from pfsc_drake.control.fixtures.parameters import GuidanceParameters
 from pfsc_drake.control.fixtures.program import MOST_NEAR
 from pfsc_drake.geometry.regions.moving import ShiftedRegion
 from pfsc_drake.geometry.regions.shapes import SphereRegion
-from pfsc_drake.systems.control.near_regions import NearRegions
+from pfsc_drake.systems.near_regions import NearRegions
 from tests.control.fixtures.walks import Swinging
 
 PERIOD, PARAMETERS = 1e-3, GuidanceParameters()

@@ -1,1 +1,0 @@
-"""Systems of a controller: they see what is measured and believed."""
