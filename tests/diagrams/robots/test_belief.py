@@ -48,9 +48,12 @@ def _is_control(system):
     module = type(system).__module__
     if isinstance(system, BlockSystem):
         return type(system.block).__module__.startswith("pfsc_drake.control")
-    servo = module == "pfsc_drake.systems.physics.velocity_servo"
     # the surroundings look at the tool, too
-    return servo or module == "pfsc_drake.systems.near_regions"
+    return module in (
+        "pfsc_drake.systems.physics.velocity_servo",
+        "pfsc_drake.systems.following_controller",
+        "pfsc_drake.systems.near_regions",
+    )
 
 
 def _is_wire(system):
