@@ -292,7 +292,6 @@ def _link(recording: Path | None, out: Path) -> str | None:
 @contextmanager
 def steady_clock() -> Iterator[None]:
     """Keep the garbage collector from walking, amid the measured time, through all made before."""
-    gc.collect()
     gc.freeze()
     try:
         yield
