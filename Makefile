@@ -6,7 +6,7 @@ DEMO_OUT := out/demo
 # a file's tests share what they build; in the order of folders, which ends with short files
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup demo test test-quick lint types unit fuzz benchmark models clean
+.PHONY: help setup demo test test-quick lint types unit fuzz benchmark models signals clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-quick the tests without those marked slow"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
+	@echo "make signals    write docs/signals.md anew from reporting/registry.toml"
 	@echo "make models     write the robot models anew from their parameters"
 
 setup: $(VENV)/.installed
@@ -60,6 +61,10 @@ fuzz: setup
 benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
 	$(BIN)/python -m tests.benchmarks.paces
+
+# the page of signals, metrics and figures
+signals: setup
+	$(BIN)/python -m reporting.registry > docs/signals.md
 
 models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer

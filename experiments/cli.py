@@ -36,6 +36,7 @@ from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
 from reporting.commands import FAULT, interruptible, run_app, show_page
 from reporting.progress import ProgressDisplay
+from reporting.registry import as_data, as_text
 
 if TYPE_CHECKING:
     from reporting.page import Report
@@ -68,8 +69,14 @@ app = typer.Typer(
 @app.command("list")
 def list_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list instead.")] = False,
+    signals: Annotated[
+        bool, typer.Option("--signals", help="Signals, metrics and figures of runs instead.")
+    ] = False,
 ) -> None:
     """List the shipped scenarios."""
+    if signals:
+        typer.echo(json.dumps(as_data(), indent=2) if as_json else as_text(), nl=as_json)
+        return
     entries = list_scenarios()
     if as_json:
         typer.echo(json.dumps([dataclasses.asdict(entry) for entry in entries], indent=2))

@@ -25,7 +25,6 @@ from experiments.results.path import path_following_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.press import press_metrics
 from experiments.results.promises import broken_promises, set_promises, unpromised_distance
-from experiments.results.pushes import lap_length
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
@@ -203,11 +202,11 @@ def _measure(
     limits = JointLimits.of(station.robot)
     metrics.update(limits.metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
-    metrics.update(posture_metrics(log, lap_length(station)))
-    metrics.add("real_time_factor", result.real_time_factor, "1")
+    metrics.update(posture_metrics(log, station.task.lap))
+    metrics.add("real_time_factor", result.real_time_factor)
     median, p99 = np.percentile(tick, [50, 99]) if len(tick) else (np.nan, np.nan)
-    metrics.add("controller_tick_us", float(median), "us", source="median")
-    metrics.add("controller_tick_us_p99", float(p99), "us")
+    metrics.add("controller_tick_us", float(median))
+    metrics.add("controller_tick_us_p99", float(p99))
     if analysis is not None:
         metrics.update({f"margins_{name}": m for name, m in metrics_of(analysis).items()})
     set_promises(metrics, settings)

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.text_file import read_text
+from reporting.registry import known_metric
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -65,11 +66,24 @@ class Metrics(UserDict[str, Metric]):
         self,
         name: str,
         value: float,
-        unit: str,
+        unit: str | None = None,
         target: str | None = None,
         source: str | None = None,
     ) -> None:
-        """Adds or replaces a metric; the arguments are those of :class:`Metric`."""
+        """Add or replace a metric.
+
+        Args:
+            name: Its name.
+            value: In ``unit``.
+            unit: SI unit; by default that of the registry, as is the source then.
+            target: See :class:`Metric`.
+            source: See :class:`Metric`.
+        """
+        if unit is None:
+            known = known_metric(name)
+            if known is None:
+                raise KeyError(f"no such metric {name!r} in the registry, and no unit")
+            unit, source = known.unit, source or known.source
         self[name] = Metric(float(value), unit, target, source)
 
     def set_target(self, name: str, target: str, source: str | None = None) -> None:

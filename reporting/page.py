@@ -11,6 +11,7 @@ from urllib.parse import quote
 from reporting.folder import ResultsFolder
 from reporting.manifest import FIGURES
 from reporting.metrics import Metric, Metrics
+from reporting.registry import known_metric
 from reporting.style import Figure
 from reporting.units import NARROW_SPACE, format_quantity
 
@@ -170,7 +171,8 @@ def _card(name: str, metric: Metric) -> str:
 def _table(metrics: Metrics) -> str:
     """All metrics."""
     rows = "\n".join(
-        f"<tr><td>{escape(_spoken(name, metric.unit))}<br><code>{escape(name)}</code></td>"
+        f"<tr{_meaning(name)}><td>{escape(_spoken(name, metric.unit))}<br>"
+        f"<code>{escape(name)}</code></td>"
         f'<td class="number">{_value(metric)}</td><td class="target">{_target(metric)}</td>'
         f"<td>{_mark(metric)}</td><td>{escape(metric.source or '')}</td></tr>"
         for name, metric in metrics.items()
@@ -183,6 +185,12 @@ def _table(metrics: Metrics) -> str:
         f'<div class="scroll"><table><thead>{head}</thead><tbody>\n{rows}\n</tbody></table></div>'
     )
     return _section("All metrics", table if metrics else "")
+
+
+def _meaning(name: str) -> str:
+    """What a metric is, to be read where the mouse rests."""
+    known = known_metric(name)
+    return "" if known is None else f' title="{escape(known.text)}"'
 
 
 def _value(metric: Metric) -> str:

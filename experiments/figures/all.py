@@ -50,6 +50,7 @@ from experiments.figures.posture import (
 from experiments.figures.virtual_input import draw_virtual_input, has_virtual_input
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals
+from reporting.registry import FIGURES
 from reporting.style import STYLE, Drawing, Figure, render
 
 _SPACE = 3  # tangential coordinates of a tool that is led freely
@@ -81,53 +82,56 @@ def draw_figures(
     """
     if log.time.size == 0:
         return
-    if "y_t" in log:
+    if _has_what_it_needs("path", log):
         yield draw_path(log, outline)
     if fit is not None:
         yield draw_surface_fit(fit)
-    for can_draw, draw in _FIGURES:
-        if can_draw(log):
+    for name, (draw, is_worth_it) in _DRAWN.items():
+        if _has_what_it_needs(name, log) and is_worth_it(log):
             yield draw(log)
 
 
-def _has(*signals: str) -> Callable[[RunLog], bool]:
-    """Condition that a log has these signals."""
-    return lambda log: all(signal in log for signal in signals)
+def _has_what_it_needs(figure: str, log: RunLog) -> bool:
+    return set(FIGURES[figure].needs) <= set(log.signals)
+
+
+def _always(_log: RunLog) -> bool:
+    return True
 
 
 def _is_along(log: RunLog) -> bool:
     """Whether there is a path or a surface to go along."""
-    return "eta" in log and log["eta"].values.shape[1] < _SPACE
+    return log["eta"].dim < _SPACE
 
 
-# In the order of the report: when a figure can be drawn, and what draws it.
-_FIGURES: list[tuple[Callable[[RunLog], bool], Callable[[RunLog], Drawing]]] = [
-    (_is_along, draw_progress),
-    (_has("pace", "tau_planned", "tau_d"), draw_pace),
-    (has_regions, draw_guidance),
-    (has_contact, draw_contact),
-    (gives_energy, draw_energy),
-    (held_by_robot, draw_limits),
-    (_has("seat_gap", "manifold_force", "damping"), draw_use_case),
-    (_has("seat_gap"), draw_mounting),
-    (_has("xi"), draw_transversal),
-    (_has("phi"), draw_orientation),
-    (_has("angles_e", "angles_d"), draw_angles),
-    (_has("axis_e", "axis_d"), draw_axis),
-    (has_virtual_input, draw_virtual_input),
-    (has_forces, draw_forces),
-    (has_varying_damping, draw_damping),
-    (_has("notch_position"), draw_notch_position),
-    (_has("normal_force", "xi"), draw_pressing),
-    (_has("normal_force", "eta"), draw_force_map),
-    (has_pushes, draw_pushes),
-    (_has("q_J"), draw_positions),
-    (_has("q_J", "q_posture"), draw_posture),
-    (has_conditioning, draw_conditioning),
-    (_has("v_J"), draw_velocities),
-    (_has("tau_d"), draw_efforts),
-    (_has("tau_f", "v_J"), draw_friction),
-    (_has("tau_f", "friction_estimate"), draw_friction_estimate),
-    (_has("momentum", "f_c", "f_v"), draw_friction_coefficients),
-    (_has("q_M", "q_J"), draw_deflection),
-]
+# in the order of the report: what draws a figure, and whether that is worth it
+_DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] = {
+    "progress": (draw_progress, _is_along),
+    "pace": (draw_pace, _always),
+    "guidance": (draw_guidance, has_regions),
+    "contact": (draw_contact, has_contact),
+    "energy": (draw_energy, gives_energy),
+    "limits": (draw_limits, held_by_robot),
+    "use_case": (draw_use_case, _always),
+    "mounting": (draw_mounting, _always),
+    "transversal": (draw_transversal, _always),
+    "orientation": (draw_orientation, _always),
+    "angles": (draw_angles, _always),
+    "axis": (draw_axis, _always),
+    "virtual_input": (draw_virtual_input, has_virtual_input),
+    "forces": (draw_forces, has_forces),
+    "damping": (draw_damping, has_varying_damping),
+    "notch": (draw_notch_position, _always),
+    "pressing": (draw_pressing, _always),
+    "force_map": (draw_force_map, _always),
+    "pushes": (draw_pushes, has_pushes),
+    "positions": (draw_positions, _always),
+    "posture": (draw_posture, _always),
+    "conditioning": (draw_conditioning, has_conditioning),
+    "velocities": (draw_velocities, _always),
+    "drive_torques": (draw_efforts, _always),
+    "friction": (draw_friction, _always),
+    "friction_estimate": (draw_friction_estimate, _always),
+    "friction_coefficients": (draw_friction_coefficients, _always),
+    "deflection": (draw_deflection, _always),
+}

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
-from experiments.results.posture import PUSHED, push_size
 from experiments.results.press import TOUCHING, force_error, held_samples
+from experiments.results.pushes import PUSHED, push_size
 from experiments.results.run_log import FloatArray, RunLog
 from reporting.style import (
     BROAD,
@@ -175,8 +175,6 @@ def _caption(log: RunLog) -> str:
 
 def has_varying_damping(log: RunLog) -> bool:
     """Whether the log has a damping along a path that varies."""
-    if "damping" not in log or "eta" not in log:
-        return False
     return bool(np.ptp(log["damping"].values[:, 0]) > 0.0)
 
 

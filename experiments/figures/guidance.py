@@ -25,7 +25,7 @@ MOST_NAMED = 6  # regions with an entry in a legend
 
 def has_regions(log: RunLog) -> bool:
     """Whether the log is that of a tool that regions may hold."""
-    return "region_distance" in log and log["region_distance"].values.shape[1] > 0
+    return log["region_distance"].dim > 0
 
 
 def draw_guidance(log: RunLog) -> Drawing:
@@ -131,7 +131,7 @@ def _along(y_t: FloatArray, n: FloatArray) -> FloatArray:
 
 def gives_energy(log: RunLog) -> bool:
     """Whether regions moved or gave way, so that energy went back and forth."""
-    if "tank" not in log or not has_regions(log):
+    if not has_regions(log):
         return False
     slots = log["near_regions"].values
     return bool(np.any(log["spring_energy"].values > 0.0)) or _moves(slots)
@@ -169,7 +169,7 @@ def draw_energy(log: RunLog) -> Drawing:
 
 def held_by_robot(log: RunLog) -> bool:
     """Whether what the robot itself can do held the tool."""
-    return "limit_force" in log and bool(np.any(log["limit_force"].values > 0.0))
+    return bool(np.any(log["limit_force"].values > 0.0))
 
 
 def draw_limits(log: RunLog) -> Drawing:

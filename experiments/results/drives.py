@@ -21,8 +21,8 @@ from reporting.metrics import Metrics
 
 # relative; a limit that is missed by rounding is not passed
 _ROUNDING = 1e-9
-# names of the position metric by whether a joint turns, and its unit
-_MARGIN = {True: ("joint_limit_margin", "rad"), False: ("slide_limit_margin", "m")}
+# names of the position metric by whether a joint turns
+_MARGIN = {True: "joint_limit_margin", False: "slide_limit_margin"}
 _SHARE = "joint_velocity_share"
 
 
@@ -59,7 +59,7 @@ class JointLimits:
     def metric_names(self) -> list[str]:
         """Return the names of the metrics that :meth:`metrics` gives."""
         bounded = np.isfinite(self.position).any(axis=1)
-        names = [name for kind, (name, _) in _MARGIN.items() if (bounded & self._turns(kind)).any()]
+        names = [name for kind, name in _MARGIN.items() if (bounded & self._turns(kind)).any()]
         return [*names, *([_SHARE] if np.isfinite(self.velocity).any() else [])]
 
     def metrics(self, log: RunLog) -> Metrics:
@@ -75,13 +75,13 @@ class JointLimits:
         """
         metrics, known, q = Metrics(), self.metric_names(), log["q_J"].values
         margin = np.minimum(q - self.position[:, 0], self.position[:, 1] - q)
-        for kind, (name, unit) in _MARGIN.items():
+        for kind, name in _MARGIN.items():
             if name in known:
                 least = _least(np.where(self._turns(kind), margin, np.inf), log)
-                metrics.add(name, least[0], unit, source=least[1])
+                metrics.add(name, least[0], source=least[1])
         if _SHARE in known:
             least = _least(-self._share(log), log)
-            metrics.add(_SHARE, -least[0], "1", source=least[1])
+            metrics.add(_SHARE, -least[0], source=least[1])
         return metrics
 
     def warnings(self, log: RunLog) -> list[str]:
@@ -218,9 +218,6 @@ def is_saturated(log: RunLog) -> np.ndarray:
     return saturated
 
 
-_BELIEVED = "believed, beforehand"
-
-
 def plan_metrics(plan: DrivePlan | None) -> Metrics:
     """Return the shares of the drives' limits that a reference takes, and how it was slowed.
 
@@ -234,9 +231,9 @@ def plan_metrics(plan: DrivePlan | None) -> Metrics:
     shares = {"asked": plan.asked}
     if plan.is_slowed:
         shares["planned"] = plan.demand
-        metrics.add("slowest_pace", float(plan.pace.min()), "1", source="of the speed asked for")
-        metrics.add("waiting_time", float(plan.waiting_time), "s", source=_BELIEVED)
+        metrics.add("slowest_pace", float(plan.pace.min()))
+        metrics.add("waiting_time", float(plan.waiting_time))
     for name, demand in shares.items():
         share = np.max(np.abs(demand[:, :joints]) / plan.limits[:joints])
-        metrics.add(f"{name}_torque_share", float(share), "1", source=_BELIEVED)
+        metrics.add(f"{name}_torque_share", float(share))
     return metrics

@@ -6,27 +6,30 @@ from numpy.typing import NDArray
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
-from experiments.results.guidance_audit import AUDITED
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.fixtures.program import SLOTS
 from pfsc_drake.control.fixtures.record import SLOT, GuidanceRecord, Mode
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from reporting.metrics import Metrics
 
-# of the record: log name, unit, labels
+# name in the log of what the record has
 _SINGLE = {
-    "velocity": ("velocity_command", "m/s", ["v_x", "v_y", "v_z"]),
-    "point": ("rest_point", "m", ["x", "y", "z"]),
-    "force": ("guiding_force", "N", ["f_x", "f_y", "f_z"]),
-    "tank": ("tank", "J", ["x"]),
-    "clock": ("region_clock", "s", ["s"]),
-    "rate": ("region_rate", "1", ["rho"]),
-    "spring": ("spring_energy", "J", ["V"]),
-    "damping": ("free_damping", "N s/m", ["d"]),
-    "limit": ("speed_limit", "m/s", ["v"]),
-    "squeezed": ("squeezed", "1", ["squeezed"]),
+    "velocity": "velocity_command",
+    "point": "rest_point",
+    "force": "guiding_force",
+    "clock": "region_clock",
+    "rate": "region_rate",
+    "spring": "spring_energy",
+    "damping": "free_damping",
+    "limit": "speed_limit",
+    "squeezed": "squeezed",
 }
-_SLOT_UNITS = "1, m, 1, 1, 1, m/s, m/s, N, N/m, m"
+# ticks over which motion is compared, and m/s by which it has to change meanwhile, rms
+_SPAN, _MOVED = 20, 2e-3
+# of the lag, and s, that it may be wrong by
+_SHARE, _LEAST = 0.3, 1e-3
+# m, from a region that leaves no room
+_TIGHT = 1e-3
 
 
 def add_guidance(
@@ -46,19 +49,20 @@ def add_guidance(
     record = GuidanceRecord(len(task.fixtures))
     rows = {name: raw["guidance"][:, part] for name, part in record.fields.items()}
     modes = np.nan_to_num(rows["mode"]).astype(int)
-    log.add("mode", modes, "1", [mode.name.lower() for mode in Mode])
-    for name, (signal, unit, labels) in _SINGLE.items():
-        log.add(signal, rows[name], unit, labels)
+    log.add("mode", modes, labels=[mode.name.lower() for mode in Mode])
+    log.add("tank", rows["tank"], labels=["x"])
+    for name, signal in _SINGLE.items():
+        log.add(signal, rows[name])
     names = [fixture.name for fixture in task.fixtures]
     slots = [f"{key}_{slot}" for slot in range(SLOTS) for key in SLOT]
-    log.add("near_regions", rows["near"], _SLOT_UNITS, slots)
+    log.add("near_regions", rows["near"], labels=slots)
     for name in ("labels", "evaluated", "on"):
-        log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), "1", names)
+        log.add(f"region_{name}", np.nan_to_num(rows[name]).astype(int), labels=names)
     distances = task.distances(y_t, region_times(log, task.guided.lead.lag))
     distances[rows["on"] == 0.0] = np.nan  # a region that is switched off is nowhere
-    log.add("region_distance", distances, "m", names)
+    log.add("region_distance", distances, labels=names)
     kinds, forces = limit_forces(rows["near"], len(names), station.robot.dimension)
-    log.add("limit_force", forces, "N", kinds)
+    log.add("limit_force", forces, labels=kinds)
 
 
 def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str], FloatArray]:
@@ -75,7 +79,7 @@ def limit_forces(near: FloatArray, regions: int, joints: int) -> tuple[list[str]
     """
     all_kinds = limit_kinds(joints)
     kinds = list(dict.fromkeys(all_kinds))
-    slots = near.reshape(len(near), -1, len(SLOT))
+    slots = near.reshape(len(near), near.shape[1] // len(SLOT), len(SLOT))
     index, phi = slots[..., SLOT.index("index")] - regions, slots[..., SLOT.index("phi")]
     forces = np.zeros((len(near), len(kinds)))
     for number, kind in enumerate(all_kinds):
@@ -128,32 +132,32 @@ def guidance_metrics(log: RunLog) -> Metrics:
         return metrics
     if "phi" in log:  # a tool that a hand turns is where it is asked to be, not at zero
         error = np.linalg.norm(log["phi"].values - log["phi_p"].values, axis=1)
-        metrics.add("max_orientation_error", float(np.nanmax(error)), "rad")
+        metrics.add("max_orientation_error", float(np.nanmax(error)))
     distance, soft = log["region_distance"].values, soft_regions(log)
     hard = np.setdiff1d(np.arange(distance.shape[1]), soft)
     if hard.size:
-        metrics.add("deepest_violation", deepest_violation(distance[:, hard]), "m")
+        metrics.add("deepest_violation", deepest_violation(distance[:, hard]))
     if soft.size:
         metrics.add(
-            "deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft], initial=np.inf))), "m"
+            "deepest_in_soft", max(0.0, float(-np.nanmin(distance[:, soft], initial=np.inf)))
         )
     command = log["velocity_command"].values
     steps = np.linalg.norm(np.diff(command, axis=0), axis=1)
-    metrics.add("largest_command_step", float(np.nanmax(steps, initial=0.0)), "m/s")
-    metrics.add("largest_command", float(np.nanmax(np.linalg.norm(command, axis=1))), "m/s")
+    metrics.add("largest_command_step", float(np.nanmax(steps, initial=0.0)))
+    metrics.add("largest_command", float(np.nanmax(np.linalg.norm(command, axis=1))))
     period = float(np.median(np.diff(log.time))) if log.time.size > 1 else 0.0
     power = np.sum(log["guiding_force"].values * command, axis=1)
     # the least that the hand has given up to any instant: what it got out of the fixtures
-    metrics.add("energy_from_fixtures", max(0.0, float(-np.nanmin(np.cumsum(power)) * period)), "J")
-    metrics.add("least_tank", float(np.nanmin(log["tank"].values)), "J")
+    metrics.add("energy_from_fixtures", max(0.0, float(-np.nanmin(np.cumsum(power)) * period)))
+    metrics.add("least_tank", float(np.nanmin(log["tank"].values)))
     modes = log["mode"].values[:, 0]
     changes = np.count_nonzero(np.diff(modes))
-    metrics.add("mode_changes_per_second", changes / max(log.time[-1], period), "1/s")
+    metrics.add("mode_changes_per_second", changes / max(log.time[-1], period))
     for number, name in enumerate(log["mode"].labels):
-        metrics.add(f"time_{name}", float(np.count_nonzero(modes == number) * period), "s")
+        metrics.add(f"time_{name}", float(np.count_nonzero(modes == number) * period))
     evaluated = log["region_evaluated"].values.sum(axis=1)
-    metrics.add("distances_per_tick", float(evaluated.mean()), "1", source="mean")
-    metrics.add("distances_per_tick_max", float(evaluated.max()), "1")
+    metrics.add("distances_per_tick", float(evaluated.mean()))
+    metrics.add("distances_per_tick_max", float(evaluated.max()))
     return metrics
 
 
@@ -176,30 +180,6 @@ def deepest_violation(distance: FloatArray) -> float:
     return deepest
 
 
-def guidance_metric_names(station: Station) -> list[str]:
-    """Return the names of the metrics of a station's run within fixtures; none without.
-
-    Args:
-        station: The station, simulated or not.
-    """
-    if "guidance" not in station.log.rows:
-        return []
-    times = [f"time_{mode.name.lower()}" for mode in Mode]
-    return [
-        "deepest_violation",
-        "deepest_in_soft",
-        "largest_command_step",
-        "largest_command",
-        "energy_from_fixtures",
-        "least_tank",
-        "mode_changes_per_second",
-        *times,
-        "distances_per_tick",
-        "distances_per_tick_max",
-        *AUDITED,
-    ]
-
-
 def soft_regions(log: RunLog) -> FloatArray:
     """Return the indices of regions that were near and soft.
 
@@ -209,9 +189,6 @@ def soft_regions(log: RunLog) -> FloatArray:
     slots = log["near_regions"].values.reshape(len(log.time), -1, len(SLOT))
     index, stiffness = slots[..., SLOT.index("index")], slots[..., SLOT.index("stiffness")]
     return np.unique(index[(stiffness > 0.0) & (index >= 0.0)]).astype(int)
-
-
-_NAMES = ["time_at_limits", "largest_limit_force"]
 
 
 def limit_metrics(log: RunLog) -> Metrics:
@@ -226,27 +203,9 @@ def limit_metrics(log: RunLog) -> Metrics:
     forces = np.nan_to_num(log["limit_force"].values)
     period = float(np.median(np.diff(log.time)))
     held = np.count_nonzero(np.any(forces > 0.0, axis=1))
-    metrics.add("time_at_limits", held * period, "s")
-    metrics.add("largest_limit_force", float(np.max(forces)), "N")
+    metrics.add("time_at_limits", held * period)
+    metrics.add("largest_limit_force", float(np.max(forces)))
     return metrics
-
-
-def limit_metric_names(station: Station) -> list[str]:
-    """Return the names of these metrics; none where no hand leads the tool.
-
-    Args:
-        station: The station, simulated or not.
-    """
-    rows = station.log.rows
-    return _NAMES if "guidance" in rows or "limit_force" in rows else []
-
-
-# ticks over which motion is compared, and m/s by which it has to change meanwhile, rms
-_SPAN, _MOVED = 20, 2e-3
-# of the lag, and s, that it may be wrong by
-_SHARE, _LEAST = 0.3, 1e-3
-# m, from a region that leaves no room
-_TIGHT = 1e-3
 
 
 def guidance_warnings(log: RunLog, settings: Scenario) -> list[str]:

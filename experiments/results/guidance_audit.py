@@ -14,9 +14,6 @@ from experiments.results.run_log import FloatArray, RunLog
 from reporting.metrics import Metrics
 
 SLOT_WIDTH = 10  # index, h, n (3), u, beta, phi, stiffness, depth
-AUDITED = tuple(
-    f"audit_{name}" for name in ("stationarity", "allowance", "energy", "tank", "bound", "missed")
-)
 _NEAR = 2e-3  # m, a region as close as this must not be missed
 
 
@@ -88,8 +85,8 @@ def audit(log: RunLog, promise: Promise) -> Metrics:
     limit = np.minimum(log["speed_limit"].values[:count, 0], promise.largest_speed)
     inertia = (promise.mass + T * d)[:, None]
     free = (promise.mass * before + T * f) / inertia
-    metrics.add("audit_stationarity", _stationarity(v, free, limit, slots, T / inertia), "m/s")
-    metrics.add("audit_allowance", _allowance(v, slots), "m/s")
+    metrics.add("audit_stationarity", _stationarity(v, free, limit, slots, T / inertia))
+    metrics.add("audit_allowance", _allowance(v, slots))
     work = T * np.sum(f * v, axis=1)
     lost = T * d * np.sum(v * v, axis=1)
     out = np.where(slots.hard, np.maximum(0.0, -slots.beta), 0.0)
@@ -100,17 +97,15 @@ def audit(log: RunLog, promise: Promise) -> Metrics:
     pressed = np.divide(slots.phi, slots.stiffness, out=np.zeros_like(slots.phi), where=slots.soft)
     after = np.sum(np.where(slots.soft, slots.stiffness * pressed**2, 0.0), axis=1) / 2
     kinetic = promise.mass / 2 * np.sum(v * v - before * before, axis=1)
-    metrics.add(
-        "audit_energy", float(np.max(kinetic + after - spring - (work - lost + given))), "J"
-    )
+    metrics.add("audit_energy", float(np.max(kinetic + after - spring - (work - lost + given))))
     tank = log["tank"].values[:count, 0]
     # what springs gain between ticks
     paid = spring - np.concatenate([[0.0], after[:-1]])
     expected = np.minimum(promise.capacity, tank[:-1] - given[:-1] + lost[:-1] - paid[:-1])
-    metrics.add("audit_tank", float(np.max(np.abs(expected - tank[1:]), initial=0.0)), "J")
+    metrics.add("audit_tank", float(np.max(np.abs(expected - tank[1:]), initial=0.0)))
     bound = -(tank[0] + spring[0])
-    metrics.add("audit_bound", float(np.min(np.cumsum(work)) - bound), "J")
-    metrics.add("audit_missed", float(_missed(log, slots, count)), "1")
+    metrics.add("audit_bound", float(np.min(np.cumsum(work)) - bound))
+    metrics.add("audit_missed", float(_missed(log, slots, count)))
     return metrics
 
 

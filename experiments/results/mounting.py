@@ -1,4 +1,4 @@
-"""Metrics of plates that are mounted, each a pure function of a run's log.
+"""Plates that are mounted: their signals, and metrics that are pure functions of a log.
 
 Signals used, as in the log: ``seat_gap`` [samples, pins] m between a plate and the frame at its
 pins, ``seat_offset`` [samples, 1] m, how far beside its seat it is, ``frame_force`` and
@@ -9,7 +9,6 @@ plate is seated their means are ``insertion_deviation`` and ``insertion_rotation
 """
 
 import math
-from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,60 +27,31 @@ TOUCHING = 0.5  # N, from which on a plate counts as touching
 
 
 def seated_samples(log: RunLog) -> NDArray[np.bool_]:
-    """At which samples the plate is seated, [samples] bool.
-
-    Args:
-        log: With ``seat_gap`` and ``seat_offset``.
-    """
+    """Return at which samples the plate is seated, shape (samples,)."""
     flush = np.all(np.abs(log["seat_gap"].values) <= SEATED, axis=1)
     return np.asarray(flush & (log["seat_offset"].values[:, 0] <= BESIDE))
 
 
 def time_to_frame(log: RunLog) -> float:
-    """First time at which the plate is at the frame, 2 cm from its seat.
-
-    Args:
-        log: With ``seat_gap`` and ``seat_offset``.
-
-    Returns:
-        s; NaN if none does.
-    """
+    """Return the first time at which the plate is 2 cm from its seat [s]; NaN if it never is."""
     near = np.all(np.abs(log["seat_gap"].values) <= REACHED, axis=1)
     return _first(log.time, near & (log["seat_offset"].values[:, 0] <= REACHED))
 
 
 def time_to_contact(log: RunLog) -> float:
-    """First time at which a plate touches the frame.
-
-    Args:
-        log: With ``frame_force``.
-
-    Returns:
-        s; NaN if none does.
-    """
+    """Return the first time at which a plate touches the frame [s]; NaN if none does."""
     return _first(log.time, _size(log, "frame_force") > TOUCHING)
 
 
 def time_to_seat(log: RunLog) -> float:
-    """First time at which the plate is seated.
-
-    Args:
-        log: With ``seat_gap`` and ``seat_offset``.
-
-    Returns:
-        s; NaN if it never is.
-    """
+    """Return the first time at which the plate is seated [s]; NaN if it never is."""
     return _first(log.time, seated_samples(log))
 
 
 def grip_time(log: RunLog) -> float:
-    """Last time at which all cups have taken hold of a plate.
+    """Return the last time at which all cups have taken hold of a plate [s].
 
-    Args:
-        log: With ``held``.
-
-    Returns:
-        s; the start for a plate that is held from there on, NaN if none is.
+    It is the start for a plate that is held from there on, NaN if none is.
     """
     held = log["held"].values[:, 0] >= 1.0
     taken = np.flatnonzero(held & ~np.append(False, held[:-1]))
@@ -89,67 +59,37 @@ def grip_time(log: RunLog) -> float:
 
 
 def release_time(log: RunLog) -> float:
-    """First time at which no cup holds a plate that was held.
-
-    Args:
-        log: With ``held``.
-
-    Returns:
-        s; NaN if it is not let go.
-    """
+    """Return the first time at which no cup holds a plate that was held [s]; NaN without."""
     held = log["held"].values[:, 0] > 0.0
     return _first(log.time, ~held & np.append(False, held[:-1]))
 
 
 def mounting_metrics(log: RunLog) -> Metrics:
-    """All metrics of this module that the log has signals for.
-
-    Args:
-        log: Of a path following run.
-    """
+    """Return the metrics of mounting, none without ``seat_gap``."""
     metrics = Metrics()
     if "seat_gap" not in log or log.time.size == 0:
         return metrics
     seated, at = seated_samples(log), time_to_seat(log)
     let_go = math.isfinite(release_time(log))
-    metrics.add("mounted", float(seated[-1] and let_go), "1")
-    metrics.add("final_seat_gap", float(np.abs(log["seat_gap"].values[-1]).max()), "m")
-    metrics.add("grip_time", grip_time(log), "s")
-    metrics.add("time_to_frame", time_to_frame(log), "s")
-    metrics.add("time_to_contact", time_to_contact(log), "s")
-    metrics.add("time_to_seat", at, "s")
-    metrics.add("insertion_time", at - time_to_frame(log), "s")
-    metrics.add("release_time", release_time(log), "s")
-    metrics.add("peak_frame_force", float(_size(log, "frame_force").max()), "N")
-    metrics.add("peak_magazine_force", float(_size(log, "magazine_force").max()), "N")
+    metrics.add("mounted", float(seated[-1] and let_go))
+    metrics.add("final_seat_gap", float(np.abs(log["seat_gap"].values[-1]).max()))
+    metrics.add("grip_time", grip_time(log))
+    metrics.add("time_to_frame", time_to_frame(log))
+    metrics.add("time_to_contact", time_to_contact(log))
+    metrics.add("time_to_seat", at)
+    metrics.add("insertion_time", at - time_to_frame(log))
+    metrics.add("release_time", release_time(log))
+    metrics.add("peak_frame_force", float(_size(log, "frame_force").max()))
+    metrics.add("peak_magazine_force", float(_size(log, "magazine_force").max()))
     inserting = (log.time >= time_to_contact(log)) & (log.time <= at)
-    for name, signal, unit in (
-        ("insertion_deviation", "xi", "m"),
-        ("insertion_rotation", "phi", "rad"),
-    ):
+    for name, signal in (("insertion_deviation", "xi"), ("insertion_rotation", "phi")):
         sizes = _size(log, signal)[inserting]
-        metrics.add(name, float(np.mean(sizes)) if sizes.size else math.nan, unit)
+        metrics.add(name, float(np.mean(sizes)) if sizes.size else math.nan)
     if "hand_wrench" in log:
         force, torque = np.hsplit(log["hand_wrench"].values, 2)
-        metrics.add("peak_operator_force", float(np.linalg.norm(force, axis=1).max()), "N")
-        metrics.add("peak_operator_torque", float(np.linalg.norm(torque, axis=1).max()), "N m")
+        metrics.add("peak_operator_force", float(np.linalg.norm(force, axis=1).max()))
+        metrics.add("peak_operator_torque", float(np.linalg.norm(torque, axis=1).max()))
     return metrics
-
-
-def mounting_metric_names(signals: Collection[str]) -> list[str]:
-    """Return the names of the metrics that :func:`mounting_metrics` gives.
-
-    Args:
-        signals: Those that the log has.
-    """
-    if "seat_gap" not in signals:
-        return []
-    names = [
-        "mounted", "final_seat_gap", "grip_time", "time_to_frame", "time_to_contact",
-        "time_to_seat", "insertion_time", "release_time", "peak_frame_force", "peak_magazine_force",
-        "insertion_deviation", "insertion_rotation",
-    ]  # fmt: skip
-    return names + ["peak_operator_force", "peak_operator_torque"] * ("hand_wrench" in signals)
 
 
 def _size(log: RunLog, name: str) -> FloatArray:
@@ -159,12 +99,6 @@ def _size(log: RunLog, name: str) -> FloatArray:
 def _first(time: FloatArray, where: NDArray[np.bool_]) -> float:
     found = np.flatnonzero(where)
     return float(time[found[0]]) if found.size else math.nan
-
-
-PLATE_SIGNALS = {
-    "plate_pose", "seat_gap", "seat_offset", "frame_force", "magazine_force", "held",
-}  # fmt: skip
-_WRENCH = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
 
 
 def add_mounting_signals(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
@@ -180,19 +114,19 @@ def add_mounting_signals(log: RunLog, station: Station, raw: dict[str, np.ndarra
     poses = plate_poses(raw["plate_state"])
     names = [*"xyz", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))]
     labels = [f"plate_{k + 1}_{name}" for k in range(poses.shape[1] // 12) for name in names]
-    log.add("plate_pose", poses, "m, 1", labels)
+    log.add("plate_pose", poses, labels=labels)
     gap, offset = seat_distances(station.mounting, poses[:, :12])
-    log.add("seat_gap", gap, "m", [f"pin_{i + 1}" for i in range(gap.shape[1])])
-    log.add("seat_offset", offset, "m")
+    log.add("seat_gap", gap)
+    log.add("seat_offset", offset)
     frame, magazine = np.hsplit(raw["plate_contact"], 2)
-    log.add("frame_force", frame, "N", _WRENCH[:3])
-    log.add("magazine_force", magazine, "N", _WRENCH[:3])
-    log.add("held", raw["held"], "1")
-    log.add("gripper_wrench", raw["gripper_wrench"], "N, Nm", _WRENCH)
+    log.add("frame_force", frame)
+    log.add("magazine_force", magazine)
+    log.add("held", raw["held"])
+    log.add("gripper_wrench", raw["gripper_wrench"])
     if "hand_wrench" in raw:
-        log.add("hand_wrench", raw["hand_wrench"], "N, Nm", _WRENCH)
+        log.add("hand_wrench", raw["hand_wrench"])
         phases = [phase.name.lower() for phase in MountingPhase]
-        log.add("phase", raw["phase"].astype(int), "1", phases)
+        log.add("phase", raw["phase"].astype(int), labels=phases)
 
 
 def plate_poses(state: FloatArray) -> FloatArray:

@@ -35,19 +35,19 @@ def add_orientation(
     unknown = ~(np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1))
     tool = station.task.place.tool
     axis, yaw_axis = tool.tool_axis, tool.yaw_axis
-    begin = R_d[int(np.argmin(unknown))]
+    begin = R_d[int(np.argmin(unknown))] if len(R_d) else np.eye(3)
     for name, R in {"e": R_e, "d": R_d}.items():
         if yaw_axis is not None:
             turn = np.unwrap(turn_about(yaw_axis, R, begin))
-            log.add(f"angles_{name}", np.where(unknown, np.nan, turn), "rad", ["the yaw axis"])
+            log.add(f"angles_{name}", np.where(unknown, np.nan, turn), labels=["the yaw axis"])
         elif axis is None:
             of_zyz = tool.euler == "zyz"
             angles = np.unwrap(matrix_to_zyz(R) if of_zyz else matrix_to_zyx(R), axis=0)
             angles[unknown] = np.nan
-            log.add(f"angles_{name}", angles, "rad", ["z", "y", "z2" if of_zyz else "x"])
+            log.add(f"angles_{name}", angles, labels=["z", "y", "z2" if of_zyz else "x"])
         else:
             directions = np.where(unknown[:, None], np.nan, R @ axis)
-            log.add(f"axis_{name}", directions, "1", ["x", "y", "z"])
+            log.add(f"axis_{name}", directions)
     lead = np.full(len(place), np.nan)
     if yaw_axis is not None:
         lead[~unknown] = np.abs(turn_about(yaw_axis, R_d, R_place))[~unknown]
@@ -56,7 +56,7 @@ def add_orientation(
     elif not unknown.all():
         between = np.swapaxes(R_place, 1, 2) @ R_d
         lead[~unknown] = Rotation.from_matrix(between[~unknown]).magnitude()
-    log.add("orientation_lead", lead, "rad")
+    log.add("orientation_lead", lead)
 
 
 def _rotations(
@@ -66,5 +66,6 @@ def _rotations(
     finite = np.isfinite(point).all(axis=1) & np.isfinite(pose).all(axis=1)
     R_e = np.where(finite[:, None], pose[:, 3:], np.eye(3).ravel()).reshape(-1, 3, 3)
     R_d = np.tile(np.eye(3), (len(point), 1, 1))
-    R_d[finite] = manifold.orientation(point[finite])
+    if finite.any():
+        R_d[finite] = manifold.orientation(point[finite])
     return R_e, R_d

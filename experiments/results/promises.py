@@ -9,17 +9,13 @@ import math
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.results.drives import JointLimits
-from experiments.results.friction import friction_metric_names
-from experiments.results.guidance import guidance_metric_names, limit_metric_names
-from experiments.results.mounting import mounting_metric_names
-from experiments.results.path import metric_names, shape_metrics
-from experiments.results.posture import posture_metric_names
-from experiments.results.press import press_metric_names
+from experiments.results.drives import JointLimits, plan_metrics
+from experiments.results.path import shape_metrics
 from experiments.results.pushes import is_redundant
-from experiments.results.run_signals import optional_signals
+from experiments.results.run_signals import expected_signals
 from pfsc_drake.errors import InputError
 from reporting.metrics import Metric, Metrics
+from reporting.registry import possible_metrics
 from reporting.units import format_quantity
 
 # held at every instant, so that also a run that was cut short is judged by them
@@ -28,6 +24,46 @@ _ALWAYS = ("deepest_violation", "max_unanswered_force")
 # that is worth a word [m]
 _DISTANCES = ("max_error_from_compliant_reference", "max_path_deviation")
 _WORTH_A_WORD = 1e-3
+# signals that another law may log on the same robot
+_OF_OTHER_LAWS = {"xi_M", "eta_dot", "tau_d"}
+# signals of an orientation, which may be no task
+_OF_ORIENTATIONS = {"phi"}
+# signals of an observer, which may be left out
+_OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
+
+
+def check_targets(settings: Scenario, station: Station) -> None:
+    """Refuse targets for metrics that a run with their law would not have.
+
+    Args:
+        settings: The scenario.
+        station: Its station.
+
+    Raises:
+        InputError: One line that names law, metric and the metrics that there are.
+    """
+    if not settings.targets:
+        return
+    task, surface = station.task, settings.surface
+    signals = expected_signals(station) | _OF_OBSERVERS
+    if settings.path.orientation.task == "none" or (surface and surface.orientation.kind == "none"):
+        signals |= _OF_ORIENTATIONS
+    properties = {"redundant": is_redundant(station), "closed": task.lap is not None}
+    known = {
+        *signals,
+        *(name for name, is_so in properties.items() if is_so),
+        *shape_metrics(task.shape, task.fit),
+        *plan_metrics(task.drive_plan),
+        *JointLimits.of(station.robot).metric_names(),
+    }
+    for law, targets in settings.targets.items():
+        other = set() if law == settings.controller.law else _OF_OTHER_LAWS
+        allowed = possible_metrics(known | other, station.robot.dimension)
+        for name in targets:
+            if name not in allowed:
+                raise InputError(
+                    f"targets.{law}.{name}: no such metric; allowed: {', '.join(allowed)}"
+                )
 
 
 def set_promises(metrics: Metrics, settings: Scenario) -> None:
@@ -91,48 +127,3 @@ def _phrase(name: str, metric: Metric) -> str:
     if math.isnan(metric.value):
         return f"{name} has no value, {target}"
     return f"{name} = {format_quantity(metric.value, metric.unit)}, {target}"
-
-
-# signals that another law may log on the same robot
-_OF_OTHER_LAWS = {"xi_M"}
-# signals of an orientation, which may be no task
-_OF_ORIENTATIONS = {"phi"}
-# signals of an observer, which may be left out
-_OF_OBSERVERS = {"tau_f", "friction_estimate", "f_c", "f_c_estimate", "f_v", "f_v_estimate"}
-
-
-def check_targets(settings: Scenario, station: Station) -> None:
-    """Refuse targets for metrics that a run with their law would not have.
-
-    Args:
-        settings: The scenario.
-        station: Its station.
-
-    Raises:
-        InputError: One line that names law, metric and the metrics that there are.
-    """
-    signals = optional_signals(station)
-    surface = settings.surface
-    if settings.path.orientation.task == "none" or (surface and surface.orientation.kind == "none"):
-        signals |= _OF_ORIENTATIONS
-    for law, targets in settings.targets.items():
-        other = set() if law == settings.controller.law else _OF_OTHER_LAWS
-        known = [
-            *metric_names(station.robot.dimension, signals | other),
-            *press_metric_names(signals),
-            *guidance_metric_names(station),
-            *limit_metric_names(station),
-            *mounting_metric_names(signals),
-            *friction_metric_names(station.robot.dimension, signals | _OF_OBSERVERS),
-            *shape_metrics(station.task.shape, station.task.fit),
-            *JointLimits.of(station.robot).metric_names(),
-            *posture_metric_names(signals, is_redundant(station), station.task.lap is not None),
-            "real_time_factor",
-            "controller_tick_us",
-            "controller_tick_us_p99",
-        ]
-        for name in targets:
-            if name not in known:
-                raise InputError(
-                    f"targets.{law}.{name}: no such metric; allowed: {', '.join(known)}"
-                )

@@ -1,4 +1,10 @@
-"""Signals of what happens to the links of a run's arm: pushes, and where its elbow goes."""
+"""What happens to the links of a run's arm: pushes, and where its elbow goes.
+
+Signals used, as in the log: ``push_force`` [samples, 3K] N, ``elbow`` and perhaps
+``elbow_undisturbed`` [samples, 3] m.
+"""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,32 +18,16 @@ from pfsc_drake.physics.link_forces import link_points_function
 _PUSHES = "push_wrench"
 # of a lap, by which a tool that rests after a lap may miss its end
 _SAME = 1e-4
+PUSHED = 0.05  # share of a run's largest force, from which on it counts as a push
 
 
 def is_redundant(station: Station) -> bool:
-    """Return whether a station's robot has more joints than its task needs.
-
-    Args:
-        station: The station.
-    """
+    """Return whether a station's robot has more joints than its task needs."""
     return station.robot.dimension > station.law.linearization.num_outputs
 
 
-def lap_length(station: Station) -> float | None:
-    """Return the length of a station's path [m] if it is closed, else None.
-
-    Args:
-        station: The station.
-    """
-    return station.task.lap
-
-
 def has_elbow(station: Station) -> bool:
-    """Return whether a point of a station's arm is worth a look beside its tool.
-
-    Args:
-        station: The station.
-    """
+    """Return whether a point of a station's arm is worth a look beside its tool."""
     arm = isinstance(station.part, Arm)
     return arm and (_PUSHES in station.log.rows or is_redundant(station))
 
@@ -71,8 +61,8 @@ def push_forces(raw: dict[str, FloatArray]) -> FloatArray:
         raw: Logged signals of a station, with ``push_wrench``.
     """
     wrenches = raw[_PUSHES]
-    force = wrenches.reshape(len(wrenches), -1, 2, 3)[:, :, 0]
-    return force.reshape(len(wrenches), -1)
+    force = wrenches.reshape(len(wrenches), wrenches.shape[1] // 6, 2, 3)[:, :, 0]
+    return force.reshape(len(wrenches), wrenches.shape[1] // 2)
 
 
 def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> None:
@@ -87,18 +77,18 @@ def add_link_signals(log: RunLog, station: Station, raw: dict[str, FloatArray]) 
     if _PUSHES in raw:
         places = station.diagram.GetSubsystemByName("link_pushes").places
         labels = [f"{place.name} {axis}" for place in places for axis in "xyz"]
-        log.add("push_force", push_forces(raw), "N", labels)
-        log.add("push_point", raw["push_point"], "m", labels)
+        log.add("push_force", push_forces(raw), labels=labels)
+        log.add("push_point", raw["push_point"], labels=labels)
     if not has_elbow(station):
         return
     elbow = elbow_motion(station, raw["joint_state"])
-    log.add("elbow", elbow, "m", labels[:3])
+    log.add("elbow", elbow, labels=labels[:3])
     undisturbed = None
     if _PUSHES in raw and station.task.lap is not None:
         force, eta = log["push_force"].values, log["eta"].values[:, 0]
         undisturbed = lap_before(eta, elbow, np.any(force != 0.0, axis=1), station.task.lap)
     if undisturbed is not None:
-        log.add("elbow_undisturbed", undisturbed, "m", labels[:3])
+        log.add("elbow_undisturbed", undisturbed, labels=labels[:3])
 
 
 def lap_before(
@@ -116,11 +106,52 @@ def lap_before(
         Shape (samples, dim), the values themselves before the disturbance; None where it never
         comes, or before a whole lap forwards is driven.
     """
+    if not disturbed.any():
+        return None
     first = int(np.argmax(disturbed))
-    if not disturbed[first] or not eta[first] - eta[0] >= lap * (1.0 - _SAME):
+    if not eta[first] - eta[0] >= lap * (1.0 - _SAME):
         return None
     along = np.maximum.accumulate(eta[:first])
     beyond = np.maximum(np.ceil((eta[first:] - along[-1]) / lap - _SAME), 0.0)
     place = eta[first:] - lap * beyond
     expected = [np.interp(place, along, column[:first]) for column in values.T]
     return np.vstack([values[:first], np.stack(expected, axis=1)])
+
+
+def push_size(log: RunLog) -> FloatArray:
+    """Return the size of the largest force on a point of a link [N], shape (samples,)."""
+    force = log["push_force"].values.reshape(len(log.time), -1, 3)
+    return np.asarray(np.linalg.norm(force, axis=2).max(axis=1))
+
+
+def elbow_shift(log: RunLog) -> FloatArray:
+    """Return how far the elbow is from where it would have been [m], shape (samples, 3).
+
+    Without ``elbow_undisturbed``, from where it was when it was first pushed, zero before.
+    """
+    elbow = log["elbow"].values
+    if "elbow_undisturbed" in log:
+        return np.asarray(elbow - log["elbow_undisturbed"].values)
+    pushed = push_size(log) > 0.0
+    first = int(np.argmax(pushed))
+    shift = elbow - elbow[first]
+    shift[: first if pushed.any() else len(shift)] = 0.0
+    return np.asarray(shift)
+
+
+def elbow_travel(log: RunLog) -> float:
+    """Return the largest distance of the elbow from where it would have been [m].
+
+    Without ``elbow_undisturbed``, from where it was when it was first pushed, while it is pushed.
+    """
+    distance = np.linalg.norm(elbow_shift(log), axis=1)
+    if "elbow_undisturbed" not in log:
+        size = push_size(log)
+        distance = distance[size >= PUSHED * size.max(initial=0.0)]
+    return finite_peak(distance)
+
+
+def finite_peak(values: FloatArray) -> float:
+    """Return the largest finite magnitude, NaN of none."""
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else math.nan

@@ -1,6 +1,7 @@
 """The log of one run: named signals over time, kept in one HDF5 file."""
 
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.text_file import find_status
+from reporting.registry import SIGNALS, KnownSignal
 
 FloatArray = NDArray[np.float64]
 
@@ -56,11 +58,13 @@ class RunLog:
         time: [samples] s.
         signals: By name, as listed in :meth:`write`; each has as many samples as ``time``.
         attributes: What identifies the run, see ``provenance.standard_attributes``.
+        turning: Whether each joint turns, else it slides; decides on units.
     """
 
     time: FloatArray
     signals: dict[str, Signal] = field(default_factory=dict)
     attributes: dict[str, str] = field(default_factory=dict)
+    turning: Sequence[bool] = (True,)
 
     def __post_init__(self) -> None:
         self.time = np.asarray(self.time, dtype=float).reshape(-1)
@@ -82,17 +86,18 @@ class RunLog:
         self,
         name: str,
         values: ArrayLike,
-        unit: str,
+        unit: str | None = None,
         labels: list[str] | None = None,
         limits: ArrayLike | None = None,
     ) -> Signal:
-        """Adds a signal and returns it.
+        """Add a signal and return it.
 
         Args:
             name: Name in the log, e.g. ``"q_J"``.
             values: [samples, dim] or [samples], in ``unit``.
-            unit: Unit of all components.
-            labels: One name per column; by default the name itself, numbered from 1 if dim > 1.
+            unit: Unit of all components; by default that of the registry.
+            labels: One name per column; by default those of the registry, or the name itself,
+                numbered from 1 if dim > 1.
             limits: [dim] or scalar, magnitude of the admissible range, or [dim, 2], its lower
                 and upper end, in ``unit``.
 
@@ -100,11 +105,12 @@ class RunLog:
             The signal that was added.
         """
         columns = _as_columns(values)
-        if labels is None:
-            dim = columns.shape[1]
-            labels = [name] if dim == 1 else [f"{name}_{i + 1}" for i in range(dim)]
+        known = SIGNALS[name] if unit is None else SIGNALS.get(name, KnownSignal(name, unit, ""))
         signal = Signal(
-            columns, unit, labels, None if limits is None else np.asarray(limits, dtype=float)
+            columns,
+            known.unit_of(self.turning) if unit is None else unit,
+            known.labels_of(columns.shape[1]) if labels is None else labels,
+            None if limits is None else np.asarray(limits, dtype=float),
         )
         self._check(name, signal)
         self.signals[name] = signal
@@ -169,6 +175,11 @@ class RunLog:
             raise ValueError(
                 f"signal {name!r} has {signal.values.shape[0]} samples, time has {self.time.size}"
             )
+
+
+def peak(values: FloatArray) -> float:
+    """Return the largest value, NaN of none."""
+    return float(np.max(values)) if values.size else np.nan
 
 
 def _as_columns(values: ArrayLike) -> FloatArray:

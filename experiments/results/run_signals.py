@@ -4,14 +4,14 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from diagrams.station import Station
-from experiments.results.friction import add_friction, friction_signals
+from experiments.results.friction import add_friction
 from experiments.results.guidance import add_guidance
-from experiments.results.mounting import PLATE_SIGNALS, add_mounting_signals
+from experiments.results.mounting import add_mounting_signals
 from experiments.results.orientation_signals import add_orientation
-from experiments.results.posture import add_posture, posture_signals
-from experiments.results.press import add_pressing, is_pressed
+from experiments.results.posture import add_posture
+from experiments.results.press import add_pressing
 from experiments.results.pushes import add_link_signals
-from experiments.results.run_log import RunLog
+from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.law.fault import Fault
@@ -20,6 +20,12 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.tool_load import joint_torque_function
+
+# what stands in a station's log as in that of a run
+_AS_LOGGED = (
+    *("wrench_ext", "wrench_measured", "wrench_sensor", "wrench_observed"),
+    *("tared", "sensor_fault", "tau_ext_observed"),
+)
 
 
 def collect_log(station: Station, root: Context) -> RunLog:
@@ -34,26 +40,42 @@ def collect_log(station: Station, root: Context) -> RunLog:
         station: The station that was simulated.
         root: Its context at the end.
     """
-    times, raw = station.log.read(root)
-    log = RunLog(times)
+    return _named(station, *station.log.read(root))
+
+
+def expected_signals(station: Station) -> set[str]:
+    """Return the names of the signals that a station's run will have.
+
+    Those that need a whole lap, or another event, may come beside them.
+
+    Args:
+        station: The station, simulated or not.
+    """
+    empty = {name: np.zeros((0, row.stop - row.start)) for name, row in station.log.rows.items()}
+    return set(_named(station, np.zeros(0), empty).signals)
+
+
+def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> RunLog:
+    """Return signals of what a station logged."""
+    log = RunLog(times, turning=station.robot.gather("is_revolute").tolist())
     measured = raw.get("joint_state_measured")
     _add_joints(log, station, raw["joint_state"], raw["law"])
     if measured is not None:
         _add_joint_state(log, station, measured, "_measured")
     pose = _tool_poses(station, raw["joint_state"])
-    log.add("y_t", pose[:, :3], "m", ["x", "y", "z"])
-    log.add("R_e", pose[:, 3:], "1", [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)])
+    log.add("y_t", pose[:, :3])
+    log.add("R_e", pose[:, 3:])
     deceived = measured is not None or not station.part.belief.sees_truth
     if deceived:
-        log.add("y_t_measured", raw["tool_pose"][:, :3], "m", ["x", "y", "z"])
-        log.add("R_e_measured", raw["tool_pose"][:, 3:], "1", log["R_e"].labels)
+        log.add("y_t_measured", raw["tool_pose"][:, :3])
+        log.add("R_e_measured", raw["tool_pose"][:, 3:])
     linearization, layout = station.law.linearization, station.law.layout
     Y = raw["law"][:, layout.manifold_state]
-    Y = Y.reshape(len(times), -1, linearization.num_outputs).copy()
+    Y = _by_order(Y, linearization.num_outputs).copy()
     points = raw["manifold_point"]
     if linearization.manifold.follows_time or station.on_motors or deceived:
         if linearization.manifold.follows_time:
-            log.add("tracking_error", Y[:, 0, :3], "m", ["along", "normal_1", "normal_2"])
+            log.add("tracking_error", Y[:, 0, :3])
         else:
             _add_seen(log, station, Y[:, 0], "M" if station.on_motors else "measured")
         points = _project(station, pose)
@@ -63,11 +85,11 @@ def collect_log(station: Station, root: Context) -> RunLog:
         moving = linearization.manifold.follows_time and rotational.stop > 0
         replaced = slice(0, rotational.start) if moving else slice(None)
         Y[:, :2, replaced] = seen[:, : Y.shape[1], replaced]
-    log.add("theta", points[:, station.task.place.layout.theta], "1")
-    log.add("alpha", points[:, station.task.place.layout.alpha], "1")
+    log.add("theta", points[:, station.task.place.layout.theta])
+    log.add("alpha", points[:, station.task.place.layout.alpha])
     _add_manifold(log, station, raw, Y)
     add_orientation(log, station, raw["manifold_point"], points, pose)
-    add_posture(log, station, raw, _joint_units(station)[0])
+    add_posture(log, station, raw)
     _add_forces(log, station, raw)
     add_pressing(log, station, raw, points)
     add_guidance(log, station, raw, pose[:, :3])
@@ -76,30 +98,8 @@ def collect_log(station: Station, root: Context) -> RunLog:
     _add_drives(log, station, raw)
     _add_plan(log, station)
     for name, length in station.further_lengths(pose[:, :3]).items():
-        log.add(name, length.values, "m", length.labels, length.limit)
+        log.add(name, length.values, labels=length.labels, limits=length.limit)
     return log
-
-
-def optional_signals(station: Station) -> set[str]:
-    """Return the signals that a station's log has beyond those of every log.
-
-    Args:
-        station: The station, simulated or not.
-    """
-    names = set(station.log.rows) | set(station.further_lengths(np.zeros((0, 3))))
-    if is_pressed(station):
-        names.add("normal_force")
-    if station.mounting is not None:
-        names |= PLATE_SIGNALS
-    if "desired_reference" in names:
-        names.add("xi_d")
-    if "push_wrench" in names:
-        names.add("push_force")
-    if station.on_motors:
-        names.add("xi_M")
-    names |= posture_signals(station) | friction_signals(station)
-    names |= {kind.value for kind, *_ in _kinds(station) if kind is Kind.ROTATIONAL}
-    return names
 
 
 def _add_seen(log: RunLog, station: Station, y: np.ndarray, suffix: str) -> None:
@@ -108,7 +108,7 @@ def _add_seen(log: RunLog, station: Station, y: np.ndarray, suffix: str) -> None
         if kind is Kind.ROTATIONAL and suffix == "M":
             continue
         labels = [name.replace(kind.value, f"{kind.value}_{suffix}", 1) for name in names]
-        log.add(f"{kind.value}_{suffix}", y[:, part], kind.unit, labels)
+        log.add(f"{kind.value}_{suffix}", y[:, part], labels=labels)
 
 
 def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
@@ -120,19 +120,17 @@ def _tool_poses(station: Station, joint_state: np.ndarray) -> np.ndarray:
 
 
 def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarray) -> None:
-    chain, n = station.robot, station.robot.dimension
+    chain = station.robot
     q_J, v_J, q_M, v_M = np.hsplit(state, 4)
-    effort, axes = _joint_units(station)[2], [str(i + 1) for i in range(n)]
     _add_joint_state(log, station, state)
     drive = law[:, station.law.layout.drive]
     if station.law.linearization.relative_degree > 1:
-        labels = [f"tau_d_{axis}" for axis in axes]
-        log.add("tau_d", drive, effort, labels, station.law.limits)
+        log.add("tau_d", drive, limits=station.law.limits)
     elastic = np.isfinite(chain.K_s)
     if elastic.any():
         K_s, K_d = chain.K_s[elastic], chain.K_d[elastic]
         tau_J = K_s * (q_M - q_J)[:, elastic] + K_d * (v_M - v_J)[:, elastic]
-        log.add("tau_J", tau_J, effort, [f"tau_J_{i + 1}" for i in np.flatnonzero(elastic)])
+        log.add("tau_J", tau_J, labels=[f"tau_J_{i + 1}" for i in np.flatnonzero(elastic)])
 
 
 def _add_plan(log: RunLog, station: Station) -> None:
@@ -140,14 +138,12 @@ def _add_plan(log: RunLog, station: Station) -> None:
     plan, n = station.task.drive_plan, station.robot.dimension
     if plan is None or not plan.is_slowed:
         return
-    log.add("pace", np.interp(log.time, plan.times, plan.pace)[:, None], "1")
+    log.add("pace", np.interp(log.time, plan.times, plan.pace))
     expected = [np.interp(log.time, plan.times, torque) for torque in plan.demand[:, :n].T]
-    labels = [f"tau_planned_{i + 1}" for i in range(n)]
-    log.add("tau_planned", np.array(expected).T, _joint_units(station)[2], labels)
+    log.add("tau_planned", np.array(expected).T)
 
 
 def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: str = "") -> None:
-    angle, rate, _ = _joint_units(station)
     limits = {
         "q_J": station.robot.gather("position_limits"),
         "v_J": station.robot.gather("velocity_limit"),
@@ -156,40 +152,31 @@ def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: s
     if np.isfinite(station.robot.K_s).any():  # motors of rigid joints move as the links do
         names += ["q_M", "v_M"]
     for name, values in zip(names, np.hsplit(state, 4), strict=False):
-        labels = [f"{name}{suffix}_{i + 1}" for i in range(station.robot.dimension)]
-        unit = angle if name.startswith("q") else rate
-        known = limits.get(name) if suffix == "" else None
-        log.add(f"{name}{suffix}", values, unit, labels, known)
-
-
-def _joint_units(station: Station) -> tuple[str, str, str]:
-    is_revolute = station.robot.gather("is_revolute")
-    if is_revolute.all():
-        return "rad", "rad/s", "Nm"
-    if is_revolute.any():
-        return "rad or m", "rad/s or m/s", "Nm or N"
-    return "m", "m/s", "N"
+        log.add(f"{name}{suffix}", values, limits=limits.get(f"{name}{suffix}"))
 
 
 def _add_manifold(log: RunLog, station: Station, raw: dict[str, np.ndarray], Y: np.ndarray) -> None:
     law, layout, linearization = raw["law"], station.law.layout, station.law.linearization
-    m = linearization.num_outputs
-    Y_p = raw["reference"].reshape(len(law), -1, m)
+    Y_p = _by_order(raw["reference"], linearization.num_outputs)
     for kind, part, labels in _kinds(station):
         name = kind.value
-        log.add(name, Y[:, 0, part], kind.unit, labels)
+        log.add(name, Y[:, 0, part], labels=labels)
         if not station.law.stabilization.is_free[part].any():
-            log.add(f"{name}_p", Y_p[:, 0, part], kind.unit, [f"{x}_p" for x in labels])
+            log.add(f"{name}_p", Y_p[:, 0, part], labels=[f"{x}_p" for x in labels])
         if linearization.relative_degree > 1:
-            rates = [f"{x}_dot" for x in labels]
-            log.add(f"{name}_dot", Y[:, 1, part], f"{kind.unit}/s", rates)
+            log.add(f"{name}_dot", Y[:, 1, part], labels=[f"{x}_dot" for x in labels])
     names = [f"v_{coordinate.name}" for coordinate in station.task.place.coordinates]
     unit = f"SI/s^{linearization.relative_degree}"
     log.add("virtual_input", law[:, layout.virtual_input], unit, names)
     status = law[:, layout.status]
-    log.add("fault", status[:, 0].astype(int), "1", [fault.name.lower() for fault in Fault])
-    log.add("rcond", status[:, 1], "1")
-    log.add("saturated_drives", status[:, 2].astype(int), "1")
+    log.add("fault", status[:, 0].astype(int), labels=[fault.name.lower() for fault in Fault])
+    log.add("rcond", status[:, 1])
+    log.add("saturated_drives", status[:, 2].astype(int))
+
+
+def _by_order(values: FloatArray, outputs: int) -> FloatArray:
+    """Return outputs and their derivatives, shape (samples, orders, outputs)."""
+    return values.reshape(len(values), values.shape[1] // outputs, outputs)
 
 
 def _kinds(station: Station) -> list[tuple[Kind, slice, list[str]]]:
@@ -214,6 +201,8 @@ def _project(station: Station, pose: np.ndarray) -> np.ndarray:
 def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the virtual output of the links and its rate, shape (samples, 2, m)."""
     n, linearization = station.robot.dimension, station.law.linearization
+    if len(points) == 0:
+        return np.zeros((0, 2, linearization.num_outputs))
     function = virtual_output_function(station.robot, station.task.place).map(len(points))
     Y = np.array(function(joint_state[:, :n].T, joint_state[:, n : 2 * n].T, points.T))
     return Y.T.reshape(len(points), 2, linearization.num_outputs)
@@ -221,50 +210,36 @@ def _path_output(station: Station, joint_state: np.ndarray, points: np.ndarray) 
 
 def _add_forces(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add what acts on the tool, what the sensor makes of it, and what the compliance asks for."""
-    m, effort = station.law.linearization.num_outputs, _joint_units(station)[2]
-    wrench = ["f_x", "f_y", "f_z", "mu_x", "mu_y", "mu_z"]
-    manifold = [coordinate.force for coordinate in station.task.place.coordinates]
-    known = {
-        "wrench_ext": ("N, Nm", wrench),
-        "wrench_measured": ("N, Nm", wrench),
-        "wrench_sensor": ("N, Nm", wrench),
-        "wrench_observed": ("N, Nm", wrench),
-        "manifold_force": ("N, Nm", manifold),
-        "damping": ("N s/m, Nm s/rad", [name.replace("tau", "d", 1) for name in manifold]),
-        "tared": ("1", None),
-        "sensor_fault": ("1", None),
-    }
-    for name, (unit, labels) in known.items():
+    for name in _AS_LOGGED:
         if name in raw:
-            log.add(name, raw[name], unit, labels)
+            log.add(name, raw[name])
+    forces = [coordinate.force for coordinate in station.task.place.coordinates]
+    if "manifold_force" in raw:
+        log.add("manifold_force", raw["manifold_force"], labels=forces)
+    if "damping" in raw:
+        labels = [name.replace("tau", "d", 1) for name in forces]
+        log.add("damping", raw["damping"], labels=labels)
     if "wrench_ext" in raw or "push_torque" in raw:
-        labels = [f"tau_ext_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("tau_ext", _joint_torques(station, raw), effort, labels)
-    if "tau_ext_observed" in raw:
-        labels = [f"tau_ext_observed_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("tau_ext_observed", raw["tau_ext_observed"], effort, labels)
+        log.add("tau_ext", _joint_torques(station, raw))
     if "desired_reference" in raw:
-        desired = raw["desired_reference"][:, :m]
+        desired = raw["desired_reference"][:, : station.law.linearization.num_outputs]
         for kind, part, names in _kinds(station):
             labels = [name.replace(kind.value, f"{kind.value}_d", 1) for name in names]
-            log.add(f"{kind.value}_d", desired[:, part], kind.unit, labels)
+            log.add(f"{kind.value}_d", desired[:, part], labels=labels)
     if "impedance" in raw:
         _add_impedance(log, station, raw)
     if "limit_force" in raw:
         kinds = list(dict.fromkeys(limit_kinds(station.robot.dimension)))
-        log.add("limit_force", raw["limit_force"], "N", kinds)
+        log.add("limit_force", raw["limit_force"], labels=kinds)
 
 
 def _add_impedance(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add what an operator has made of the impedance, where it is not as the scenario says."""
     names = [coordinate.name for coordinate in station.task.place.coordinates]
-    impedance = raw["impedance"].reshape(len(log.time), 3, -1)
-    for name, row, unit in (
-        ("stiffness", STIFFNESS, "N/m, Nm/rad"),
-        ("damping", DAMPING, "N s/m, Nm s/rad"),
-    ):
-        log.add(name, impedance[:, row], unit, names)
-    log.add("tank", raw["tank"], "J")
+    impedance = _by_order(raw["impedance"], len(names))
+    log.add("stiffness", impedance[:, STIFFNESS], labels=names)
+    log.add("damping", impedance[:, DAMPING], labels=names)
+    log.add("tank", raw["tank"])
 
 
 def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
@@ -279,10 +254,8 @@ def _joint_torques(station: Station, raw: dict[str, np.ndarray]) -> np.ndarray:
 
 def _add_drives(log: RunLog, station: Station, raw: dict[str, np.ndarray]) -> None:
     """Add the torques that a velocity servo gives, and what friction takes."""
-    effort = _joint_units(station)[2]
     if station.servo is not None:
-        labels = [f"tau_d_{i + 1}" for i in range(station.robot.dimension)]
-        log.add("tau_d", raw["drive_torque"], effort, labels, station.servo.limits)
+        log.add("tau_d", raw["drive_torque"], limits=station.servo.limits)
         names = [fault.name.lower() for fault in Fault]
-        log.add("servo_fault", raw["servo_fault"].astype(int), "1", names)
-    add_friction(log, station, raw, effort)
+        log.add("servo_fault", raw["servo_fault"].astype(int), labels=names)
+    add_friction(log, station, raw)

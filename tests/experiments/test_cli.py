@@ -217,6 +217,17 @@ def test_list(monkeypatch, scenario, capsys):
     ]
 
 
+def test_list_of_signals(capsys):
+    assert main(["list", "--signals"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[:2] == ["Signal", "Unit"]
+    assert any(line.startswith("manifold_force ") and " N, Nm " in line for line in lines)
+    assert main(["list", "--signals", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert list(listed) == ["signals", "metrics", "figures"]
+    assert "settling_time" in [metric["name"] for metric in listed["metrics"]]
+
+
 def run_process(*arguments: str, code: str | None = None) -> subprocess.CompletedProcess:
     command = ["-c", code] if code else ["-m", "experiments"]
     return subprocess.run(

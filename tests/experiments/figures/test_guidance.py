@@ -94,7 +94,6 @@ def test_a_tool_in_space_has_no_progress_along_anything(log):
 
 
 def test_limits_of_the_robot_that_held_are_drawn(log):
-    assert not held_by_robot(log)
     forces = np.zeros((len(TIME), 3))
     log.add("limit_force", forces, "N", ["speed_3", "end_5", "singular"])
     assert not held_by_robot(log)

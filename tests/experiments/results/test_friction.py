@@ -8,12 +8,13 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains, Scenario
 from experiments.catalog.scenario_catalog import find_scenario
-from experiments.results.friction import friction_metric_names, friction_metrics, friction_signals
+from experiments.results.friction import friction_metrics
 from experiments.results.run_log import RunLog
-from experiments.results.run_signals import collect_log, optional_signals
+from experiments.results.run_signals import collect_log, expected_signals
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.yaml.typed import load_file
+from tests.experiments.results.registry_names import names_about
 
 
 def make_log():
@@ -40,10 +41,10 @@ def test_errors_of_torques_and_of_coefficients_at_the_end():
 
 def test_names_are_those_of_the_metrics():
     log = make_log()
-    assert list(friction_metrics(log)) == friction_metric_names(2, log.signals)
+    assert list(friction_metrics(log)) == names_about(log, "tau_f", "f_c", "f_v", drives=2)
     bare = RunLog(np.linspace(0.0, 1.0, 5))
     assert not friction_metrics(bare)
-    assert not friction_metric_names(2, bare.signals)
+    assert not names_about(bare, "tau_f", "f_c", "f_v", drives=2)
 
 
 @pytest.fixture(name="settings")
@@ -63,8 +64,8 @@ def run(settings):
     log = collect_log(station, result.root)
     assert log["momentum"].unit == "Nm s"
     assert log["momentum"].labels == ["p_1", "p_2", "p_3"]
-    assert friction_signals(station) <= optional_signals(station) & set(log.signals)
-    assert {"momentum", "f_c", "f_v_estimate"} <= friction_signals(station)
+    assert expected_signals(station) == set(log.signals)
+    assert {"momentum", "f_c", "f_v_estimate", "friction_estimate", "tau_f"} <= set(log.signals)
     return station.part.model, result.root, log
 
 

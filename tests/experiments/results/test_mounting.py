@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.mounting import mounting_metric_names, mounting_metrics
+from experiments.results.mounting import mounting_metrics
 from experiments.results.run_log import RunLog
+from tests.experiments.results.registry_names import names_about
 
 TIME = np.linspace(0.0, 10.0, 1001)
 
@@ -31,7 +32,7 @@ def fixture_log():
 def test_a_mounted_plate(log):
     metrics = mounting_metrics(log)
     value = {name: metric.value for name, metric in metrics.items()}
-    assert list(metrics) == mounting_metric_names(set(log.signals))
+    assert list(metrics) == names_about(log, "seat_gap")
     assert value["mounted"] == 1.0
     assert value["final_seat_gap"] == 0.0
     for name, expected in {
@@ -76,12 +77,12 @@ def test_without_operator_there_are_no_metrics_of_one(log):
     del log.signals["hand_wrench"]
     metrics = mounting_metrics(log)
     assert "peak_operator_force" not in metrics
-    assert list(metrics) == mounting_metric_names(set(log.signals))
+    assert list(metrics) == names_about(log, "seat_gap")
 
 
 def test_other_runs_have_none():
     assert not mounting_metrics(RunLog(TIME))
-    assert mounting_metric_names({"eta"}) == []
+    assert names_about(RunLog(TIME), "seat_gap") == []
 
 
 def test_of_a_plate_that_is_gripped_twice_the_last_time_counts(log):

@@ -15,7 +15,6 @@ from experiments.results.path import (
     max_path_deviation_while_moving,
     max_tangential_force,
     max_unanswered_force,
-    metric_names,
     path_distance,
     path_following_metrics,
     peak_speed,
@@ -35,6 +34,7 @@ from pfsc_drake.geometry import (
     path_from_waypoints,
     shape_report,
 )
+from tests.experiments.results.registry_names import names_about
 
 RATE = 8.0  # 1/s
 START = 0.01  # m
@@ -185,7 +185,10 @@ def test_names_are_those_of_the_collection():
     for name in ("eta", "eta_p", "eta_dot"):
         log.add(name, np.zeros(samples), "m")
     log.add("tau_d", np.ones((samples, 3)), "N")
-    assert list(path_following_metrics(log, 5e-5, 0.5, 0.1)) == metric_names(3, [])
+    about = ("xi", "xi_d", "xi_M", "phi", "eta", "eta_dot", "tau_d")
+    about += ("manifold_force", "wrench_ext", "notch_position")
+    metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
+    assert list(metrics) == names_about(log, *about, drives=3)
     log.add("xi_d", np.zeros((samples, 2)), "m")
     log.add("xi_M", np.zeros((samples, 2)), "m")
     log.add("phi", np.zeros((samples, 3)), "rad")
@@ -193,7 +196,7 @@ def test_names_are_those_of_the_collection():
     log.add("wrench_ext", np.ones((samples, 6)), "N, Nm")
     log.add("notch_position", np.ones((samples, 2)), "m")
     metrics = path_following_metrics(log, 5e-5, 0.5, 0.1)
-    assert list(metrics) == metric_names(3, log.signals)
+    assert list(metrics) == names_about(log, *about, drives=3)
     for name in ("max_manifold_force", "max_tangential_force", "max_external_force"):
         assert metrics[name].unit == "N"
 

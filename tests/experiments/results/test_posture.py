@@ -5,14 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from experiments.results.posture import (
-    elbow_shift,
-    elbow_travel,
-    posture_metric_names,
-    posture_metrics,
-)
-from experiments.results.pushes import lap_before
+from experiments.results.posture import posture_metrics
+from experiments.results.pushes import elbow_shift, elbow_travel, lap_before
 from experiments.results.run_log import RunLog
+from tests.experiments.results.registry_names import names_about
 
 LAP = 1.0
 
@@ -40,7 +36,8 @@ def log():
 
 def test_all_metrics(log):
     metrics = posture_metrics(log, LAP)
-    assert list(metrics) == posture_metric_names(log.signals, redundant=True, closed=True)
+    about = ("q_posture", "redundant", "push_force")
+    assert list(metrics) == names_about(log, *about, also=("redundant", "closed"))
     assert metrics["max_posture_error"].value == pytest.approx(0.02)
     assert metrics["posture_return"].value == pytest.approx(0.1, rel=1e-3)
     assert metrics["final_joint_speed"].value == pytest.approx(0.0, abs=1e-9)
@@ -103,7 +100,7 @@ def test_square_robots_have_none_of_them(log):
         del log.signals[name]
     log["q_J"].values = log["q_J"].values[:, :6]
     assert not posture_metrics(log, LAP)
-    assert not posture_metric_names(log.signals, redundant=False, closed=True)
+    assert not names_about(log, "q_posture", "redundant", "push_force", also=("closed",))
 
 
 def test_what_the_elbow_does_before_it_is_pushed_is_no_shift(log):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.results.press import SETTLING, press_metric_names, press_metrics
+from experiments.results.press import SETTLING, press_metrics
 from experiments.results.run_log import RunLog
+from tests.experiments.results.registry_names import names_about
 
 TIME = np.linspace(0.0, 4.0, 401)
 
@@ -33,7 +34,7 @@ def test_overshoot_is_relative_to_the_reference_of_the_moment(press):
     assert metrics["max_force_error"].value == pytest.approx(1.5)
     assert metrics["peak_force"].value == 22.0
     assert metrics["contact_losses"].value == 0.0
-    assert list(metrics) == press_metric_names({"normal_force", "press"})
+    assert list(metrics) == names_about(make_log(force, press), "normal_force")
 
 
 def test_a_bounce_is_counted(press):
@@ -49,8 +50,9 @@ def test_what_never_touches_has_no_overshoot(press):
 
 
 def test_position_control_has_a_peak_alone():
-    metrics = press_metrics(make_log(np.full_like(TIME, 70.0)))
-    assert list(metrics) == press_metric_names({"normal_force"}) == ["peak_force"]
+    log = make_log(np.full_like(TIME, 70.0))
+    metrics = press_metrics(log)
+    assert list(metrics) == names_about(log, "normal_force") == ["peak_force"]
     assert metrics["peak_force"].value == 70.0
     assert not press_metrics(RunLog(TIME))
 

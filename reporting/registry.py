@@ -1,0 +1,206 @@
+"""The signals, metrics and figures that a run may have, told once, in ``registry.toml``.
+
+From here come units and labels of a log, units and sources of metrics, what a target may name, when
+a figure is drawn, ``list --signals`` and the page ``docs/signals.md``, which this module prints.
+"""
+
+import re
+import sys
+import tomllib
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class KnownSignal:
+    """A signal that a log may have.
+
+    Attributes:
+        name: Name in the log.
+        unit: Unit of all components, of several kinds with a comma between; ``rad|m`` stands for
+            joints that turn, or slide.
+        text: What it is.
+        when: When a log has it; always where empty.
+        labels: Names of the components with a space between, or one for all with ``{}`` for a
+            number; the signal's own name where empty.
+        figures: Figures that show it.
+    """
+
+    name: str
+    unit: str
+    text: str
+    when: str = ""
+    labels: str = ""
+    figures: tuple[str, ...] = ()
+
+    def unit_of(self, turning: Sequence[bool]) -> str:
+        """Return the unit on a robot.
+
+        Args:
+            turning: Whether each joint turns, else it slides.
+        """
+        turns, _, slides = self.unit.partition("|")
+        if not slides or all(turning):
+            return turns
+        return f"{turns} or {slides}" if any(turning) else slides
+
+    def labels_of(self, count: int) -> list[str]:
+        """Return the names of so many components."""
+        if self.labels and "{}" not in self.labels:
+            return self.labels.split()
+        if not self.labels and count == 1:
+            return [self.name]
+        pattern = self.labels or f"{self.name}_{{}}"
+        return [pattern.format(number) for number in range(1, count + 1)]
+
+
+@dataclass(frozen=True)
+class KnownMetric:
+    """A metric that a run may have.
+
+    Attributes:
+        name: Its name, with ``{}`` for the number of a drive where each has one.
+        unit: SI unit; ``Nm|N`` stands for joints that turn, or slide.
+        text: What it is.
+        needs: Signals, or properties of a run, without which there is no such metric.
+        source: Where the number comes from, if that needs a word.
+    """
+
+    name: str
+    unit: str
+    text: str
+    needs: tuple[str, ...] = ()
+    source: str | None = None
+
+    def names(self, drives: int) -> list[str]:
+        """Return the names that it has on a robot with so many drives."""
+        if "{}" not in self.name:
+            return [self.name]
+        return [self.name.format(number) for number in range(1, drives + 1)]
+
+
+@dataclass(frozen=True)
+class KnownFigure:
+    """A figure that may be drawn of a run.
+
+    Attributes:
+        name: Name of its file, without suffix.
+        text: What it shows.
+        needs: Signals without which it is not drawn.
+    """
+
+    name: str
+    text: str
+    needs: tuple[str, ...] = ()
+
+
+_NUMBER = re.compile(r"_\d+$")  # of a drive
+_INTRODUCTION = """# Signals, metrics and figures
+
+What a run may leave: signals in `log.h5`, each a dataset `[samples, components]` at 1 kHz with
+attributes `unit` and `labels`; metrics in `metrics.json`, which are there if a run has what they
+need, N being the number of a drive; pictures in `figures/`. Units are SI; where there are two, the
+second is that of joints that slide, and r is the relative degree.
+
+`python -m experiments list --signals` prints the same, with `--json` as data. `make signals` writes
+this page from `reporting/registry.toml`."""
+
+
+def _rows(kind: str) -> Iterator[dict[str, Any]]:
+    for name, row in _TABLE[kind].items():
+        lists = {key: tuple(row[key].split()) for key in ("needs", "figures") if key in row}
+        yield {"name": name, **row, **lists}
+
+
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+SIGNALS = {row["name"]: KnownSignal(**row) for row in _rows("signals")}
+METRICS = {row["name"]: KnownMetric(**row) for row in _rows("metrics")}
+FIGURES = {row["name"]: KnownFigure(**row) for row in _rows("figures")}
+
+
+def known_metric(name: str) -> KnownMetric | None:
+    """Return what is known of a metric, perhaps with the number of a drive; None if nothing is."""
+    return METRICS.get(name) or METRICS.get(_NUMBER.sub("_{}", name))
+
+
+def possible_metrics(known: Collection[str], drives: int) -> list[str]:
+    """Return the names of the metrics that a run may have.
+
+    Args:
+        known: Its signals, what else it has of what metrics need, and metrics known beforehand.
+        drives: Number of drives.
+    """
+    return [
+        name
+        for metric in METRICS.values()
+        for name in metric.names(drives)
+        if name in known or set(metric.needs) <= set(known)
+    ]
+
+
+def as_data() -> dict[str, list[dict[str, Any]]]:
+    """Return all signals, metrics and figures as plain data."""
+    return {
+        "signals": [asdict(signal) for signal in SIGNALS.values()],
+        "metrics": [asdict(metric) for metric in METRICS.values()],
+        "figures": [asdict(figure) for figure in FIGURES.values()],
+    }
+
+
+def as_tables() -> dict[str, tuple[Sequence[str], list[Sequence[str]]]]:
+    """Return head and rows, of text, of the tables of signals, metrics and figures."""
+    return {
+        "signals": (
+            ("Signal", "Unit", "What it is", "When", "Figures"),
+            [
+                (s.name, _unit(s.unit), s.text, s.when, ", ".join(s.figures))
+                for s in SIGNALS.values()
+            ],
+        ),
+        "metrics": (
+            ("Metric", "Unit", "What it is", "Needs"),
+            [
+                (m.name.replace("{}", "N"), _unit(m.unit), m.text, ", ".join(m.needs))
+                for m in METRICS.values()
+            ],
+        ),
+        "figures": (
+            ("Figure", "What it shows", "Needs"),
+            [(f.name, f.text, ", ".join(f.needs)) for f in FIGURES.values()],
+        ),
+    }
+
+
+def as_markdown() -> str:
+    """Return the page of all signals, metrics and figures."""
+    page = [_INTRODUCTION]
+    for kind, (head, rows) in as_tables().items():
+        page += [f"\n## {kind.capitalize()}\n", _line(head), _line(["---"] * len(head))]
+        page += [_line([f"`{name}`", *row]) for name, *row in rows]
+    return "\n".join(page) + "\n"
+
+
+def as_text() -> str:
+    """Return the same in columns."""
+    lines = []
+    for head, rows in as_tables().values():
+        widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
+        for row in (head, *rows):
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            lines.append("  ".join(cells).rstrip())
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _unit(unit: str) -> str:
+    return unit.replace("|", " or ")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(as_markdown())
