@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from identification.consistency.command import printed_command
+from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
 from identification.excitation.command import information_command
 from identification.options import (
@@ -184,7 +184,7 @@ def estimate_command(
 ) -> None:
     """Estimate base parameters from measured motions, and write identification.h5 and a page."""
     from identification.pages import write_identification
-    from identification.report.tables import parameter_table, torque_table
+    from identification.report.page import parameter_table, torque_table
     from identification.steps import estimate_files
     from reporting.tables import print_table
 

@@ -12,9 +12,8 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.recording import record_excitation
 from identification.excitation.scene import cell_of
 from identification.findings import Findings
-from identification.measurement.drift import friction_trend
-from identification.measurement.periods import AveragedMotion
-from identification.measurement.prepare import read_motion
+from identification.measurement.experiment import read_motion
+from identification.measurement.periods import AveragedMotion, friction_trend
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
 from identification.report.page import PageContent, write_page

@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from identification.consistency.bounds import PhysicalBounds, load_bounds
-from identification.consistency.direct import estimate_consistent
-from identification.consistency.nearest import ConsistentParameters
+from identification.consistency.nearest import ConsistentParameters, estimate_consistent
 from identification.consistency.writing import WrittenModel, write_model
-from identification.estimation.bandwidth import choose_bandwidth
 from identification.estimation.plausibility import refuse_implausible
 from identification.estimation.repetitions import Repetitions
+from identification.estimation.residuals import choose_bandwidth
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
 from identification.estimation.validation import predict
 from identification.estimation.wiring import unchecked
@@ -22,11 +21,10 @@ from identification.excitation.scene import cell_of
 from identification.excitation.search import SearchResult
 from identification.findings import Findings, find_consistent, find_parameters, true_base
 from identification.measurement.columns import Reading
-from identification.measurement.experiment import run_experiment
+from identification.measurement.experiment import prepare_motion, run_experiment
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections
 from identification.measurement.periods import AveragedMotion
-from identification.measurement.prepare import prepare_motion
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from diagrams.robots.model import locate_model
-from identification.consistency.check import require_consistent
-from identification.consistency.model_edits import edited_model
-from identification.consistency.parameter_files import identified_delta, identified_robot
-from identification.consistency.urdf import urdf_text
+from identification.consistency.model_edits import edited_model, urdf_text
+from identification.consistency.parameter_files import (
+    identified_delta,
+    identified_robot,
+    require_consistent,
+)
 from identification.model.subject import Subject
 from identification.output import make_folder, write_text
 from pfsc_drake.errors import InputError

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.elastic.signals import JointSignals
-from identification.elastic.weak_form import TestFunction, mean_sign, white_noise
+from identification.elastic.signals import JointSignals, TestFunction, mean_sign, white_noise
 
 _SLOW = 0.03  # of the largest velocity, below which friction is anything between both signs
 _NOISE = 4.0  # standard deviations of the measured velocity, likewise

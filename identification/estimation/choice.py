@@ -27,9 +27,8 @@ from identification.estimation.friction import (
     FrictionModel,
     FrictionTerm,
 )
-from identification.estimation.further_columns import FurtherColumns
 from identification.estimation.identifiability import factorize
-from identification.estimation.information import SLOW, MeasuredMotion, information
+from identification.estimation.information import SLOW, FurtherColumns, MeasuredMotion, information
 from identification.estimation.least_squares import estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor

@@ -1,4 +1,4 @@
-"""What is left of measured torques: noise, or something that the model lacks."""
+"""What is left of measured torques: noise, motion that was filtered out, or what a model lacks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,9 +7,14 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import f as fisher
 
+from identification.estimation.least_squares import estimate
 from identification.estimation.noise import mean_torque_spectrum
-from identification.measurement.periods import AveragedMotion
+from identification.measurement.periods import HARMONICS_KEPT, AveragedMotion, average
+from identification.measurement.record import Record
+from identification.model.base import BaseParameters
+from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.progress import Progress
 
 # delays that residuals are compared with themselves at, in samples
 LAGS = 20
@@ -163,3 +168,76 @@ def excess(
         ratio,
         fisher.sf(ratio, freedom, 2.0 * count * (motion.periods - 1)),
     )
+
+
+# in units of 20 harmonics
+_MULTIPLES = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
+# standard deviations by which what is left may be above the least
+_CHANCE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class BandwidthChoice:
+    """The bandwidth with which positions are filtered.
+
+    Attributes:
+        motion: The record averaged with it.
+        candidates: Bandwidths that were tried [Hz], rising.
+        excesses: What each leaves of the torques.
+    """
+
+    motion: AveragedMotion
+    candidates: tuple[float, ...]
+    excesses: tuple[Excess, ...]
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """``f_g`` [Hz]."""
+        return self.motion.bandwidth_hz
+
+    @property
+    def excess(self) -> Excess:
+        """What the chosen one leaves."""
+        return self.excesses[self.candidates.index(self.bandwidth_hz)]
+
+
+def choose_bandwidth(
+    regressor: Regressor,
+    base: BaseParameters,
+    record: Record,
+    period: float | None = None,
+    skip: int = 1,
+    progress: Progress | None = None,
+) -> BandwidthChoice:
+    """Return the least bandwidth with which the model explains torques as well as with any.
+
+    Args:
+        regressor: Of the robot.
+        base: Its base parameters.
+        record: Of a periodic motion.
+        period: ``T_f`` [s]; by default the record's.
+        skip: Periods at the start that are left out.
+        progress: Told the fraction done and what is done.
+
+    Raises:
+        InputError: As of :func:`~identification.measurement.periods.average` and
+            :func:`~identification.estimation.least_squares.estimate`.
+    """
+    first = average(record, period, skip)
+    half = 0.5 * len(first.t) / first.period
+    lowest = HARMONICS_KEPT / first.period
+    candidates = [lowest * m for m in _MULTIPLES if lowest * m < half]
+    motions, excesses = [], []
+    for i, candidate in enumerate(candidates):
+        if progress is not None:
+            progress(i / len(candidates), "choosing the bandwidth")
+        motion = average(record, period, skip, candidate)
+        result = estimate(regressor, base, motion, white=True)
+        motions.append(motion)
+        excesses.append(
+            excess(result.residuals, result.system.used, motion, parameters=result.base.rank)
+        )
+    left = np.array([found.ratio.mean() for found in excesses])
+    chance = np.sqrt(2.0 / (excesses[0].freedom * record.dimension))
+    chosen = int(np.argmax(left <= left.min() * (1.0 + _CHANCE * chance)))
+    return BandwidthChoice(motions[chosen], tuple(candidates), tuple(excesses))

@@ -35,7 +35,7 @@ from identification.estimation.identifiability import factorize
 from identification.estimation.information import Information
 from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
-from identification.measurement.units import si_unit
+from identification.measurement.columns import si_unit
 from identification.model.base import BaseParameters
 from identification.output import write_bytes
 from pfsc_drake.errors import InputError

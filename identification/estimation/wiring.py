@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.information import standing_still
-from identification.estimation.normal_equations import NormalEquations
+from identification.estimation.least_squares import NormalEquations
 from identification.estimation.plausibility import describe_negative, never_negative
 from identification.estimation.signal_changes import SignalChange, likely_changes
 from identification.measurement.periods import AveragedMotion

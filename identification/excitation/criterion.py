@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
-from identification.excitation.sampled import SampledFunction
+from identification.excitation.run_in import SampledFunction
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError

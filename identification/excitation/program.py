@@ -15,7 +15,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 from identification.excitation.criterion import ExcitationCost
 from identification.excitation.fourier import fourier_basis
 from identification.excitation.problem import ExcitationProblem
-from identification.excitation.sampled import SampledFunction
+from identification.excitation.run_in import SampledFunction
 
 Evaluated = Callable[[np.ndarray], np.ndarray]
 

@@ -10,11 +10,6 @@ from numpy.typing import ArrayLike
 
 from identification.excitation.cell import Cell
 from identification.excitation.criterion import Information, information
-from identification.excitation.feasibility import (
-    check_excited,
-    check_postures,
-    check_start_posture,
-)
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import Given, JointLimits, chosen_limits
 from identification.excitation.local_search import LocalOptimum, LocalSearch
@@ -25,7 +20,13 @@ from identification.excitation.problem import (
     tightened,
 )
 from identification.excitation.scene import RobotScene, cell_of
-from identification.excitation.verification import Verification, verify
+from identification.excitation.verification import (
+    Verification,
+    check_excited,
+    check_postures,
+    check_start_posture,
+    verify,
+)
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject

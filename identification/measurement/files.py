@@ -24,10 +24,9 @@ import numpy as np
 from scipy.io import loadmat, savemat
 
 from identification.measurement.checks import check_record
-from identification.measurement.columns import RawSignal, Reading, make_record, parse_name
+from identification.measurement.columns import RawSignal, Reading, make_record, parse_name, si_unit
 from identification.measurement.record import SIGNALS, MeasuredRobot, Record
 from identification.measurement.synchronization import check_velocities
-from identification.measurement.units import si_unit
 from identification.output import write_bytes
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers

@@ -15,8 +15,14 @@ from diagrams.robots.plant_wiring import joint_state_of
 from diagrams.signal_log import SignalLog, add_log
 from identification.excitation.run_in import ExcitationRun
 from identification.measurement.imperfections import Imperfections
-from identification.measurement.servo import Servo, drive_inertia
-from identification.measurement.sources import add_curves, add_samples, add_signs, add_sum
+from identification.measurement.servo import (
+    Servo,
+    add_curves,
+    add_samples,
+    add_signs,
+    add_sum,
+    drive_inertia,
+)
 from identification.model.subject import Subject
 from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydrake.math import RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame
 
 from diagrams.robots.delta import is_delta, load_delta_robot
 from diagrams.robots.model import locate_model, read_robot, tool_frame
 from diagrams.scenario import RobotParameters as RobotBlock
-from identification.model.round_angles import with_round_angles
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.models.parameters import BodyParameters, RobotParameters, load_parameters
@@ -21,6 +21,71 @@ from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount, mounts_from_parameters
 from pfsc_drake.yaml.reading import read_yaml
 from pfsc_drake.yaml.typed import load_typed
+
+# what angles of a robot's design are multiples of
+STEP_DEG = 15.0
+# how far off such a multiple an angle is taken for rounded [rad]
+TOLERANCE = 1e-4
+# of a rotation matrix, by which it is off without having been rounded
+_EXACT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedChain:
+    """A chain whose angles are what they were before they were rounded.
+
+    Attributes:
+        chain: The chain.
+        note: What was changed, one line; empty if nothing was.
+    """
+
+    chain: SerialChain
+    note: str
+
+
+def with_round_angles(chain: SerialChain) -> RoundedChain:
+    """Return a chain with joints turned by multiples of 15 degrees where they nearly are.
+
+    Roll, pitch and yaw of a joint's frame in the one before count, each by itself.
+
+    Args:
+        chain: As the model file has it.
+    """
+    links, changed, most = [], [], 0.0
+    for link in chain.links:
+        rounded = round_rotation(link.R_PF)
+        off = float(np.abs(rounded - link.R_PF).max())
+        if off > _EXACT:
+            changed.append(link.name)
+            most = max(most, off)
+            link = replace(link, R_PF=rounded)
+        links.append(link)
+    if not changed:
+        return RoundedChain(chain, "")
+    note = (
+        f"the model's angles at {', '.join(changed)} are up to {most:.2g} rad off multiples of "
+        f"{STEP_DEG:g} deg; taken for rounded, and put right"
+    )
+    return RoundedChain(replace(chain, links=tuple(links)), note)
+
+
+def round_rotation(R: np.ndarray) -> np.ndarray:
+    """Return a rotation with roll, pitch and yaw on multiples of 15 degrees that they are near.
+
+    Args:
+        R: Shape (3, 3).
+    """
+    angles = RollPitchYaw(RotationMatrix(R)).vector()
+    step = np.deg2rad(STEP_DEG)
+    nearest = step * np.round(angles / step)
+    near = np.abs(angles - nearest) <= TOLERANCE
+    if not near.any():
+        return R
+    rounded = RollPitchYaw(np.where(near, nearest, angles)).ToRotationMatrix().matrix()
+    # sines and cosines of right angles are zero and one
+    rounded = np.where(np.abs(rounded - np.round(rounded)) < _EXACT, np.round(rounded), rounded)
+    return rounded if np.abs(rounded - R).max() <= 3.0 * TOLERANCE else R
+
 
 _YAML = (".yaml", ".yml")
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.consistency.bounds import bounds_from_geometry, load_bounds
-from identification.consistency.check import inconsistencies
-from identification.consistency.constraints import link_intervals
-from identification.consistency.prior import check_prior, prior_from_bounds
+from identification.consistency.bounds import bounds_from_geometry, link_intervals, load_bounds
+from identification.consistency.parameter_files import inconsistencies
+from identification.consistency.program import check_prior, prior_from_bounds
 from identification.consistency.pseudo_inertia import spread
 from identification.model.parameters import parameter_names, true_parameters
 from pfsc_drake.errors import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.consistency.check import (
+from identification.consistency.parameter_files import (
     inconsistencies,
     require_consistent,
 )

@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from identification.consistency.bounds import bounds_from_geometry, load_bounds
-from identification.consistency.check import inconsistencies
-from identification.consistency.direct import estimate_consistent
-from identification.consistency.nearest import nearest_consistent
+from identification.consistency.nearest import estimate_consistent, nearest_consistent
+from identification.consistency.parameter_files import inconsistencies
 from identification.estimation.friction import FrictionModel, FrictionTerm
 from identification.estimation.least_squares import estimate
 from identification.excitation.fourier import FourierTrajectory

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from identification.elastic.joint_estimate import JointEstimate
-from identification.elastic.table import table_rows, write_table
+from identification.elastic.command import table_rows, write_table
+from identification.elastic.estimate import JointEstimate
 from pfsc_drake.errors import InputError
 
 NAMES = ("stiffness", "damping", "inertia", "coulomb", "viscous", "offset")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.elastic.torques import random_steps, zippered_multisine
+from identification.elastic.experiment import random_steps, zippered_multisine
 from pfsc_drake.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.elastic.weak_form import (
+from identification.elastic.signals import (
     TestFunction,
     long_run_covariance,
     mean_sign,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.estimation.bandwidth import choose_bandwidth
 from identification.estimation.least_squares import estimate
+from identification.estimation.residuals import choose_bandwidth
 from identification.estimation.validation import compare_with_truth
 from identification.measurement.periods import average
 from identification.measurement.record import Record

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.measurement.drift import friction_trend
-from identification.measurement.periods import average
+from identification.measurement.periods import average, friction_trend
 from identification.measurement.record import Record
 from pfsc_drake.errors import InputError
 

@@ -9,11 +9,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from identification.excitation.fourier import FourierTrajectory
-from identification.measurement.drift import friction_trend
 from identification.measurement.experiment import run_experiment, simulate_experiment
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
-from identification.measurement.periods import average
+from identification.measurement.periods import average, friction_trend
 from identification.measurement.servo import Servo
 from identification.measurement.synchronization import check_torque_lag, torque_lag
 from identification.model.parameters import true_parameters

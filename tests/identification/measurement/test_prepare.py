@@ -8,10 +8,9 @@ import pytest
 
 from identification.excitation.fourier import FourierTrajectory
 from identification.measurement.columns import Reading
-from identification.measurement.experiment import simulate_experiment
+from identification.measurement.experiment import read_motion, simulate_experiment
 from identification.measurement.files import write_record
 from identification.measurement.imperfections import shipped_imperfections
-from identification.measurement.prepare import read_motion
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
 from pfsc_drake.errors import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
-from identification.measurement.sources import (
+from identification.measurement.servo import (
     add_curves,
     add_lines,
     add_samples,

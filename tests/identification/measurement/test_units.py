@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.measurement.units import si_unit, to_si
+from identification.measurement.columns import si_unit, to_si
 from pfsc_drake.errors import InputError
 
 

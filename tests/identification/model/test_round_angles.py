@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from identification.consistency.urdf import urdf_text
+from identification.consistency.model_edits import urdf_text
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
-from identification.model.round_angles import round_rotation
-from identification.model.subject import load_subject
+from identification.model.subject import load_subject, round_rotation
 
 
 def rotation(*degrees):
@@ -37,7 +36,7 @@ def test_other_angles_stay():
 def test_a_urdf_with_rounded_angles(comau, tmp_path, monkeypatch, digits, rounded_again):
     """Also without putting angles right, as of a robot whose angles are not multiples of 15 deg."""
     if not rounded_again:
-        monkeypatch.setattr("identification.model.round_angles.TOLERANCE", -1.0)
+        monkeypatch.setattr("identification.model.subject.TOLERANCE", -1.0)
     text = urdf_text(comau, true_parameters(comau))
 
     def shortened(found):
