@@ -1,4 +1,14 @@
-"""What is measured of one elastic joint, and its equations without derivatives of signals."""
+"""What is measured of one elastic joint, and its equations without derivatives of signals.
+
+An equation ``tau = I q'' + K q + ...`` is convolved with a smooth function ``phi`` of finite
+length. The derivatives then fall on ``phi``::
+
+    phi * tau = I (phi'' * q) + K (phi * q) + ...
+
+which holds exactly, whatever the motion was before and after, periodic or not. Here ``phi`` is the
+B-spline of degree 5, sampled; sums stand for integrals, with errors that fall with the sixth power
+of its knots' distance.
+"""
 
 from dataclasses import dataclass
 from math import comb

@@ -1,4 +1,12 @@
-"""What is left of measured torques: noise, motion that was filtered out, or what a model lacks."""
+"""What is left of measured torques: noise, motion that was filtered out, or what a model lacks.
+
+Sec. C.2 keeps 20 harmonics of the period. That is right for a robot that follows its excitation.
+One whose servo does not know its friction sticks a little at each reversal and moves with edges, of
+which such a filter leaves nothing: accelerations are missing and parameters are biased, far more
+than their covariance tells. With too large a bandwidth the noise of the positions, whose second
+derivative grows with the frequency squared, biases them as well. What is left of the torques at low
+frequencies tells both.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,10 @@
-"""The robot under test."""
+"""The robot under test.
+
+Angles of a model that were rounded when it was written, as 1.5708 for a right angle, are found:
+axes that are parallel or at right angles but for 4e-6 rad have another set of base parameters than
+those of the robot. Gravity then acts about an upright axis, and some more are seen, by 4e-6 of what
+others do; their estimates are noise of any size.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
