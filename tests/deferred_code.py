@@ -1,21 +1,28 @@
 """Machine code that is made when it pays: most functions of a test are evaluated a few times."""
 
+import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from pfsc_drake.compiled import bound_function
+from pfsc_drake.compiled.content import function_digest
 from pfsc_drake.compiled.native_code import native_code
 
-# to make machine code takes as long as the interpreter takes for about so many evaluations
-MANY = 1000
+# after so many evaluations it is looked at what they take
+BATCH = 100
+# of the interpreter, over all tests of a process [s]: to make machine code takes about as long
+ENOUGH = 1.0
+
+_spent: Counter[bytes] = Counter()
 
 
 class DeferredCode:
-    """Evaluates a function by CasADi's interpreter, and as machine code after many evaluations.
+    """Evaluates a function by CasADi's interpreter until that has taken long, then as machine code.
 
     The results are the same to the last bit, which ``tests/compiled`` checks.
 
@@ -35,23 +42,40 @@ class DeferredCode:
             buffer.set_arg(i, values.data)
         for i, values in enumerate(results):
             buffer.set_res(i, values.data)
-        left = MANY
+        left = BATCH
 
         def call() -> None:
             nonlocal buffer, evaluate, left
             left -= 1
-            if left == 0:
-                code = native_code(self._function)
-                if code is not None:
-                    evaluate, buffer = code.bind(arguments, results), None
+            if left:
+                evaluate()
+                return
+            begin = time.thread_time()
             evaluate()
+            key = function_digest(self._function)
+            _spent[key] += BATCH * (time.thread_time() - begin)
+            code = native_code(self._function) if _spent[key] > ENOUGH else None
+            if code is None:
+                left = BATCH
+            else:
+                evaluate, buffer = code.bind(arguments, results), None
 
         return call
 
 
 @contextmanager
-def compiled_at_once() -> Iterator[None]:
-    """Compile all functions that are bound within the context, as a run does."""
+def code_made(make: Callable[[ca.Function], object]) -> Iterator[None]:
+    """Bind all functions within the context to what a function returns for them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bound_function, "native_code", native_code)
+        patch.setattr(bound_function, "native_code", make)
         yield
+
+
+def compiled_at_once() -> AbstractContextManager[None]:
+    """Compile all functions that are bound within the context, as a run does."""
+    return code_made(native_code)
+
+
+def interpreted() -> AbstractContextManager[None]:
+    """Leave all functions that are bound within the context to CasADi's interpreter for good."""
+    return code_made(lambda function: None)

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
+from experiments import simulation
 from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
 from experiments.results.run_log import RunLog
@@ -58,6 +59,14 @@ def run(out, scenario, *arguments, complete=False):
         arguments = [*arguments, *(() if complete else BARE)]
         status = main(["run", str(scenario), "--out", str(out), *arguments])
     return Run(status, out, stdout.getvalue())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_ticks_measured():
+    """Measure the tick a few times: that would take as long as to simulate, and no test looks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation, "_SAMPLES", 10)
+        yield
 
 
 @pytest.fixture(scope="session")

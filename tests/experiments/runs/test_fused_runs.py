@@ -3,8 +3,6 @@
 The one is machine code, the others are interpreted.
 """
 
-from contextlib import nullcontext
-
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -15,7 +13,7 @@ from diagrams.station import Station
 from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY, find_scenario, scenario_names
 from experiments.simulation import configure
 from pfsc_drake.yaml.typed import load_file
-from tests.deferred_code import compiled_at_once
+from tests.deferred_code import compiled_at_once, interpreted
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +24,7 @@ Log = dict[str, np.ndarray]
 def run(settings: Scenario, fused: bool, like: Station | None = None) -> tuple[Station, Log]:
     """Return a station, and the log of its first ticks with whether it ended in a fault."""
     settings.simulation.fused = fused
-    with compiled_at_once() if fused else nullcontext():
+    with compiled_at_once() if fused else interpreted():
         station = build_station(settings, SCENARIO_DIRECTORY, like=like)
         simulator = Simulator(station.diagram)
         configure(simulator, "runge_kutta3", settings.controller.sampling_time)
