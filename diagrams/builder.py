@@ -113,7 +113,7 @@ def build_station(
         forces |= add_sensor(builder, part, scenario, states | forces)
         if mounting is not None:
             forces |= add_payload(builder, scenario, mounting, place.signals | forces)
-    wishes = {} if operator is None else operator.wishes
+    wishes = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | wishes)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator_file import columns, read_controls
-from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, WISHES
+from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, REQUESTS
 from pfsc_drake.control.manifolds.projector import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import ASKED, LiveHand
@@ -18,7 +18,11 @@ from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 from pfsc_drake.systems.physics.recorded_controls import RecordedControls
 
-PULL, WISH, REGIONS = slice(0, ASKED), slice(ASKED, ASKED + WISHES), slice(ASKED + WISHES, None)
+PULL, REQUEST, REGIONS = (
+    slice(0, ASKED),
+    slice(ASKED, ASKED + REQUESTS),
+    slice(ASKED + REQUESTS, None),
+)
 
 
 @dataclass(frozen=True)
@@ -59,9 +63,9 @@ class Operator:
         return self.panel.GetOutputPort("pull")
 
     @property
-    def wishes(self) -> dict[str, OutputPort]:
-        """What is asked of the law: ``impedance_wish``, and ``regions_on`` if there are any."""
-        ports = {"impedance_wish": self.panel.GetOutputPort("wish")}
+    def requests(self) -> dict[str, OutputPort]:
+        """What is asked of the law: ``impedance_request``, and ``regions_on`` if there are any."""
+        ports = {"impedance_request": self.panel.GetOutputPort("request")}
         if self.regions:
             ports["regions_on"] = self.panel.GetOutputPort("regions")
         return ports
@@ -88,7 +92,7 @@ def idle_controls(regions: Sequence[str]) -> np.ndarray:
     Args:
         regions: Names of what can be switched on and off; they are on.
     """
-    return np.concatenate([np.zeros(ASKED), np.full(WISHES, AS_GIVEN), np.ones(len(regions))])
+    return np.concatenate([np.zeros(ASKED), np.full(REQUESTS, AS_GIVEN), np.ones(len(regions))])
 
 
 def add_operator(builder: DiagramBuilder, scenario: Scenario, folder: FilePath) -> Operator | None:
@@ -109,7 +113,7 @@ def add_operator(builder: DiagramBuilder, scenario: Scenario, folder: FilePath) 
         return None
     period, regions = scenario.controller.sampling_time, region_names(scenario)
     idle = idle_controls(regions)
-    parts = {"pull": idle[PULL], "wish": idle[WISH]}
+    parts = {"pull": idle[PULL], "request": idle[REQUEST]}
     if regions:
         parts["regions"] = idle[REGIONS]
     panel = builder.AddNamedSystem("operator_panel", OperatorPanel(parts, period))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
-from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, wishes_of
+from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, requests_of
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.space import SpaceManifold
 
@@ -56,7 +56,7 @@ class TunedParameter:
     """A stiffness or damping that can be changed.
 
     Attributes:
-        index: Among the wishes, see :class:`ImpedanceTuner`.
+        index: Among the requests, see :class:`ImpedanceTuner`.
         slider: By which.
         top_is_rigid: Whether the highest value stands for what is given, which is rigid.
         always: Whether the slider counts where it starts, too, and not what is given.
@@ -67,7 +67,7 @@ class TunedParameter:
     top_is_rigid: bool = False
     always: bool = False
 
-    def wish(self, value: float) -> float:
+    def request(self, value: float) -> float:
         """Return what a value of the slider asks for."""
         at_start = abs(value - self.slider.value) < 0.5 * self.slider.step
         if at_start and not self.always:
@@ -99,7 +99,7 @@ def tuned_parameters(settings: Scenario, station: Station) -> list[TunedParamete
 
 
 def _of_kind(kind: Kind, given: CoordinateImpedance, *, stiffness: bool) -> list[TunedParameter]:
-    of_stiffness, of_damping = wishes_of(kind)
+    of_stiffness, of_damping = requests_of(kind)
     per = ("Nm/rad", "Nms/rad") if kind is Kind.ROTATIONAL else ("N/m", "Ns/m")
     rigid = not given.stiffness.at and math.isinf(given.stiffness.value)
     soft_stiffness, soft_damping = _SOFT[kind]

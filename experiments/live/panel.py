@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagrams.surroundings.operator import PULL, REGIONS, WISH, idle_controls
+from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.pages import Pages
-from pfsc_drake.control.compliance.tuned_impedance import wishes_of
+from pfsc_drake.control.compliance.tuned_impedance import requests_of
 from pfsc_drake.control.manifolds.coordinate import Kind
 
 _DEAD_ZONE = 0.12  # of a stick
@@ -50,7 +50,7 @@ class Panel:
     ) -> None:
         self._pages, self._tuned, self._force_limit = pages, tuned, force_limit
         self._idle = idle_controls(regions)
-        across, _ = wishes_of(Kind.TRANSVERSAL)
+        across, _ = requests_of(Kind.TRANSVERSAL)
         self._can_be_free = any(parameter.index == across for parameter in tuned)
         self._pull = [f"pull {axis} [N]" for axis in _AXES]
         self._stick = [f"stick {axis}" for axis in _AXES]
@@ -145,7 +145,7 @@ class Panel:
         """
         controls = self._idle.copy()
         controls[PULL] = self._asked(y_t)
-        controls[WISH] = self._wishes()
+        controls[REQUEST] = self._requests()
         if self._regions:
             controls[REGIONS] = [self._value(name) for name in self._regions]
         return controls
@@ -180,15 +180,15 @@ class Panel:
         beyond = np.maximum(np.abs(sticks) - _DEAD_ZONE, 0.0) / (1.0 - _DEAD_ZONE)
         return np.sign(sticks) * beyond * self._force_limit
 
-    def _wishes(self) -> np.ndarray:
-        wishes = self._idle[WISH].copy()
+    def _requests(self) -> np.ndarray:
+        requests = self._idle[REQUEST].copy()
         for parameter in self._tuned:
-            wishes[parameter.index] = parameter.wish(self._value(parameter.slider.name))
+            requests[parameter.index] = parameter.request(self._value(parameter.slider.name))
         if self._can_be_free and self._value(_GUIDE) < 0.5:
-            _, along = wishes_of(Kind.TANGENTIAL)
-            stiffness, damping = wishes_of(Kind.TRANSVERSAL)
-            wishes[stiffness], wishes[damping] = 0.0, self._damping_along(along)
-        return wishes
+            _, along = requests_of(Kind.TANGENTIAL)
+            stiffness, damping = requests_of(Kind.TRANSVERSAL)
+            requests[stiffness], requests[damping] = 0.0, self._damping_along(along)
+        return requests
 
     def _damping_along(self, index: int) -> float:
         """Return the damping of the tangential coordinates, in which free ones move [N s/m]."""

@@ -98,7 +98,7 @@ def add_compliance(
         wanted: What is wanted of the tool without forces.
         ports: See :func:`force_ports`; ``joint_state``, ``manifold_point``, ``manifold_state`` and
             ``desired_reference`` with derivatives up to :func:`reference_order`; with an operator
-            ``impedance_wish``.
+            ``impedance_request``.
         period: Sampling time [s].
 
     Returns:
@@ -146,7 +146,7 @@ def add_compliance(
     if limits is not None:
         signals["limit_force"] = _add_limits(builder, limits, impedance, ports)
     # where guidance leads along, the impedance is the one given
-    if "impedance_wish" in ports and manifold.name != SpaceManifold.name:
+    if "impedance_request" in ports and manifold.name != SpaceManifold.name:
         signals |= _add_tuner(builder, wanted.tuning, manifold.coordinates, law, impedance, ports)
     elif not law.is_constant:
         signals["damping"] = impedance.GetOutputPort("damping")
@@ -216,7 +216,7 @@ def _add_tuner(
     ]
     block = ImpedanceTuner(tuning, law, coordinates, masses)
     sources = {
-        "wish": ports["impedance_wish"],
+        "request": ports["impedance_request"],
         "manifold_state": ports["manifold_state"],
         "reference": impedance.GetOutputPort("reference"),
         "desired_reference": ports["desired_reference"],

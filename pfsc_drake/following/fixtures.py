@@ -6,7 +6,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.blocks.wiring_blocks import Linear
 from pfsc_drake.control.compliance.impedance_parameters import Profile
-from pfsc_drake.control.compliance.tuned_impedance import WISHES, wishes_of
+from pfsc_drake.control.compliance.tuned_impedance import REQUESTS, requests_of
 from pfsc_drake.control.fixtures.fixture_guidance import FixtureGuidance, LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.lead import FilterLead, Lead, ServoLead
@@ -83,7 +83,7 @@ def add_fixture_guidance(
         robot: The robot as it is believed.
         order: Highest derivative of the reference that is needed.
         ports: ``joint_state`` as measured, and those of :func:`force_ports`; where a person can
-            change them, ``regions_on`` and ``impedance_wish``, see :class:`ImpedanceTuner`.
+            change them, ``regions_on`` and ``impedance_request``, see :class:`ImpedanceTuner`.
         start: Joint coordinates at the start, shape (N,).
 
     Raises:
@@ -105,12 +105,12 @@ def add_fixture_guidance(
     builder.Connect(ready, system.GetInputPort("ready"))
     if "regions_on" in ports:
         builder.Connect(ports["regions_on"], system.GetInputPort("active"))
-    if "impedance_wish" in ports:
-        picked = np.zeros((1, WISHES))
-        _, place = wishes_of(Kind.TANGENTIAL)
+    if "impedance_request" in ports:
+        picked = np.zeros((1, REQUESTS))
+        _, place = requests_of(Kind.TANGENTIAL)
         picked[0, place] = 1.0
         damping = builder.AddNamedSystem("free_damping", BlockSystem(Linear(picked), period))
-        builder.Connect(ports["impedance_wish"], damping.GetInputPort("vector"))
+        builder.Connect(ports["impedance_request"], damping.GetInputPort("vector"))
         builder.Connect(damping.GetOutputPort("product"), system.GetInputPort("damping"))
     return system
 

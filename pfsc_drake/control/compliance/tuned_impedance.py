@@ -14,22 +14,22 @@ from pfsc_drake.control.compliance.impedance import ImpedanceLaw
 from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
 from pfsc_drake.errors import InputError
 
-# a wish that leaves a parameter as it would be without
+# a request that leaves a parameter as it would be without
 AS_GIVEN = -1.0
 KINDS = tuple(Kind)
 # stiffness and damping of each kind
-WISHES = 2 * len(KINDS)
+REQUESTS = 2 * len(KINDS)
 
 
-def wishes_of(kind: Kind) -> tuple[int, int]:
-    """Return where stiffness and damping of a kind stand among the wishes."""
+def requests_of(kind: Kind) -> tuple[int, int]:
+    """Return where stiffness and damping of a kind stand among the requests."""
     first = 2 * KINDS.index(kind)
     return first, first + 1
 
 
 @dataclass
 class TuningParameters:
-    """How parameters follow a wish.
+    """How parameters follow a request.
 
     Attributes:
         ramp: Time constant with which they approach it [s].
@@ -56,7 +56,7 @@ class TuningParameters:
 
 
 class ImpedanceTuner(Block):
-    """Leads mass, damping and stiffness from what they are to what somebody wishes.
+    """Leads mass, damping and stiffness from what they are to what somebody requests.
 
     The motion itself never jumps (:class:`ImpedanceLaw`), but a spring that becomes stiffer by
     dk while it is deflected by e takes ``dk e^2 / 2`` from nowhere, and gives it to
@@ -71,12 +71,12 @@ class ImpedanceTuner(Block):
 
         ``integral of tau e' dt >= (m e'^2 + k e^2) / 2 - (the same at the start) - x_0``.
 
-    Damping may change at any time, and stiffness may fall. Both approach a wish with a time
+    Damping may change at any time, and stiffness may fall. Both approach a request with a time
     constant. Where the stiffness is to be infinite again, a critically damped spring leads back,
     and the coordinate becomes rigid when it is caught within ``caught_within``; from rigid, with
     e = 0, it becomes soft at once.
 
-    Parameters that vary over the manifold by themselves are, unless somebody wishes otherwise, what
+    Parameters that vary over the manifold by themselves are, unless somebody asks otherwise, what
     they are, unpaid: whoever wrote them down answers for them.
 
     The impedance follows at once from state and inputs, so that the deflection at which a spring
@@ -84,7 +84,7 @@ class ImpedanceTuner(Block):
     there is no algebraic loop. A motion that is not finite changes nothing.
 
     Ports:
-        wish (input): Stiffness and damping, tangential, transversal and rotational, shape (6,);
+        request (input): Stiffness and damping, tangential, transversal and rotational, shape (6,);
             what is negative stays as given.
         manifold_state (input): Derivatives of yhat by rows, where parameters depend on it.
         reference (input): Derivatives of y_p by rows, from :class:`ImpedanceFilter`.
@@ -97,7 +97,7 @@ class ImpedanceTuner(Block):
 
     Args:
         parameters: See :class:`TuningParameters`.
-        law: Of the filter, whose impedance is the one without wishes.
+        law: Of the filter, whose impedance is the one without requests.
         coordinates: The m coordinates of the virtual output.
         masses: Of coordinates that are rigid as given, for the time that they are not, (m,).
     """
@@ -111,12 +111,12 @@ class ImpedanceTuner(Block):
     ) -> None:
         self._parameters, self._law, self._masses = parameters, law, ca.DM(masses)
         self._returning = ca.DM(_returning(parameters, coordinates))
-        places = zip(*(wishes_of(coordinate.kind) for coordinate in coordinates), strict=True)
+        places = zip(*(requests_of(coordinate.kind) for coordinate in coordinates), strict=True)
         self._stiffnesses, self._dampings = (list(place) for place in places)
         m, r = law.num_outputs, law.relative_degree
         motion = "m, rad, per s, .."
         self.inputs = {
-            "wish": Port(WISHES, "N/m, N s/m, Nm/rad, Nm s/rad"),
+            "request": Port(REQUESTS, "N/m, N s/m, Nm/rad, Nm s/rad"),
             "manifold_state": Port(r * m, motion),
             "reference": Port((r + 1) * m, motion),
             "desired_reference": Port((law.desired_order + 1) * m, motion),
@@ -134,7 +134,7 @@ class ImpedanceTuner(Block):
         m = self._law.num_outputs
         error = u.reference[: 2 * m] - u.desired_reference[: 2 * m]
         known, (e, rate) = all_finite(error), ca.vertsplit(error, m)
-        impedance, left = self._granted(x, self._given(u), u.wish, e, rate)
+        impedance, left = self._granted(x, self._given(u), u.request, e, rate)
         return {
             "impedance": where(known, impedance, x.impedance),
             "tank": x.tank,
@@ -147,48 +147,48 @@ class ImpedanceTuner(Block):
         return {"impedance": y.impedance, "rate": y.rate, "tank": y.left}
 
     def _given(self, u: Values) -> Any:
-        """Return the impedance without wishes, shape (3 m,)."""
+        """Return the impedance without requests, shape (3 m,)."""
         return self._law.impedance(u.manifold_state[: self._law.num_outputs])
 
-    def _granted(self, x: Values, given: Any, wish: Any, e: Any, rate: Any) -> tuple[Any, Any]:
+    def _granted(self, x: Values, given: Any, request: Any, e: Any, rate: Any) -> tuple[Any, Any]:
         """Return the impedance from now on, shape (3 m,), and what is left in the tank.
 
         Args:
             x: States.
-            given: The impedance without wishes, shape (3 m,).
-            wish: See the port.
+            given: The impedance without requests, shape (3 m,).
+            request: See the port.
             e: ``y_p - y_d``, shape (m,).
             rate: ``e'``, shape (m,).
         """
         parameters, T = self._parameters, self._law.period
         _, last_damping, last_stiffness = ca.vertsplit(x.impedance, e.numel())
         given_mass, given_damping, given_stiffness = ca.vertsplit(given, e.numel())
-        asked_stiffness, asked_damping = wish[self._stiffnesses], wish[self._dampings]
-        wished_stiffness = where(asked_stiffness < 0.0, given_stiffness, asked_stiffness)
-        wished_damping = where(asked_damping < 0.0, given_damping, asked_damping)
+        asked_stiffness, asked_damping = request[self._stiffnesses], request[self._dampings]
+        requested_stiffness = where(asked_stiffness < 0.0, given_stiffness, asked_stiffness)
+        requested_damping = where(asked_damping < 0.0, given_damping, asked_damping)
         mass = where(given_stiffness < ca.inf, given_mass, self._masses)
 
-        was_soft, shall_be_soft = last_stiffness < ca.inf, wished_stiffness < ca.inf
+        was_soft, shall_be_soft = last_stiffness < ca.inf, requested_stiffness < ca.inf
         share = -math.expm1(-T / parameters.ramp) if parameters.ramp > 0.0 else 1.0
         spent = last_damping * ca.fmin(rate**2, x.rate**2)
         filled = x.tank + T * ca.sum1(where(was_soft, spent, 0.0))
         tank = ca.fmin(filled, parameters.capacity)
 
-        aim = where(shall_be_soft, wished_stiffness, self._returning)
+        aim = where(shall_be_soft, requested_stiffness, self._returning)
         change = where(was_soft, share * (aim - last_stiffness), 0.0)
         cost = ca.sum1(ca.fmax(change, 0.0) * e**2) / 2.0
         paid = where(cost > tank, tank / cost, 1.0)
         granted = last_stiffness + where(change > 0.0, paid * change, change)
         # what was rigid is not deflected
-        stiffness = where(was_soft, granted, wished_stiffness)
+        stiffness = where(was_soft, granted, requested_stiffness)
         near = ca.fabs(e) < parameters.caught_within
         near = ca.logic_and(near, ca.fabs(rate) < parameters.caught_below)
         stiffness = where(ca.logic_and(ca.logic_not(shall_be_soft), near), ca.inf, stiffness)
 
         led_back = ca.logic_and(ca.logic_not(shall_be_soft), stiffness < ca.inf)
         critical = 2.0 * ca.sqrt(where(led_back, stiffness, 0.0) * mass)
-        approached = last_damping + share * (wished_damping - last_damping)
-        damping = where(was_soft, approached, wished_damping)
+        approached = last_damping + share * (requested_damping - last_damping)
+        damping = where(was_soft, approached, requested_damping)
         damping = where(led_back, ca.fmax(damping, critical), damping)
         if not self._law.is_constant:
             stiffness = where(asked_stiffness < 0.0, given_stiffness, stiffness)

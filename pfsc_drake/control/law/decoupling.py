@@ -37,16 +37,16 @@ class Spare(NamedTuple):
     """What joints beyond the number of outputs are to do.
 
     Attributes:
-        wish: Highest joint derivative that is wanted, shape (N,).
+        desired: Highest joint derivative that is wanted, shape (N,).
         scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which
-            deviations from the wish are judged, see :func:`scale_of`; None for the identity.
+            deviations from it are judged, see :func:`scale_of`; None for the identity.
         slope: Of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
             none.
         rate: ``h q^(r)`` that this coordinate is to have.
         restraint: By what all of this is held back; None for nothing.
     """
 
-    wish: ca.SX
+    desired: ca.SX
     scale: ca.SX | None = None
     slope: ca.SX | None = None
     rate: ca.SX | float = 0.0
@@ -79,7 +79,7 @@ class DecouplingInverse:
     """Solves ``A q^(r) = v - b`` and judges the conditioning of A, shape (m, N) with N >= m.
 
     With as many joints as outputs that is one linear system. With more, it is the solution
-    that deviates least from a wish w, weighted by W::
+    that deviates least from a desired value w, weighted by W::
 
         x = w + W^-1 A' (A W^-1 A')^-1 (rhs - A w)
 
@@ -129,7 +129,7 @@ class DecouplingInverse:
         return DecouplingSolution(x, rcond, rcond >= self.min_rcond, ca.SX(*rhs.shape))
 
     def _solve_next_to(self, A: ca.SX, rhs: ca.SX, spare: Spare) -> DecouplingSolution:
-        """Solve a system with a wish, or with damping."""
+        """Solve a system with a desired solution, or with damping."""
         B = A if spare.scale is None else A @ spare.scale
         sides = _sides(A, rhs, spare)
         Q, R = householder(B.T)
@@ -191,15 +191,15 @@ def _rcond(B: ca.SX, R: ca.SX) -> ca.SX:
 
 
 def _next_to(Q: ca.SX, y: ca.SX, spare: Spare) -> ca.SX:
-    """Return ``wish + S y``, with the rate of the spare coordinate where it can move alone.
+    """Return ``desired + S y``, with the rate of the spare coordinate where it can move alone.
 
     Args:
         Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
-        y: What the outputs ask for beyond the wish, shape (N,).
-        spare: The wish.
+        y: What the outputs ask for beyond the desired value, shape (N,).
+        spare: What is desired of the spare motion.
     """
     scale = ca.SX.eye(Q.shape[0]) if spare.scale is None else spare.scale
-    x = spare.wish + scale @ y
+    x = spare.desired + scale @ y
     if spare.slope is None:
         return x
     whole = scale.T @ spare.slope
@@ -211,8 +211,8 @@ def _next_to(Q: ca.SX, y: ca.SX, spare: Spare) -> ca.SX:
 
 
 def _sides(A: ca.SX, rhs: ca.SX, spare: Spare) -> ca.SX:
-    """Return what is left to the outputs beside the wish, the rest and nothing, as columns."""
-    sides, restraint = [rhs - A @ spare.wish], spare.restraint
+    """Return what is left to the outputs beside desired motion, rest and nothing, as columns."""
+    sides, restraint = [rhs - A @ spare.desired], spare.restraint
     if restraint is not None:
         sides.append(rhs - A @ restraint.rest)
         if restraint.velocity is not None:

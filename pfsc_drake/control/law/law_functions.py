@@ -158,22 +158,22 @@ def spare_of(posture: Posture, robot: RobotModel, aim: Aim, reference: ca.SX) ->
         reference: Derivatives 0..r of the posture reference by rows, shape ((r + 1) N,).
     """
     n, restraint = robot.dimension, None
-    wishes = posture_expressions(
+    terms = posture_expressions(
         posture, robot, ca.horzsplit(aim.motion), ca.vertsplit(reference, n)
     )
     if posture.speeds is not None:
         velocity = aim.motion[:, 1] if aim.motion.shape[1] > 1 else None
         to_ends = posture.to_ends(aim.motion[:, 0])
-        restraint = Restraint(wishes.rest, velocity, posture.settling, posture.speeds, to_ends)
+        restraint = Restraint(terms.rest, velocity, posture.settling, posture.speeds, to_ends)
     scale = posture.scale
-    scale = scale_of(wishes.weight) if wishes.weight.numel() else scale
-    if not wishes.slope.numel():
-        return Spare(wishes.wish, scale, restraint=restraint)
-    return Spare(wishes.wish, scale, wishes.slope, wishes.rate, restraint)
+    scale = scale_of(terms.weight) if terms.weight.numel() else scale
+    if not terms.slope.numel():
+        return Spare(terms.desired, scale, restraint=restraint)
+    return Spare(terms.desired, scale, terms.slope, terms.rate, restraint)
 
 
 def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spare:
-    """Return the wish that joints come to rest wherever they are.
+    """Return the desired motion by which joints come to rest wherever they are.
 
     With the gains of the first coordinate but the one of its position; what is left of an error
     dynamics with real poles is stable.
@@ -182,10 +182,10 @@ def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spa
         stabilization: Gains of the virtual output.
         motion: Derivatives 0..r-1 of the joint coordinates, each (N,).
     """
-    wish = ca.SX(motion[0].numel(), 1)
+    desired = ca.SX(motion[0].numel(), 1)
     for gains, derivative in zip(stabilization.proportional[1:], motion[1:], strict=True):
-        wish -= gains[0] * derivative
-    return Spare(wish)
+        desired -= gains[0] * derivative
+    return Spare(desired)
 
 
 def left_to_outputs(drives: Drives, limits: np.ndarray, solution: DecouplingSolution) -> ca.SX:

@@ -115,7 +115,7 @@ class LoopAtRest:
         return A, gain
 
     def _solve(self, A: np.ndarray, gain: np.ndarray, posture: Posture, q: np.ndarray) -> None:
-        """Find how the drives answer to outputs, wishes and the coordinate of a posture."""
+        """Find how the drives answer to outputs, desired values and the coordinate of a posture."""
         n, m, inverse = self._n, len(A), DecouplingInverse(_SINGULAR)
         symbol, rest = ca.SX.sym("q", n), [ca.SX(n, 1)] * (self._motion.shape[1])
         expressions = posture_expressions(
@@ -125,21 +125,23 @@ class LoopAtRest:
         weight, slope = (ca.SX(x) for x in values)
         scale = scale_of(weight) if weight.numel() else posture.scale
         self._slope = np.array(values[1]).ravel() if slope.numel() else None
-        rhs, wish, rate = ca.SX.sym("rhs", m), ca.SX.sym("wish", n), ca.SX.sym("rate")
-        spare = Spare(wish, scale, slope if slope.numel() else None, rate)
+        rhs, desired, rate = ca.SX.sym("rhs", m), ca.SX.sym("desired", n), ca.SX.sym("rate")
+        spare = Spare(desired, scale, slope if slope.numel() else None, rate)
         answer = ca.SX(gain) @ inverse.solve(ca.SX(A), rhs, spare).x
         # it is linear in all of them
-        slopes = [ca.evalf(ca.jacobian(answer, x)) for x in (rhs, wish, rate)]
-        self._per_output, self._per_wish, per_rate = (np.array(slope) for slope in slopes)
+        slopes = [ca.evalf(ca.jacobian(answer, x)) for x in (rhs, desired, rate)]
+        self._per_output, self._per_desired, per_rate = (np.array(slope) for slope in slopes)
         self._per_rate = per_rate.ravel()
 
     def _posture_answer(self, gains: Stabilization) -> np.ndarray:
         """Return the slopes of the drives that the posture adds, shape (N, 4N)."""
-        wish = -np.einsum("km,ikm->mi", gains.proportional, self._motion)
-        answer = self._per_wish @ wish
+        desired = -np.einsum("km,ikm->mi", gains.proportional, self._motion)
+        answer = self._per_desired @ desired
         # the rate of the coordinate follows from the same gains
         return (
-            answer if self._slope is None else answer + np.outer(self._per_rate, self._slope @ wish)
+            answer
+            if self._slope is None
+            else answer + np.outer(self._per_rate, self._slope @ desired)
         )
 
     def closed(self, gains: LoopGains, mass: float = 1.0, stiffness: float = 1.0) -> np.ndarray:

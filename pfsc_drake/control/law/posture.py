@@ -30,7 +30,7 @@ _TO_END = 0.1
 class Posture:
     """How N joints keep next to a posture reference ``q_0(t)`` as far as the outputs let them.
 
-    The wish for the highest joint derivative is that of linear error dynamics::
+    The desired highest joint derivative is that of linear error dynamics::
 
         w = q_0^(r) - sum_k a_{k+1} (q - q_0)^(k)
 
@@ -98,7 +98,7 @@ class PostureExpressions(NamedTuple):
     """What a posture asks for, as expressions.
 
     Attributes:
-        wish: ``w``, shape (N, 1).
+        desired: Highest joint derivative ``w``, shape (N, 1).
         rest: What it would be without any place to go, ``-sum_k a_{k+1} q^(k)`` from k = 1 on, by
             which joints come to rest, shape (N, 1).
         weight: ``W``, shape (N, N), if it varies, else empty.
@@ -106,7 +106,7 @@ class PostureExpressions(NamedTuple):
         rate: ``dc/dq q^(r)`` that the coordinate is to have, shape (1, 1), or empty.
     """
 
-    wish: ca.SX
+    desired: ca.SX
     rest: ca.SX
     weight: ca.SX
     slope: ca.SX
@@ -125,7 +125,7 @@ def posture_expressions(
         reference: Those of the posture reference, orders 0..r, each (N, 1).
     """
     empty, stabilization = ca.SX(0, 1), posture.stabilization
-    wish = stabilization.virtual_input(motion, reference, ca.SX(robot.dimension, 1))
+    desired = stabilization.virtual_input(motion, reference, ca.SX(robot.dimension, 1))
     rest = ca.SX(robot.dimension, 1)
     for gains, derivative in zip(stabilization.proportional[1:], motion[1:], strict=True):
         rest -= ca.SX(gains) * derivative
@@ -133,7 +133,7 @@ def posture_expressions(
     if posture.weight is None:
         weight = robot.mass_matrix(motion[0]) + ca.diag(robot.D_M)
     if posture.coordinate is None:
-        return PostureExpressions(wish, rest, weight, empty, empty)
+        return PostureExpressions(desired, rest, weight, empty, empty)
     actual = posture.coordinate(joint_jets([*motion, ca.SX(robot.dimension, 1)]))
     wanted = posture.coordinate(joint_jets(reference))
     q = ca.SX.sym("q", robot.dimension)
@@ -147,7 +147,7 @@ def posture_expressions(
         if k == 0:  # the shorter way round
             error = ca.atan2(ca.sin(error), ca.cos(error))
         rate = rate - gains[0] * error
-    return PostureExpressions(wish, rest, weight, ca.densify(slope), rate)
+    return PostureExpressions(desired, rest, weight, ca.densify(slope), rate)
 
 
 def range_weight(robot: RobotModel) -> np.ndarray:

@@ -43,7 +43,7 @@ class CourseFinder:
     At every instant, order by order: with ``yhat^(k) = A q^(k) + b_k``, where ``b_k`` depends on
     lower orders only, ``q^(k)`` is corrected by the inverse of A until ``yhat^(k)`` is the
     reference's, for k = 0 .. r. What joints beyond the number of outputs do is what the law
-    would let them do: their r-th derivative is the one next to the posture's wish, and what is
+    would let them do: their r-th derivative is next to what the posture desires, and what is
     integrated of it is corrected as little as the outputs allow.
 
     Args:
@@ -190,12 +190,12 @@ def _correction_function(
     ]
     still = led = None
     if posture is not None:
-        wishes = posture_expressions(posture, robot, q[:-1], ca.vertsplit(reference, n))
+        terms = posture_expressions(posture, robot, q[:-1], ca.vertsplit(reference, n))
         still = Spare(ca.SX(n, 1), posture.scale)
-        scale = scale_of(wishes.weight) if wishes.weight.numel() else posture.scale
-        led = Spare(wishes.wish, scale)
-        if wishes.slope.numel():
-            led = led._replace(slope=wishes.slope, rate=wishes.rate)
+        scale = scale_of(terms.weight) if terms.weight.numel() else posture.scale
+        led = Spare(terms.desired, scale)
+        if terms.slope.numel():
+            led = led._replace(slope=terms.slope, rate=terms.rate)
     steps = [inverse.solve(A, rhs, still) for rhs in missing]
     last = inverse.solve(A, missing[-1], led)
     results = {

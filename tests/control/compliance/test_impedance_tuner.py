@@ -51,11 +51,11 @@ def station():
 def test_stiffness_changes_at_depth_without_a_jump_and_to_what_was_asked(station):
     simulator, tuner, log = station
     root = simulator.get_mutable_context()
-    wish = tuner.GetInputPort("wish")
+    request = tuner.GetInputPort("request")
     context = tuner.GetMyMutableContextFromRoot(root)
-    wish.FixValue(context, np.full(6, -1.0))
+    request.FixValue(context, np.full(6, -1.0))
     simulator.AdvanceTo(1.5)
-    wish.FixValue(context, [-1.0, -1.0, 3000.0, -1.0, -1.0, -1.0])
+    request.FixValue(context, [-1.0, -1.0, 3000.0, -1.0, -1.0, -1.0])
     simulator.AdvanceTo(6.0)
     motion = log.FindLog(root).data()
     xi, rate = motion[1], motion[4]
@@ -71,7 +71,7 @@ def test_along_a_rigid_coordinate_nothing_changes(station):
     simulator, tuner, log = station
     root = simulator.get_mutable_context()
     context = tuner.GetMyMutableContextFromRoot(root)
-    tuner.GetInputPort("wish").FixValue(context, np.full(6, -1.0))
+    tuner.GetInputPort("request").FixValue(context, np.full(6, -1.0))
     simulator.AdvanceTo(0.2)
     assert not log.FindLog(root).data()[0].any()
     impedance = tuner.GetOutputPort("impedance").Eval(context).reshape(3, 3)

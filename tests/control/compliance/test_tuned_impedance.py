@@ -24,7 +24,7 @@ from tests.control.compliance.impedance_on_numbers import ImpedanceOnNumbers
 PERIOD = 1e-3
 COORDINATES = PathManifold(2, oriented=False).coordinates
 NOTHING = np.full(6, AS_GIVEN)
-WISH = {"along": slice(0, 2), "across": slice(2, 4)}
+REQUEST = {"along": slice(0, 2), "across": slice(2, 4)}
 
 
 def impedance(mass, damping, stiffness):
@@ -47,7 +47,7 @@ class Bench:
         )
         self.impedance = self.given
         self.state, self.work = self.law.start(np.zeros((2, 3))), 0.0
-        self.wish = NOTHING.copy()
+        self.request = NOTHING.copy()
 
     def tick(self, force=(0.0, 0.0, 0.0)):
         """Go on by a tick, and count the work of the hand."""
@@ -59,9 +59,9 @@ class Bench:
         self.work += float(np.dot(force, self.state[0] - before))
 
     def tune(self, error, y=(0.0, 0.0, 0.0)):
-        """Let the wish be followed for a tick."""
+        """Let the request be followed for a tick."""
         self.impedance = self.tuner.step(
-            wish=self.wish,
+            request=self.request,
             manifold_state=[*y, 0.0, 0.0, 0.0],
             reference=[*np.ravel(error), 0.0, 0.0, 0.0],
             desired_reference=np.zeros(9),
@@ -86,9 +86,9 @@ class Bench:
 def pump(bench, cycles):
     """Pull out while it is soft, stiffen at depth, be pulled back while it is stiff."""
     for _ in range(cycles):
-        bench.wish[WISH["across"]] = [0.0, 1.0]
+        bench.request[REQUEST["across"]] = [0.0, 1.0]
         bench.hold_at(0.03, 400)
-        bench.wish[WISH["across"]] = [5000.0, 1.0]
+        bench.request[REQUEST["across"]] = [5000.0, 1.0]
         bench.hold_at(0.03, 400)
         bench.hold_at(0.0, 400)
 
@@ -107,12 +107,12 @@ def test_without_the_tank_somebody_could():
 
 
 def test_any_motion_is_passive():
-    """Random pulls and wishes, seeded; at every instant."""
+    """Random pulls and requests, seeded; at every instant."""
     random = np.random.default_rng(7)
     for _ in range(5):
         bench = Bench(reserve=0.02)
         for _ in range(40):
-            bench.wish[:4] = random.uniform(0.0, [2000.0, 100.0, 6000.0, 100.0])
+            bench.request[:4] = random.uniform(0.0, [2000.0, 100.0, 6000.0, 100.0])
             force = random.normal(0.0, 20.0, 3)
             for _ in range(int(random.integers(10, 80))):
                 bench.tick(force)
@@ -122,7 +122,7 @@ def test_any_motion_is_passive():
 
 def test_on_the_manifold_a_wish_is_followed_with_its_time_constant():
     bench = Bench(ramp=0.1, reserve=0.0)
-    bench.wish[WISH["across"]] = [5000.0, 150.0]
+    bench.request[REQUEST["across"]] = [5000.0, 150.0]
     for _ in range(200):
         bench.tick()
     left = math.exp(-200 * PERIOD / 0.1)
@@ -133,10 +133,10 @@ def test_on_the_manifold_a_wish_is_followed_with_its_time_constant():
 
 def test_at_depth_stiffness_waits_for_what_dampers_dissipate():
     bench = Bench(reserve=0.05)
-    bench.wish[WISH["across"]] = [0.0, 30.0]
+    bench.request[REQUEST["across"]] = [0.0, 30.0]
     bench.hold_at(0.05, 1000)
     full = bench.tank
-    bench.wish[WISH["across"]] = [5000.0, 30.0]
+    bench.request[REQUEST["across"]] = [5000.0, 30.0]
     bench.hold_at(0.05, 3000)
     there = bench.state[0, 1]
     paid = 0.5 * bench.impedance[STIFFNESS, 1] * there**2
@@ -149,7 +149,7 @@ def test_at_depth_stiffness_waits_for_what_dampers_dissipate():
 def test_stiffness_falls_at_any_depth():
     bench = Bench(ramp=0.05)
     bench.hold_at(0.04, 500)
-    bench.wish[WISH["across"]] = [0.0, 30.0]
+    bench.request[REQUEST["across"]] = [0.0, 30.0]
     bench.hold_at(0.04, 500)
     assert bench.impedance[STIFFNESS, 1] < 1.0
 
@@ -157,11 +157,11 @@ def test_stiffness_falls_at_any_depth():
 def test_what_is_rigid_becomes_soft_and_rigid_again_without_a_step():
     bench = Bench(HARD)
     assert np.isinf(bench.impedance[STIFFNESS, 1:]).all()
-    bench.wish[WISH["across"]] = [2000.0, 150.0]
+    bench.request[REQUEST["across"]] = [2000.0, 150.0]
     path = []
     for step in range(4000):
         if step == 2000:
-            bench.wish[:] = AS_GIVEN
+            bench.request[:] = AS_GIVEN
         bench.tick((0.0, 20.0 if step < 2000 else 0.0, 0.0))
         path.append(bench.state[0, 1])
     assert path[1999] == pytest.approx(20.0 / 2000.0, rel=1e-3)
@@ -184,7 +184,7 @@ def test_parameters_that_vary_by_themselves_do_so_at_once():
     stiffness = Profile(over="eta", at=[0.0, 1.0], values=[100.0, 600.0])
     across = CoordinateImpedance(Profile(3.0), Profile(90.0), stiffness)
     bench = Bench(ImpedanceParameters(impedance(3.0, 90.0, 0.0), across))
-    bench.wish[1] = 30.0  # damping along
+    bench.request[1] = 30.0  # damping along
     bench.tune(np.zeros((2, 3)))
     assert bench.impedance[STIFFNESS].tolist() == [0.0, 100.0, 100.0]
     error = [[0.0, 0.1, 0.1], [0.0] * 3]
@@ -196,7 +196,7 @@ def test_parameters_that_vary_by_themselves_do_so_at_once():
 
 def test_a_motion_that_is_not_finite_changes_nothing():
     bench = Bench()
-    bench.wish[WISH["across"]] = [3000.0, 90.0]
+    bench.request[REQUEST["across"]] = [3000.0, 90.0]
     bench.hold_at(0.01, 20)
     before, impedance_before = dict(bench.tuner.states), bench.impedance
     bench.tune(np.full((2, 3), np.nan))

@@ -29,13 +29,13 @@ def on_numbers(expression, *arrays):
 def solve(inverse, A, rhs, spare=None):
     """Return the solution of numbers."""
 
-    def expression(A, rhs, wish, scale, slope, rate, rest, velocity):
-        if wish is None:
+    def expression(A, rhs, desired, scale, slope, rate, rest, velocity):
+        if desired is None:
             return inverse.solve(A, rhs)
         held = None
         if rest is not None:
             held = Restraint(rest, velocity, *spare.restraint[2:])
-        return inverse.solve(A, rhs, Spare(wish, scale, slope, rate, held))
+        return inverse.solve(A, rhs, Spare(desired, scale, slope, rate, held))
 
     spare = spare or Spare(None, rate=None)
     restraint = spare.restraint or Restraint(None, None, 0.0, None)
@@ -104,7 +104,7 @@ def test_the_limit_must_lie_between_zero_and_one(min_rcond):
 
 
 def redundant(seed, m=6, n=7):
-    """Return a matrix of more columns than rows, a right-hand side, a wish and a weight's root."""
+    """Return a matrix of more columns than rows, a right side, a desired value, a weight's root."""
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(n, n))
     weight = root @ root.T + np.eye(n)
@@ -115,11 +115,11 @@ def redundant(seed, m=6, n=7):
 @pytest.mark.parametrize("weighted", [False, True])
 def test_the_solution_next_to_a_wish_is_the_weighted_least_squares_one(size, weighted):
     for seed in range(10):
-        A, rhs, wish, W = redundant(seed, *size)
+        A, rhs, desired, W = redundant(seed, *size)
         W_inv = np.linalg.inv(W) if weighted else np.eye(size[1])
         scale = scale_of(W) if weighted else None
-        solution = solve(DecouplingInverse(), A, rhs, Spare(wish, scale))
-        expected = wish + W_inv @ A.T @ np.linalg.solve(A @ W_inv @ A.T, rhs - A @ wish)
+        solution = solve(DecouplingInverse(), A, rhs, Spare(desired, scale))
+        expected = desired + W_inv @ A.T @ np.linalg.solve(A @ W_inv @ A.T, rhs - A @ desired)
         assert np.allclose(solution.x, expected, rtol=1e-10, atol=1e-11)
         # conditioning is that of A, whatever the weight
         frobenius = np.linalg.norm(A) * np.linalg.norm(np.linalg.pinv(A))
@@ -136,10 +136,10 @@ def test_the_root_of_a_weight():
 
 @pytest.mark.parametrize("weighted", [False, True])
 def test_a_spare_coordinate_gets_its_rate_and_the_outputs_theirs(weighted):
-    A, rhs, wish, W = redundant(5, 3, 6)
+    A, rhs, desired, W = redundant(5, 3, 6)
     slope, scale = np.arange(1.0, 7.0), scale_of(W) if weighted else None
-    plain = solve(DecouplingInverse(), A, rhs, Spare(wish, scale)).x
-    x = solve(DecouplingInverse(), A, rhs, Spare(wish, scale, slope, 0.7)).x
+    plain = solve(DecouplingInverse(), A, rhs, Spare(desired, scale)).x
+    x = solve(DecouplingInverse(), A, rhs, Spare(desired, scale, slope, 0.7)).x
     assert np.allclose(A @ x, rhs, atol=1e-12)
     assert slope @ x == pytest.approx(0.7, abs=1e-12)
     # of all that do both it is nearest to the one without
@@ -150,12 +150,12 @@ def test_a_spare_coordinate_gets_its_rate_and_the_outputs_theirs(weighted):
 
 @pytest.mark.parametrize("share", [0.0, 1e-6, 0.01, 0.5])
 def test_a_coordinate_that_the_outputs_fix_is_given_up_smoothly(share):
-    A, rhs, wish, _ = redundant(6)
+    A, rhs, desired, _ = redundant(6)
     free, fixed = np.linalg.svd(A)[2][-1], A[0] / np.linalg.norm(A[0])
     slope = share * free + np.sqrt(1.0 - share**2) * fixed
-    x = solve(DecouplingInverse(), A, rhs, Spare(wish, None, slope, 100.0)).x
+    x = solve(DecouplingInverse(), A, rhs, Spare(desired, None, slope, 100.0)).x
     assert np.allclose(A @ x, rhs, atol=1e-9)
-    plain = solve(DecouplingInverse(), A, rhs, Spare(wish)).x
+    plain = solve(DecouplingInverse(), A, rhs, Spare(desired)).x
     missing = 100.0 - slope @ plain
     gain = share / max(share**2, 1e-2)
     assert np.allclose(x - plain, gain * missing * free, atol=1e-8)
@@ -176,16 +176,16 @@ def test_damping_bounds_the_solution_and_tells_what_is_missed(spare):
     n = 7 if spare else 6
     rng = np.random.default_rng(8)
     u, _, v = np.linalg.svd(rng.normal(size=(6, n)), full_matrices=False)
-    rhs, wish = rng.normal(size=6), Spare(np.zeros(n)) if spare else None
+    rhs, desired = rng.normal(size=6), Spare(np.zeros(n)) if spare else None
     inverse = DecouplingInverse(1e-3, 0.1)
     for smallest in (0.0, 1e-9, 1e-3, 0.02):
         A = u @ np.diag([1.0, 0.9, 0.8, 0.7, 0.6, smallest]) @ v
-        solution = solve(inverse, A, rhs, wish)
+        solution = solve(inverse, A, rhs, desired)
         assert solution.usable
         assert np.allclose(rhs - A @ solution.x, solution.residual, atol=1e-10)
         # lambda is at least 0.05, and x at most |rhs| / (2 lambda)
         assert np.linalg.norm(solution.x) < np.linalg.norm(rhs) / (2.0 * 0.05)
-        undamped = solve(DecouplingInverse(1e-14), A, rhs, wish)
+        undamped = solve(DecouplingInverse(1e-14), A, rhs, desired)
         if smallest == 1e-9:
             assert not np.linalg.norm(undamped.x) < 1e6
 
@@ -205,27 +205,27 @@ def test_damping_is_least_squares_with_a_weight_that_follows_the_matrix(size):
 
 @pytest.mark.parametrize("spare", [True, False])
 def test_damping_sets_in_continuously(spare):
-    n, wish = (7, Spare(np.zeros(7))) if spare else (6, None)
+    n, desired = (7, Spare(np.zeros(7))) if spare else (6, None)
     rng = np.random.default_rng(9)
     A, rhs = rng.normal(size=(6, n)), rng.normal(size=6)
     # one that is looked at for damping and needs none
-    plain = solve(DecouplingInverse(1e-4, 1e-3), A, rhs, wish)
-    just = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 + 1e-9)), A, rhs, wish)
+    plain = solve(DecouplingInverse(1e-4, 1e-3), A, rhs, desired)
+    just = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 + 1e-9)), A, rhs, desired)
     assert just.residual.any()
     assert not plain.residual.any()
     assert np.allclose(just.x, plain.x, rtol=1e-5)
-    above = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 - 1e-9)), A, rhs, wish)
+    above = solve(DecouplingInverse(1e-4, plain.rcond * (1.0 - 1e-9)), A, rhs, desired)
     assert np.array_equal(above.x, plain.x)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 @pytest.mark.parametrize("damped_below", [0.0, 0.1])
 def test_what_is_not_finite_is_refused_with_joints_to_spare(bad, damped_below):
-    A, rhs, wish, _ = redundant(10)
+    A, rhs, desired, _ = redundant(10)
     inverse = DecouplingInverse(1e-3, damped_below)
     A[2, 3] = bad
-    assert not solve(inverse, A, rhs, Spare(wish)).usable
-    assert not solve(DecouplingInverse(1e-3), np.zeros((6, 7)), rhs, Spare(wish)).usable
+    assert not solve(inverse, A, rhs, Spare(desired)).usable
+    assert not solve(DecouplingInverse(1e-3), np.zeros((6, 7)), rhs, Spare(desired)).usable
 
 
 @pytest.mark.parametrize("damped_below", [1e-3, 1.0, -0.1, np.nan])
@@ -246,10 +246,10 @@ def held_back(
 ):
     """Return matrix, right-hand side, velocity, spare motion, and the solution."""
     rng = np.random.default_rng(seed)
-    A, rhs, wish = rng.normal(size=(4, 7)), rng.normal(size=4), 50.0 * rng.normal(size=7)
+    A, rhs, desired = rng.normal(size=(4, 7)), rng.normal(size=4), 50.0 * rng.normal(size=7)
     v = rng.normal(size=7) if velocity else None
     restraint = Restraint(-5.0 * v if velocity else np.zeros(7), v, settling, speeds, to_ends)
-    spare = Spare(wish, scale, slope, 30.0, restraint)
+    spare = Spare(desired, scale, slope, 30.0, restraint)
     return A, rhs, v, spare, solve(DecouplingInverse(damped_below=damped_below), A, rhs, spare)
 
 
@@ -275,7 +275,7 @@ def test_joints_become_as_fast_as_they_may_and_outputs_stay(velocity, scale):
     taken = np.abs(right @ (A @ v) if velocity else rest)
     reached = (taken + np.abs(solution.x - rest) / settling) / speeds
     assert reached.max() == pytest.approx(1.0)
-    far = spare.wish + right @ (rhs - A @ spare.wish) - rest
+    far = spare.desired + right @ (rhs - A @ spare.desired) - rest
     assert np.abs(np.cross((solution.x - rest)[:3], far[:3])).max() < 1e-9  # the same way
     assert (taken + np.abs(far) / settling).max() > 2.0 * speeds[0]
 

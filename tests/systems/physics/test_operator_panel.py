@@ -6,7 +6,7 @@ from pydrake.systems.analysis import Simulator
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel
 
 PERIOD = 1e-3
-PARTS = {"pull": np.zeros(2), "wish": np.array([-1.0])}
+PARTS = {"pull": np.zeros(2), "request": np.array([-1.0])}
 
 
 def test_controls_count_from_the_next_tick_on():
