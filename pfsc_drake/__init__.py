@@ -30,7 +30,7 @@ __version__ = "0.1.0"
 _DOOR = {
     "ComplianceParameters": "pfsc_drake.following.options.compliance",
     "ControllerParameters": "pfsc_drake.following.options.controller",
-    "CoordinateImpedance": "pfsc_drake.control.compliance.impedance",
+    "CoordinateImpedance": "pfsc_drake.control.compliance.impedance_parameters",
     "FaultParameters": "pfsc_drake.following.options.follower",
     "Fixture": "pfsc_drake.control.fixtures.parameters",
     "Follower": "pfsc_drake.following.follower",
@@ -40,7 +40,7 @@ _DOOR = {
     "HalfSpace": "pfsc_drake.geometry.regions.shapes",
     "LawGains": "pfsc_drake.following.options.controller",
     "Path": "pfsc_drake.geometry",
-    "Profile": "pfsc_drake.control.compliance.impedance",
+    "Profile": "pfsc_drake.control.compliance.impedance_parameters",
     "SphereRegion": "pfsc_drake.geometry.regions.shapes",
     "StreamLimits": "pfsc_drake.control.law.timed_reference",
     "WaypointTable": "pfsc_drake.geometry",
