@@ -30,10 +30,10 @@ from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
 from identification.output import make_folder
-from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.models.files import models_directory
+from reporting.processes import side_by_side
 
 EXCITATION, RUN, RECORDING = "excitation.yaml", "excitation.csv", "excitation.html"
 _RATE = 1000.0  # Hz, of the motion for a robot's controller

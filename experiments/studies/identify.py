@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
-from experiments.studies.side_by_side import run_side_by_side
+from experiments.sweep.many import run_side_by_side
 from experiments.sweep.rows import COMPLETED, RunRow
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate

@@ -8,8 +8,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure as Canvas
 
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
-from experiments.studies.side_by_side import run_side_by_side
 from experiments.studies.study_page import write_study_page
+from experiments.sweep.many import run_side_by_side
 from experiments.sweep.rows import COMPLETED, RunRow
 from reporting.folder import open_results
 from reporting.metrics import Metrics

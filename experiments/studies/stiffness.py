@@ -12,8 +12,8 @@ from matplotlib.figure import Figure as Canvas
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, read_scenario
-from experiments.studies.side_by_side import run_side_by_side
 from experiments.studies.study_page import write_study_page
+from experiments.sweep.many import run_side_by_side
 from experiments.sweep.rows import COMPLETED, RunRow
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf

@@ -1,29 +1,48 @@
 """Many runs on many processes."""
 
 import contextlib
+import importlib.util
+import logging
 import math
 import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from experiments.sweep.cluster import count_cores, open_cluster
+from experiments.catalog.scenario_file import ScenarioFile
 from experiments.sweep.rows import DIED, FAILED, RunRow
-from experiments.sweep.worker import RunTask, run_task
-from pfsc_drake.errors import shortened
+from experiments.sweep.worker import RunTask, program_revision, run_task
+from pfsc_drake.errors import InputError, shortened
+from reporting import processes
+from reporting.interruption import noticed_interruption
+from reporting.processes import local_cluster
 from reporting.terminal import one_line
 
 if TYPE_CHECKING:
     from distributed import Client, Future
+
+Key = TypeVar("Key", bound=Hashable)
 
 _LOOK = 0.2  # s, how often Ctrl-C is noticed
 _ASK = 1.0  # s, how often new workers are; asking takes time from those of this machine
 # of a process [bytes], from which on it is replaced: every diagram leaves some megabytes behind
 _MOST_MEMORY = 1.5e9
 _RESTART_SECONDS = 120
+_CONNECT_SECONDS = 10
+
+_SETTINGS = {
+    # a run whose process died is a row; trying it again would take the next process too
+    "distributed.scheduler.allowed-failures": 0,
+    # what takes all memory dies, nothing is paused or put on disk before
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+}
 
 
 def run_many(
@@ -53,9 +72,100 @@ def run_many(
     """
     if not tasks:
         return None
-    processes = min(workers or count_cores(), len(tasks))
-    with open_cluster(scheduler, processes) as client:
+    with open_cluster(scheduler, min(workers or count_cores(), len(tasks))) as client:
         return _Dispatcher(client, tasks, take, idle).run(interrupted)
+
+
+def run_side_by_side(
+    scenarios: Mapping[Key, ScenarioFile], take: Callable[[Key, RunRow], None]
+) -> dict[Key, RunRow]:
+    """Run scenarios on all cores, and return what came of each in their order.
+
+    Args:
+        scenarios: By any name.
+        take: Told name and outcome of each run, in the order in which they end.
+
+    Raises:
+        KeyboardInterrupt: At Ctrl-C.
+    """
+    keys, rows = list(scenarios), dict[Key, RunRow]()
+
+    def keep(number: int, row: RunRow) -> None:
+        rows[keys[number]] = row
+        take(keys[number], row)
+
+    tasks = {number: RunTask.of(scenarios[key]) for number, key in enumerate(keys)}
+    with noticed_interruption() as interrupted:
+        run_many(tasks, keep, interrupted=interrupted)
+        if interrupted():
+            raise KeyboardInterrupt
+    return {key: rows[key] for key in keys}
+
+
+def count_cores() -> int:
+    """Return the number of cores that this process may use.
+
+    Raises:
+        InputError: If Dask or what keeps its tables is not installed.
+    """
+    cores = processes.count_cores()
+    if importlib.util.find_spec("pyarrow") is None:
+        raise InputError("pyarrow is not installed; allowed: make setup, or the extra 'sweep'")
+    return cores
+
+
+@contextmanager
+def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
+    """Connects to processes that take runs, until the end of the context.
+
+    Args:
+        address: Of a Dask scheduler, e.g. ``tcp://10.0.0.1:8786``; None for processes of this
+            machine, which listen on its loopback address alone. Scheduler and workers must find
+            the program: ``python -m dask scheduler`` and ``python -m dask worker ADDRESS
+            --nthreads 1`` in a clone of the same revision.
+        workers: Number of processes; of this machine only.
+
+    Raises:
+        InputError: If Dask is not installed, no scheduler answers, or it lacks the program.
+    """
+    count_cores()
+    if address is None:
+        with local_cluster(workers, "experiments.sweep.worker", _SETTINGS) as client:
+            yield client
+        return
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with _connect(address) as client:
+        _check_program(client, address)
+        yield client
+
+
+def _connect(address: str) -> "Client":
+    from distributed import Client
+    from distributed.comm import parse_address, parse_host_port
+
+    try:
+        parse_host_port(parse_address(address)[1])  # a Client that fails at this leaves a mess
+        return Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
+        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
+        raise InputError(
+            f"--scheduler {shortened(address)}: no Dask scheduler answers: {reason}; "
+            "allowed: an address such as tcp://127.0.0.1:8786"
+        ) from None
+
+
+def _check_program(client: "Client", address: str) -> None:
+    """Refuses a scheduler or workers that cannot run the program; who comes later, is not asked."""
+    if not client.nthreads():
+        return
+    try:
+        client.submit(program_revision, pure=False).result()
+    except Exception as error:  # whatever they raise, they cannot
+        reason = shortened(" ".join(str(error).split()) or type(error).__name__, 200)
+        raise InputError(
+            f"--scheduler {shortened(address)}: it has not this program: {reason}; allowed: in a "
+            "clone of this revision python -m dask scheduler, python -m dask worker ADDRESS"
+        ) from None
 
 
 @dataclass(frozen=True)

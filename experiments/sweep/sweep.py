@@ -9,10 +9,9 @@ from rich.console import Console
 
 from diagrams.scenario import Scenario
 from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
-from experiments.sweep.cluster import count_cores
 from experiments.sweep.definition import SweepDefinition, SweepRecord
 from experiments.sweep.figures import draw_sweep
-from experiments.sweep.many import run_many
+from experiments.sweep.many import count_cores, run_many
 from experiments.sweep.progress import SweepProgress
 from experiments.sweep.rows import REFUSED, RunRow
 from experiments.sweep.samples import Sample, draw_samples, parse_variations

@@ -1,7 +1,6 @@
 """What runs in the processes of a sweep."""
 
 import logging
-import signal
 import socket
 import threading
 import time
@@ -15,6 +14,7 @@ from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
 from experiments.catalog.scenario_file import ScenarioFile
 from experiments.sweep.rows import COMPLETED, FAILED, FAULT, REFUSED, RunRow
 from pfsc_drake.errors import InputError, shortened
+from reporting import processes
 from reporting.provenance import git_revision
 from reporting.terminal import one_line, silence_libraries
 
@@ -110,10 +110,8 @@ def program_revision() -> str:
     return git_revision()
 
 
-def dask_setup(_worker: Any) -> None:
+def dask_setup(worker: Any) -> None:
     """Prepares a process on this machine before it takes runs; called by Dask."""
-    # Ctrl-C reaches every process of the terminal; the one that leads ends the others
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    processes.dask_setup(worker)
     silence_libraries()
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     import experiments.run  # noqa: F401  # before the first run rather than in it

@@ -30,9 +30,9 @@ from identification.excitation.verification import (
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
-from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
+from reporting.processes import side_by_side
 
 # what is kept of limits for what solvers leave of them
 _SHARE, _MARGIN = 0.998, 0.002

@@ -13,9 +13,9 @@ from pyarrow import parquet
 from rich.console import Console
 
 from experiments.cli import main
-from experiments.sweep import cluster
-from experiments.sweep.cluster import open_cluster
+from experiments.sweep import many
 from experiments.sweep.definition import RECORD
+from experiments.sweep.many import open_cluster
 from experiments.sweep.summary import MACHINE_METRICS
 from experiments.sweep.sweep import define_sweep, run_sweep
 from reporting.folder import check_folder
@@ -131,7 +131,7 @@ def test_every_run_refused(address, tmp_path, capfd):
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(arguments, reason, tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(cluster, "_CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr(many, "_CONNECT_SECONDS", 0.5)
     status = main(["sweep", "pfc_elastic_3r", *arguments, "--out", str(tmp_path / "out")])
     error = capfd.readouterr().err
     assert status == 2

@@ -16,8 +16,8 @@ from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
-from identification.processes import side_by_side
 from pfsc_drake.errors import InputError
+from reporting.processes import side_by_side
 
 POST = Obstacle(
     name="post", kind="cylinder", start=np.array([0, 1, 0]), end=np.array([0, 1, 1]), radius=0.1

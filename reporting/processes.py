@@ -2,9 +2,10 @@
 
 import logging
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from pfsc_drake.errors import InputError
@@ -59,7 +60,8 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
     if workers == 1:
         yield lambda function, common, tasks: (function(common, task) for task in tasks)
         return
-    with _processes(workers, most) as client:
+    cores = count_cores("one worker")
+    with local_cluster(min(workers or cores, most), __name__) as client:
         from distributed import KilledWorker, as_completed
 
         def run(
@@ -81,33 +83,57 @@ def side_by_side(workers: int | None, most: int) -> Iterator[SideBySide]:
 
 
 @contextmanager
-def _processes(workers: int | None, most: int) -> Iterator["Client"]:
-    try:
-        import dask
-        from dask.system import CPU_COUNT
-        from distributed import Client, LocalCluster
-    except ImportError as error:
-        raise InputError(
-            f"{error.name} is not installed; allowed: make setup, the extra 'sweep', or one worker"
-        ) from None
+def local_cluster(
+    workers: int, preload: str, settings: Mapping[str, Any] = MappingProxyType({})
+) -> Iterator["Client"]:
+    """Give a client of processes of this machine, which listen on its loopback address alone.
+
+    Args:
+        workers: Number of processes.
+        preload: Module that prepares each of them, see :func:`dask_setup`.
+        settings: Further settings of Dask.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with (
         TemporaryDirectory(prefix="pfsc_drake_workers_", ignore_cleanup_errors=True) as folder,
-        dask.config.set(_SETTINGS),
+        dask.config.set({**_SETTINGS, **settings}),
         LocalCluster(
-            n_workers=min(workers or CPU_COUNT, most),
+            n_workers=workers,
             threads_per_worker=1,
             processes=True,
             host=_LOOPBACK,
             dashboard_address=f"{_LOOPBACK}:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=folder,
-            preload=[__name__],
+            preload=[preload],
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+def count_cores(instead: str = "") -> int:
+    """Return the number of cores that this process may use.
+
+    Args:
+        instead: What else is allowed than to install Dask.
+
+    Raises:
+        InputError: If Dask is not installed.
+    """
+    try:
+        import distributed  # noqa: F401
+        from dask.system import CPU_COUNT
+    except ImportError as error:
+        ways = ["make setup", "the extra 'sweep'", *([instead] if instead else [])]
+        raise InputError(
+            f"{error.name} is not installed; allowed: {', '.join(ways[:-1])}, or {ways[-1]}"
+        ) from None
+    return int(CPU_COUNT)
 
 
 def dask_setup(_worker: Any) -> None:
