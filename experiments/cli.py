@@ -20,7 +20,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.catalog.scenario_catalog import expand_home, list_scenarios
 from experiments.outcomes import (
     judge_commands,
     judge_live,
@@ -32,6 +31,7 @@ from experiments.outcomes import (
     print_run,
     print_sweep,
 )
+from experiments.scenario_file import expand_home, list_scenarios
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
 from reporting.commands import FAULT, interruptible, run_app, show_page
@@ -117,8 +117,8 @@ def run_command(
     ] = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.catalog.scenario_file import read_scenario
     from experiments.run import run_scenario
+    from experiments.scenario_file import read_scenario
 
     if scenario in (IDENTIFICATION, TEACH_IN):
         study_command(scenario, out or Path("out") / scenario)
@@ -170,8 +170,8 @@ def live_command(
     ] = True,
 ) -> None:
     """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
-    from experiments.catalog.scenario_file import read_scenario
     from experiments.live.start import run_live
+    from experiments.scenario_file import read_scenario
 
     seconds = None if duration is None else _read_duration(duration)
     with interruptible():
@@ -203,7 +203,7 @@ def compare_command(
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/comparison"),
 ) -> None:
     """Put several runs on one page."""
-    from experiments.pages.compare import write_comparison
+    from experiments.compare import write_comparison
 
     with interruptible():
         report = write_comparison([expand_home(run) for run in runs], expand_home(out))
@@ -290,8 +290,8 @@ def study_command(
     from experiments.studies.identify import write_identification
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
-    from experiments.studies.teach_in import write_teach_in
     from experiments.studies.tracking import write_tracking
+    from experiments.teaching.teach import write_teach_in
 
     studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
         "stiffness": write_study,
@@ -331,7 +331,7 @@ def teach_command(
     ] = True,
 ) -> None:
     """Turn a run in which a hand led the tool into a path, and follow it."""
-    from experiments.teaching.options import TeachingOptions
+    from experiments.teaching.taught import TeachingOptions
     from experiments.teaching.teach import teach
 
     with interruptible():
@@ -368,7 +368,7 @@ def margins_command(
     tool: Annotated[float, typer.Option(help="Error of the tool's mass to be borne [kg].")] = 0.1,
 ) -> None:
     """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
-    from experiments.catalog.scenario_file import read_scenario
+    from experiments.scenario_file import read_scenario
     from experiments.studies.margins.box import Box
     from experiments.studies.margins.page import write_margins
     from experiments.studies.margins.table import case_table, place_table, summary
@@ -403,9 +403,9 @@ def export_command(
     ] = "1",
 ) -> None:
     """Write a scenario's controller as C99."""
-    from experiments.catalog.scenario_file import read_scenario
     from experiments.export import export_scenario
     from experiments.replay import check_export, missing_tool
+    from experiments.scenario_file import read_scenario
 
     seconds = _read_duration(duration)
     with interruptible():

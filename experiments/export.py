@@ -9,8 +9,8 @@ from pydrake.systems.analysis import Simulator
 from diagrams.controller_part import ControllerPart, controller_part
 from diagrams.scenario import SimulationParameters
 from diagrams.station import Station
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.preparation import naming, prepare
+from experiments.scenario_file import ScenarioFile
 from experiments.simulation import configure
 from pfsc_drake.codegen.c_controller import CController
 from pfsc_drake.codegen.project import write_project

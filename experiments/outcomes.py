@@ -173,7 +173,7 @@ def judge_commands(console: Console, commands: "Commands") -> int:
 
 def _metrics_table(metrics: Mapping[str, "Metric"]) -> Table:
     """The metrics with their targets, one line each."""
-    from reporting.units import format_quantity
+    from reporting.metrics import format_quantity
 
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
     table.add_column("Metric", no_wrap=True)

@@ -11,15 +11,22 @@ from diagrams.integration import Integration
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.station import Station
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.integration import choose_integration
-from experiments.length import check_frames, check_length
 from experiments.results.promises import check_targets
+from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.dumping import dump_typed
 from pfsc_drake.yaml.files import resolve_files
 from pfsc_drake.yaml.typed import load_typed
 from reporting.progress import ProgressListener
+
+MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz
+MAX_FRAMES = 50_000  # of a recording; almost half an hour at the default of 32 ms
+# of six elastic axes on one core: wall clock time of a tick with its integration [s]
+_SECONDS_PER_TICK = 2e-4
+# of each logged number: in a container that doubles as it grows, and in the signals made of it
+_COPIES = 4
+_UNITS = (("years", 365.25 * 86400.0), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0))
 
 
 @dataclass(frozen=True)
@@ -116,3 +123,53 @@ def naming(path: Path) -> Iterator[None]:
     except OSError as error:  # of a file that the scenario names
         name = shortened(str(error.filename), 100)
         raise InputError(f"{path}: cannot read {name}: {error.strerror}") from None
+
+
+def check_length(settings: Scenario, station: Station) -> None:
+    """Refuse a run of more than MAX_TICKS sampling intervals of the controller.
+
+    Args:
+        settings: The scenario, with its duration.
+        station: Its station.
+
+    Raises:
+        InputError: One line that says how long the run would take, and how much memory.
+    """
+    period, duration = station.controller.period, settings.duration
+    ticks = duration / period
+    if ticks <= MAX_TICKS:
+        return
+    sizes = (rows.stop - rows.start for rows in station.log.rows.values())
+    memory = 8.0 * sum(sizes) * ticks * _COPIES
+    raise InputError(
+        f"duration = {duration:g} s: {ticks:.3g} sampling intervals, about "
+        f"{_time(ticks * _SECONDS_PER_TICK)} and {memory / 1e9:.3g} GB of memory; "
+        f"allowed: up to {MAX_TICKS * period:g} s (--duration, or duration: in the scenario)"
+    )
+
+
+def check_frames(duration: float, frame_period: float) -> None:
+    """Refuse a recording of more than MAX_FRAMES frames.
+
+    Args:
+        duration: Simulated time [s].
+        frame_period: Time between two frames [s].
+
+    Raises:
+        InputError: One line that says which period would do.
+    """
+    frames = duration / frame_period
+    if frames > MAX_FRAMES:
+        raise InputError(
+            f"simulation.frame_period = {frame_period:g} s: {frames:.3g} frames in "
+            f"{duration:g} s; allowed: up to {MAX_FRAMES} (frame_period from "
+            f"{duration / MAX_FRAMES:.3g} s on, or --no-recording)"
+        )
+
+
+def _time(seconds: float) -> str:
+    """A duration in the largest unit that it fills."""
+    for unit, length in _UNITS:
+        if not seconds < length:
+            return f"{seconds / length:.3g} {unit}"
+    return f"{seconds:.3g} s"

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.preparation import PreparedRun, prepare
+from experiments.scenario_file import ScenarioFile
 from experiments.simulation import simulate
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box

@@ -16,6 +16,8 @@ from reporting.progress import ProgressListener
 
 # progress and faults are looked at this often [s]; between them nothing interrupts the loop
 _CHUNK = 0.05
+_SAMPLES = 1000
+_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
 
 
 @dataclass
@@ -107,10 +109,6 @@ def configure(simulator: Simulator, scheme: str, max_step: float, accuracy: floa
         accuracy=accuracy if error_control else 1e-6,
     )
     ApplySimulatorConfig(configuration, simulator)
-
-
-_SAMPLES = 1000
-_JOINT_STATE = ("q_J", "v_J", "q_M", "v_M")
 
 
 def measure_tick(station: Station, root: Context, log: RunLog) -> np.ndarray:

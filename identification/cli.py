@@ -35,7 +35,7 @@ from identification.options import (
 )
 from identification.output import check_folder
 from reporting.commands import interruptible, run_app, show_page
-from reporting.fraction import fraction_display
+from reporting.progress import fraction_display
 
 if TYPE_CHECKING:
     from identification.model.subject import Subject
@@ -186,7 +186,7 @@ def estimate_command(
     from identification.pages import write_identification
     from identification.report.page import parameter_table, torque_table
     from identification.steps import estimate_files
-    from reporting.tables import print_table
+    from reporting.terminal import print_table
 
     with interruptible():
         _quiet()

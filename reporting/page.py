@@ -10,10 +10,9 @@ from urllib.parse import quote
 
 from reporting.folder import ResultsFolder
 from reporting.manifest import FIGURES
-from reporting.metrics import Metric, Metrics
+from reporting.metrics import NARROW_SPACE, Metric, Metrics, format_quantity
 from reporting.registry import known_metric
 from reporting.style import Figure
-from reporting.units import NARROW_SPACE, format_quantity
 
 TEMPLATE = Path(__file__).resolve().parent / "page_template.html"
 MAX_CARDS = 8

@@ -12,6 +12,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+_NUMBER = re.compile(r"_\d+$")  # of a drive
+_INTRODUCTION = """# Signals, metrics and figures
+
+What a run may leave: signals in `log.h5`, each a dataset `[samples, components]` at 1 kHz with
+attributes `unit` and `labels`; metrics in `metrics.json`, which are there if a run has what they
+need, N being the number of a drive; pictures in `figures/`. Units are SI; where there are two, the
+second is that of joints that slide, and r is the relative degree.
+
+`python -m experiments list --signals` prints the same, with `--json` as data. `make signals` writes
+this page from `reporting/registry.toml`."""
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
 
 @dataclass(frozen=True)
 class KnownSignal:
@@ -96,25 +108,12 @@ class KnownFigure:
     needs: tuple[str, ...] = ()
 
 
-_NUMBER = re.compile(r"_\d+$")  # of a drive
-_INTRODUCTION = """# Signals, metrics and figures
-
-What a run may leave: signals in `log.h5`, each a dataset `[samples, components]` at 1 kHz with
-attributes `unit` and `labels`; metrics in `metrics.json`, which are there if a run has what they
-need, N being the number of a drive; pictures in `figures/`. Units are SI; where there are two, the
-second is that of joints that slide, and r is the relative degree.
-
-`python -m experiments list --signals` prints the same, with `--json` as data. `make signals` writes
-this page from `reporting/registry.toml`."""
-
-
 def _rows(kind: str) -> Iterator[dict[str, Any]]:
     for name, row in _TABLE[kind].items():
         lists = {key: tuple(row[key].split()) for key in ("needs", "figures") if key in row}
         yield {"name": name, **row, **lists}
 
 
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 SIGNALS = {row["name"]: KnownSignal(**row) for row in _rows("signals")}
 METRICS = {row["name"]: KnownMetric(**row) for row in _rows("metrics")}
 FIGURES = {row["name"]: KnownFigure(**row) for row in _rows("figures")}

@@ -17,6 +17,8 @@ from experiments.figures.drives import (
     draw_friction,
     draw_pace,
     draw_velocities,
+    draw_virtual_input,
+    has_virtual_input,
 )
 from experiments.figures.forces import (
     draw_damping,
@@ -47,7 +49,6 @@ from experiments.figures.posture import (
     has_conditioning,
     has_pushes,
 )
-from experiments.figures.virtual_input import draw_virtual_input, has_virtual_input
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.geometry.surfaces.residuals import Residuals
 from reporting.registry import FIGURES

@@ -36,6 +36,9 @@ _SYMBOLS = {
     **{f"f_{axis}": f"$f_{axis}$" for axis in "xyz"},
     **{f"mu_{axis}": rf"$\mu_{axis}$" for axis in "xyz"},
 }
+BAND = 2.0  # N, to either side of the reference
+_SIZE = (7.0, 4.6)  # inches
+_DOT = 7.0  # points^2
 
 
 @dataclass
@@ -191,11 +194,6 @@ def draw_damping(log: RunLog) -> Drawing:
         f"{damping.max():.4g} Ns/m."
     )
     return Drawing("damping", "Damping along the path", caption, canvas)
-
-
-BAND = 2.0  # N, to either side of the reference
-_SIZE = (7.0, 4.6)  # inches
-_DOT = 7.0  # points^2
 
 
 def draw_pressing(log: RunLog) -> Drawing:

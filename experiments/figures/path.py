@@ -13,6 +13,10 @@ from reporting.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing, fitt
 
 ARROW_COUNT = 5
 ELEVATION = 28.0  # degrees, of the viewer
+_SIZE = 5.0  # inches
+_MARGIN = 1.25  # of the picture, beyond the farthest point
+_BINS = 40
+_ROOM = 1.05  # of the largest distance
 
 
 def draw_path(log: RunLog, outline: Sequence[FloatArray]) -> Drawing:
@@ -129,10 +133,6 @@ def _draw_direction(axes: Axes3D, output: FloatArray) -> None:
             )
 
 
-_SIZE = 5.0  # inches
-_MARGIN = 1.25  # of the picture, beyond the farthest point
-
-
 def draw_notch_position(log: RunLog) -> Drawing:
     """Way of the ball's centre in the notch, with the circle in which it touches nothing."""
     signal = log["notch_position"]
@@ -163,10 +163,6 @@ def draw_notch_position(log: RunLog) -> Drawing:
         "shell is pressed.",
         canvas,
     )
-
-
-_BINS = 40
-_ROOM = 1.05  # of the largest distance
 
 
 def draw_surface_fit(fit: Residuals) -> Drawing:

@@ -27,6 +27,8 @@ _REACH = 0.1  # of the range of an axis, below which its distance from a limit m
 _NEAR = 0.5  # of the span that a joint's panel shows, within which a limit is shown, too
 _ROOM = 0.15  # of that span, beyond what has to be seen
 _FORBIDDEN, _BEYOND = "#E5E7EB", "#FECACA"
+MILLI = 1e3
+_WORTH_A_LOOK = 10.0  # times the threshold, below which conditioning is drawn of any arm
 
 
 def draw_positions(log: RunLog) -> Drawing:
@@ -143,10 +145,6 @@ def _limits_within_reach(signal: Signal) -> dict[tuple[int, int], bool]:
             if beyond > -reach:
                 near[axis, side] = beyond > 0.0
     return near
-
-
-MILLI = 1e3
-_WORTH_A_LOOK = 10.0  # times the threshold, below which conditioning is drawn of any arm
 
 
 def has_conditioning(log: RunLog) -> bool:

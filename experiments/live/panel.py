@@ -1,13 +1,18 @@
-"""The controls of a live session: handles, sliders and buttons, keys and a gamepad."""
+"""What a person sees and sets in a live session: controls, and a scene that only draws."""
 
 import enum
-from collections.abc import Sequence
+import secrets
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
+from pydrake.geometry import Meshcat, MeshcatParams
 
+from diagrams.drawing.live_view import LiveFrame, LiveView
 from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.pages import Pages
+from experiments.live.server import HOST
 from pfsc_drake.control.compliance.tuned_impedance import requests_of
 from pfsc_drake.control.manifolds.coordinate import Kind
 
@@ -17,6 +22,8 @@ _FREE_DAMPING = 90.0  # N s/m, where it varies along the manifold: Tab. 4.3
 _AXES = "xyz"
 _KEYS = (("KeyW", "KeyS"), ("KeyA", "KeyD"), ("KeyR", "KeyF"))
 _STRENGTH, _GUIDE, _HOLD = "key force [N]", "guide (K, J)", "hold (T, G)"
+# how often a scene begins anew
+_MOST = 10
 
 
 class Command(enum.Enum):
@@ -194,3 +201,69 @@ class Panel:
         """Return the damping of the tangential coordinates, in which free ones move [N s/m]."""
         sliders = (p.slider for p in self._tuned if p.index == index)
         return next((self._value(slider.name) for slider in sliders), _FREE_DAMPING)
+
+
+class Scene:
+    """Draws a station in Meshcat, for the page to show in a frame.
+
+    Meshcat asks nobody who they are and where they come from, and one message that is none ends it.
+    So nothing that is done in it is listened to; it has an address on this machine that only the
+    page is told, one of 16 million and 28 thousand ports, where the system has so many; and when it
+    was ended all the same, there is a new one elsewhere.
+
+    Attributes:
+        url: Where it is.
+
+    Args:
+        view: Returns what draws a station there, from a first frame on.
+        first: The first frame.
+        tell: Told in words what happens.
+    """
+
+    def __init__(
+        self,
+        view: Callable[[LiveFrame, Meshcat], LiveView],
+        first: LiveFrame,
+        tell: Callable[[str], None],
+    ) -> None:
+        self._make, self._tell, self._losses = view, tell, 0
+        self._begin(first)
+
+    def _begin(self, frame: LiveFrame) -> None:
+        self._meshcat = hidden_meshcat()
+        self.url = str(self._meshcat.web_url())
+        self._view = self._make(frame, self._meshcat)
+
+    def draw(self, frame: LiveFrame, factor: float, *, interrupted: bool = False) -> None:
+        """Draw a frame.
+
+        Args:
+            frame: The frame.
+            factor: Simulated over real time.
+            interrupted: Whether the tool's way does not lead there from the last one.
+        """
+        if self._losses > _MOST:
+            return
+        try:
+            self._view.draw(frame, interrupted=interrupted)
+            self._meshcat.SetRealtimeRate(factor)
+        except RuntimeError:
+            self._begin_anew(frame)
+
+    def _begin_anew(self, frame: LiveFrame) -> None:
+        self._losses += 1
+        if self._losses > _MOST:
+            self._tell("the scene was ended from outside too often; it is drawn no more")
+            return
+        self._tell("the scene was ended from outside, and begins anew")
+        with suppress(RuntimeError):  # that it is ended at once, too, the next frame finds
+            self._begin(frame)
+
+
+def hidden_meshcat() -> Meshcat:
+    """Return a Meshcat at an address of this machine that cannot be guessed, if there are many."""
+    own = ".".join(["127", *(str(secrets.choice(range(1, 255))) for _ in range(3))])
+    try:
+        return Meshcat(MeshcatParams(host=own, port=0))
+    except RuntimeError:
+        return Meshcat(MeshcatParams(host=HOST, port=0))

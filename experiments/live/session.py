@@ -9,11 +9,9 @@ from typing import Protocol
 from diagrams.drawing.live_view import LiveView
 from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
-from experiments.live.pacing import RealTimePace
 from experiments.live.pages import Pages
-from experiments.live.panel import Command, Panel
-from experiments.live.scene import Scene
-from experiments.live.simulation import LiveSimulation
+from experiments.live.panel import Command, Panel, Scene
+from experiments.live.simulation import LiveSimulation, RealTimePace
 from experiments.live.status import LiveStatus
 from experiments.live.take import ControlRecord, TakeFolders
 from experiments.preparation import PreparedRun

@@ -1,6 +1,8 @@
-"""A station that runs in steps, with a person at its controls."""
+"""A station that runs in steps, with a person at its controls, as fast as a clock or slower."""
 
 import time
+from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -16,6 +18,11 @@ from pfsc_drake.robot.robot_model import pose_function
 
 # the longest time between two looks at the controls [s]
 _STEP = 0.01
+# how far simulated time may lag and still catch up [s]; beyond, it stays behind
+_SLACK = 0.1
+# over which the real-time factor is taken [s]
+_WINDOW = 1.0
+_MOMENT = 0.03  # s
 
 
 class LiveSimulation:
@@ -113,3 +120,60 @@ def _ticks_per_step(period: float) -> int:
     """
     most = max(1, int(_STEP / period * (1.0 + 1e-9)))
     return max(n for n in range(1, most + 1) if chunk_ticks(period) % n == 0)
+
+
+class RealTimePace:
+    """Lets simulated time wait for the clock, and never run after it.
+
+    A lag of up to 0.1 s, as of a computer that was busy for a moment, is caught up. What lags more
+    was simulated too slowly: then time goes on from there, slower than the clock, as
+    :attr:`factor` tells.
+
+    Args:
+        clock: Tells the time [s].
+        sleep: Waits [s].
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._clock, self._sleep = clock, sleep
+        self._origin = 0.0
+        self._past: deque[tuple[float, float]] = deque()
+
+    def restart(self, simulated: float) -> None:
+        """Begin anew, after time has stood still.
+
+        Args:
+            simulated: Simulated time now [s].
+        """
+        now = self._clock()
+        self._origin = now - simulated
+        self._past = deque([(now, simulated)])
+
+    def keep(self, simulated: float) -> None:
+        """Wait until the clock has come to a simulated time, if it has not.
+
+        Args:
+            simulated: Simulated time now [s].
+        """
+        early = self._origin + simulated - self._clock()
+        if early > 0.0:
+            self._sleep(early)
+        elif early < -_SLACK:
+            self._origin -= early + _SLACK
+        self._past.append((self._clock(), simulated))
+        while len(self._past) > 2 and self._past[-1][0] - self._past[1][0] >= _WINDOW:
+            self._past.popleft()
+
+    def wait(self) -> None:
+        """Let a moment pass in which simulated time stands still."""
+        self._sleep(_MOMENT)
+
+    @property
+    def factor(self) -> float:
+        """Simulated over real time during the last second."""
+        (begin, first), (end, last) = self._past[0], self._past[-1]
+        return (last - first) / (end - begin) if end > begin else 1.0

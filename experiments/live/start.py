@@ -7,13 +7,13 @@ from pathlib import Path
 
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator import region_names
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.live.pages import Pages
 from experiments.live.server import PageServer
 from experiments.live.session import Kept, LiveSession, Output, Teller
 from experiments.live.status import LiveStatus
 from experiments.live.take import TakeFolders
 from experiments.preparation import prepare
+from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import LiveHandParameters
 from pfsc_drake.yaml.typed import load_typed

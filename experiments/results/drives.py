@@ -24,6 +24,7 @@ _ROUNDING = 1e-9
 # names of the position metric by whether a joint turns
 _MARGIN = {True: "joint_limit_margin", False: "slide_limit_margin"}
 _SHARE = "joint_velocity_share"
+SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
 
 
 @dataclass(frozen=True)
@@ -144,9 +145,6 @@ def _least(values: FloatArray, log: RunLog) -> tuple[float, str | None]:
         return np.nan, None
     k, i = np.unravel_index(np.argmin(known), known.shape)
     return float(known[k, i]), f"q_{i + 1} at t = {log.time[k]:.3f} s"
-
-
-SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to rounding
 
 
 def peak_torque(log: RunLog) -> FloatArray:

@@ -14,9 +14,8 @@ from experiments.results.path import shape_metrics
 from experiments.results.pushes import is_redundant
 from experiments.results.run_signals import expected_signals
 from pfsc_drake.errors import InputError
-from reporting.metrics import Metric, Metrics
+from reporting.metrics import Metric, Metrics, format_quantity
 from reporting.registry import possible_metrics
-from reporting.units import format_quantity
 
 # held at every instant, so that also a run that was cut short is judged by them
 _ALWAYS = ("deepest_violation", "max_unanswered_force")

@@ -7,11 +7,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.preparation import prepare
 from experiments.results.guidance import guidance_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log
+from experiments.scenario_file import read_scenario
 from experiments.simulation import simulate
 from experiments.studies.study_page import write_study_page
 from reporting.folder import open_results

@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from experiments.catalog.scenario_file import ScenarioFile, read_scenario
+from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.rows import COMPLETED, RunRow
+from experiments.sweep.worker import COMPLETED, RunRow
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
@@ -44,6 +44,13 @@ _ENCODERS = (
 )
 _ERROR = "model_error={random: {seed: 1, mass: 0.056, inertia: 0.056, friction: 0.05}}"
 _DEVIATION, _FROM_REFERENCE = "max_path_deviation", "max_error_from_compliant_reference"
+_SEED = 1
+_DESCRIPTION = (
+    "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
+    "disturbance; from what was measured come its base parameters, the nearest consistent model, "
+    "and files. Then scenarios are driven three times: with a law that believes the true model, "
+    "one wrong by the deviations of Tab. C.3, and the identified one."
+)
 
 
 @dataclass(frozen=True)
@@ -125,13 +132,6 @@ CIRCLES = (
             ),
         },
     ),
-)
-_SEED = 1
-_DESCRIPTION = (
-    "Each robot is excited, its experiment simulated with friction, noise, encoders and a coloured "
-    "disturbance; from what was measured come its base parameters, the nearest consistent model, "
-    "and files. Then scenarios are driven three times: with a law that believes the true model, "
-    "one wrong by the deviations of Tab. C.3, and the identified one."
 )
 
 

@@ -7,43 +7,14 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure as Canvas
 
-from experiments.catalog.scenario_file import ScenarioFile, read_scenario
+from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.rows import COMPLETED, RunRow
+from experiments.sweep.worker import COMPLETED, RunRow
 from reporting.folder import open_results
 from reporting.metrics import Metrics
 from reporting.page import Report
 from reporting.style import ALERT, COLOURS, STYLE, WIDTH, Drawing, Figure, render
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A scenario whose law is to bear disturbances.
-
-    Attributes:
-        scenario: Its name.
-        before: What it was before the cures, as overrides.
-        after: The cures beyond those that the scenario has.
-        elastic: Whether its joints have a stiffness.
-        friction: Overrides without friction, and the one that gives it.
-        metric: What is to stay small.
-    """
-
-    scenario: str
-    before: tuple[str, ...] = ()
-    after: tuple[str, ...] = ()
-    elastic: bool = True
-    metric: str = "max_path_deviation"
-    friction: tuple[str, str] = ("friction={}", "friction.file=comau_racer_1_4")
-
-
-def _equal_poles(law: str, **poles: float) -> str:
-    kinds = ", ".join(
-        f"{kind}: {{poles: [{', '.join([f'{p:g}'] * 4)}]}}" for kind, p in poles.items()
-    )
-    return f"controller.gains.{law}={{{kinds}}}"
-
 
 # nothing but the law between the plant and its model
 _BARE = ("model_error={}", "encoders={}")
@@ -51,27 +22,6 @@ _OBSERVED = ("controller.friction.source=observer",)
 # what links and tool do that the model does not tell, of robots that nothing pushes
 _TORQUE_OBSERVED = "controller.external_torque={source: observed, bandwidth: 60}"
 _UNOBSERVED = ("controller.friction.source=none",)
-SUBJECTS = (
-    Subject(
-        "pfc_elastic_6r",
-        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
-    ),
-    Subject(
-        "pfc_comau_6r_elastic",
-        (_equal_poles("elastic", eta=-40, xi=-60, phi=-50), "start.transition=0"),
-    ),
-    Subject(
-        "pfc_elastic_7r",
-        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
-        friction=("friction={}", "friction.file=franka_emika_panda"),
-    ),
-    Subject("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
-    Subject("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
-    Subject("pfc_comau_6r"),
-    # a DELTA robot brings its own friction
-    Subject("pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")),
-    Subject("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
-)
 _FRICTION = "friction"  # as each subject says it
 _ENCODERS = (
     "encoders={motor_increments: [4000000], link_increments: [4000000], difference_quotient: true}"
@@ -105,6 +55,57 @@ _DESCRIPTION = (
 )
 # what one run is called by: scenario, disturbance, before or after
 Case = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scenario whose law is to bear disturbances.
+
+    Attributes:
+        scenario: Its name.
+        before: What it was before the cures, as overrides.
+        after: The cures beyond those that the scenario has.
+        elastic: Whether its joints have a stiffness.
+        friction: Overrides without friction, and the one that gives it.
+        metric: What is to stay small.
+    """
+
+    scenario: str
+    before: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    elastic: bool = True
+    metric: str = "max_path_deviation"
+    friction: tuple[str, str] = ("friction={}", "friction.file=comau_racer_1_4")
+
+
+def _equal_poles(law: str, **poles: float) -> str:
+    kinds = ", ".join(
+        f"{kind}: {{poles: [{', '.join([f'{p:g}'] * 4)}]}}" for kind, p in poles.items()
+    )
+    return f"controller.gains.{law}={{{kinds}}}"
+
+
+SUBJECTS = (
+    Subject(
+        "pfc_elastic_6r",
+        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
+    ),
+    Subject(
+        "pfc_comau_6r_elastic",
+        (_equal_poles("elastic", eta=-40, xi=-60, phi=-50), "start.transition=0"),
+    ),
+    Subject(
+        "pfc_elastic_7r",
+        (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
+        friction=("friction={}", "friction.file=franka_emika_panda"),
+    ),
+    Subject("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
+    Subject("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
+    Subject("pfc_comau_6r"),
+    # a DELTA robot brings its own friction
+    Subject("pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")),
+    Subject("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
+)
 
 
 def write_robustness(

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure as Canvas
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import ScenarioFile, read_scenario
+from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.rows import COMPLETED, RunRow
+from experiments.sweep.worker import COMPLETED, RunRow
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.resonance import joint_resonances

@@ -7,10 +7,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.rows import COMPLETED, RunRow
+from experiments.sweep.worker import COMPLETED, RunRow
 from reporting.folder import open_results
 from reporting.metrics import Metrics
 from reporting.page import Report

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.sweep.rows import RunRow
+from experiments.sweep.worker import RunRow
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.text_file import read_text
 from reporting.folder import ResultsFolder
@@ -18,6 +18,14 @@ RECORD = "sweep.json"
 _PROGRAM = ("python", "-m", "experiments")
 # no row is older than this when the process is killed [s], or than so many times what writing takes
 _OLDEST, _SHARE = 2.0, 20.0
+_SPOKEN = {
+    "vary": "--vary {}",
+    "samples": "--samples {}",
+    "seed": "--seed {}",
+    "overrides": "--set {}",
+    "duration": "--duration {}",
+    "content": "another scenario, or one that has changed since",
+}
 
 
 @dataclass(frozen=True)
@@ -83,16 +91,6 @@ class SweepDefinition:
         if self.duration is not None:
             words += ["--duration", repr(self.duration)]
         return words
-
-
-_SPOKEN = {
-    "vary": "--vary {}",
-    "samples": "--samples {}",
-    "seed": "--seed {}",
-    "overrides": "--set {}",
-    "duration": "--duration {}",
-    "content": "another scenario, or one that has changed since",
-}
 
 
 class SweepRecord:

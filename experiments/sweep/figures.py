@@ -12,11 +12,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from experiments.sweep.rows import COMPLETED
-from experiments.sweep.summary import Spread
-from experiments.sweep.table import Columns
+from experiments.sweep.summary import Columns, Spread
+from experiments.sweep.worker import COMPLETED
+from reporting.metrics import format_quantity
 from reporting.style import ALERT, COLOURS, INK, STYLE, WIDTH, Drawing, Figure, render
-from reporting.units import format_quantity
 
 MAX_PANELS = 12
 

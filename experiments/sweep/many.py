@@ -1,4 +1,4 @@
-"""Many runs on many processes."""
+"""Many runs on many processes: those of this machine, or those behind an address."""
 
 import contextlib
 import importlib.util
@@ -13,9 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from experiments.catalog.scenario_file import ScenarioFile
-from experiments.sweep.rows import DIED, FAILED, RunRow
-from experiments.sweep.worker import RunTask, program_revision, run_task
+from experiments.scenario_file import ScenarioFile
+from experiments.sweep.worker import DIED, FAILED, RunRow, RunTask, program_revision, run_task
 from pfsc_drake.errors import InputError, shortened
 from reporting import processes
 from reporting.interruption import noticed_interruption

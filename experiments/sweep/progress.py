@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, TaskID
 
-from experiments.sweep.rows import COMPLETED
+from experiments.sweep.worker import COMPLETED
 from reporting.progress import PLAIN_LINES, make_bar
 
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
@@ -57,7 +57,7 @@ class SweepProgress:
             self._bar.stop()
 
     def advance(self, status: str) -> None:
-        """Takes the end of one run, see :mod:`experiments.sweep.rows`."""
+        """Takes the end of one run, see :mod:`experiments.sweep.worker`."""
         self._done += 1
         self._ends[status] += 1
         is_due = self._done - self._said >= self._total / PLAIN_LINES or self._done == self._total

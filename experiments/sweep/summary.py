@@ -1,14 +1,18 @@
-"""What a sweep says as a whole: how many runs went well, quantiles, the worst run."""
+"""What a sweep says as a whole: ends, quantiles, the worst run, and a table of all runs."""
 
+import csv
+import io
+import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from experiments.sweep.rows import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
-from reporting.metrics import Metric, Metrics
-from reporting.units import format_quantity
+from experiments.sweep.samples import Sample
+from experiments.sweep.worker import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
+from reporting.metrics import Metric, Metrics, format_quantity
 
 # of the machine and what else it does, not of the robot
 MACHINE_METRICS = ("real_time_factor", "controller_tick_us", "controller_tick_us_p99")
@@ -20,6 +24,10 @@ _SPOKEN = {
     FAILED: "failed",
     DIED: "died with their process",
 }
+_LARGE = ("real_time_factor", "joint_limit_margin")
+_SINGLE = {FAULT: "fault", REFUSED: "refused", FAILED: "failed", DIED: "died"}
+Columns = dict[str, list[Any]]
+_ABOUT = ("run", "status", "reason", "warnings", "simulated_time", "seconds", "host", "revision")
 
 
 @dataclass(frozen=True)
@@ -108,9 +116,6 @@ def _spread(name: str, metrics: Mapping[int, Metric]) -> Spread:
     return Spread(name, unit, tuple(metrics), values, is_better_large, target, source)
 
 
-_LARGE = ("real_time_factor", "joint_limit_margin")
-
-
 def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
     """Returns how many runs ended in which way, then the worst value of each metric.
 
@@ -178,4 +183,92 @@ def striking_runs(rows: Mapping[int, RunRow], chosen: str | None, most: int) -> 
     return striking
 
 
-_SINGLE = {FAULT: "fault", REFUSED: "refused", FAILED: "failed", DIED: "died"}
+def table_columns(samples: Sequence[Sample], rows: Mapping[int, RunRow]) -> Columns:
+    """Returns the columns of the table, in the order of the samples.
+
+    Args:
+        samples: All of the sweep; those without row are left out.
+        rows: By number of the sample.
+
+    Returns:
+        What varied, how the run ended (``status``, ``reason``, number of ``warnings``,
+        ``simulated_time`` [s], ``seconds`` of wall clock time, ``host``, ``revision``) and every
+        metric in SI units; None where a run has no value.
+    """
+    done = [sample for sample in samples if sample.index in rows]
+    own = [rows[sample.index] for sample in done]
+    columns: Columns = {"run": [sample.index for sample in done]}
+    for name in dict.fromkeys(name for sample in done for name in sample.varied):
+        values = [sample.varied.get(name) for sample in done]
+        columns[_free(name, columns)] = values if _is_numeric(values) else [str(v) for v in values]
+    columns |= {
+        "status": [row.status for row in own],
+        "reason": [row.reason for row in own],
+        "warnings": [len(row.warnings) for row in own],
+        "simulated_time": [_finite(row.end) for row in own],
+        "seconds": [_finite(row.seconds) for row in own],
+        "host": [row.host for row in own],
+        "revision": [row.revision for row in own],
+    }
+    for name in dict.fromkeys(name for row in own for name in row.metrics):
+        metrics = (row.metrics.get(name) for row in own)
+        values = [None if metric is None else _finite(metric.value) for metric in metrics]
+        columns[_free(name, columns)] = values
+    return columns
+
+
+def units_of(rows: Mapping[int, RunRow]) -> dict[str, str]:
+    """Returns the unit of each metric, and of the times."""
+    metrics = {name: metric.unit for row in rows.values() for name, metric in row.metrics.items()}
+    return {"simulated_time": "s", "seconds": "s", **metrics}
+
+
+def to_csv(columns: Columns) -> str:
+    """Returns the table as CSV with a line of names; numbers keep all their digits."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def to_parquet(columns: Columns, units: Mapping[str, str]) -> bytes:
+    """Returns the table as Parquet.
+
+    Args:
+        columns: The table.
+        units: Of its columns; kept as ``unit`` in the metadata of the column.
+    """
+    import pyarrow
+    from pyarrow import parquet
+
+    arrays = [pyarrow.array(_typed(values)) for values in columns.values()]
+    fields = [
+        pyarrow.field(name, array.type, metadata={"unit": units[name]} if name in units else None)
+        for name, array in zip(columns, arrays, strict=True)
+    ]
+    sink = pyarrow.BufferOutputStream()
+    parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), sink)
+    return bytes(sink.getvalue())
+
+
+def _free(name: str, columns: Columns) -> str:
+    """A name that no other column has."""
+    while name in columns or name in _ABOUT:
+        name += "_"
+    return name
+
+
+def _is_numeric(values: Sequence[Any]) -> bool:
+    return all(isinstance(value, (int, float)) for value in values)
+
+
+def _typed(values: list[Any]) -> list[Any]:
+    """Numbers of one type, nothing else changed."""
+    if any(isinstance(value, float) for value in values):
+        return [None if value is None else float(value) for value in values]
+    return values
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -8,12 +8,11 @@ from pathlib import Path
 from rich.console import Console
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import ScenarioFile, apply_override, read_scenario
+from experiments.scenario_file import ScenarioFile, apply_override, read_scenario
 from experiments.sweep.definition import SweepDefinition, SweepRecord
 from experiments.sweep.figures import draw_sweep
 from experiments.sweep.many import count_cores, run_many
 from experiments.sweep.progress import SweepProgress
-from experiments.sweep.rows import REFUSED, RunRow
 from experiments.sweep.samples import Sample, draw_samples, parse_variations
 from experiments.sweep.summary import (
     choose_metric,
@@ -22,9 +21,12 @@ from experiments.sweep.summary import (
     measure_spreads,
     striking_runs,
     summary_metrics,
+    table_columns,
+    to_csv,
+    to_parquet,
+    units_of,
 )
-from experiments.sweep.table import table_columns, to_csv, to_parquet, units_of
-from experiments.sweep.worker import RunTask, program_revision
+from experiments.sweep.worker import REFUSED, RunRow, RunTask, program_revision
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed

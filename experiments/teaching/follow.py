@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.scenario import Scenario
-from experiments.teaching.options import TeachingOptions
-from experiments.teaching.taught import Taught, keeps_orientation
+from experiments.teaching.taught import Taught, TeachingOptions, keeps_orientation
 from pfsc_drake.following.options.controller import LawGains
 from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.finished_run import RunOutcome
 from experiments.results.run_log import RunLog
 from experiments.run import run_scenario
+from experiments.scenario_file import read_scenario
 from experiments.teaching.comparison import (
     Followed,
     compare_fit,
@@ -15,9 +15,8 @@ from experiments.teaching.comparison import (
     comparison_metrics,
 )
 from experiments.teaching.follow import CSV_NAME, YAML_NAME, follow_text
-from experiments.teaching.options import TeachingOptions
 from experiments.teaching.pictures import draw_pictures
-from experiments.teaching.taught import Taught, read_run, taught_path
+from experiments.teaching.taught import Taught, TeachingOptions, read_run, taught_path
 from pfsc_drake.geometry import waypoints_text
 from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.page import Report, report_page, write_report
@@ -28,6 +27,7 @@ _DESCRIPTION = (
     "A hand led the tool, and turned it. Where encoders and model tell the tool to be was picked "
     "as waypoints, by distance and angle; the path is the smoothest within a tolerance of them."
 )
+SCENARIO, GUIDE = "teach_by_hand_6r", "guide"
 
 
 @dataclass(frozen=True)
@@ -204,3 +204,33 @@ def _cards(followed: Followed | None) -> list[str]:
         "model_error_of_place",
         "model_error_left",
     ]
+
+
+def write_teach_in(
+    out: Path,
+    progress: Callable[[str], None],
+    scenario: str = SCENARIO,
+    options: TeachingOptions | None = None,
+    *,
+    drawn: bool = True,
+) -> Report:
+    """Let a hand lead a tool, follow the path that this taught, and write a page.
+
+    Args:
+        out: Folder for waypoints, scenario and page; the run with the hand is in ``guide``, the
+            one along the path in ``follow``.
+        progress: Told one line per step.
+        scenario: Name or file of the scenario with the hand.
+        options: How the path is taught.
+        drawn: Whether the two runs have figures and recordings.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: See :func:`teach`; nothing has been run where a folder cannot take results.
+        KeyboardInterrupt: If the user stopped a run.
+    """
+    check_folders(out, out / GUIDE)
+    run_and_tell(scenario, out / GUIDE, progress, drawn=drawn)
+    return teach(out / GUIDE, out, options, drawn=drawn, progress=progress).report

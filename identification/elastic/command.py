@@ -14,8 +14,8 @@ from identification.elastic.estimate import JointEstimate
 from identification.options import Names, Robot, Scales, Units, read_number, read_reading
 from identification.output import check_folder, write_text
 from reporting.commands import interruptible
-from reporting.fraction import fraction_display
 from reporting.page import Table
+from reporting.progress import fraction_display
 
 
 def elastic_command(
@@ -53,7 +53,7 @@ def elastic_command(
     from identification.model.subject import load_subject
     from identification.output import make_folder
     from identification.steps import load_excitation
-    from reporting.tables import print_table
+    from reporting.terminal import print_table
 
     with interruptible():
         console, subject = Console(), load_subject(robot)

@@ -25,7 +25,7 @@ from diagrams.robots.arm import add_arm
 from diagrams.robots.drives import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY, find_scenario
+from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario
 from experiments.simulation import configure
 from pfsc_drake.systems.plants.link_pushes import LinkPushes
 from pfsc_drake.yaml.typed import load_file

@@ -14,8 +14,8 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.integration import choose_integration
+from experiments.scenario_file import find_scenario
 from experiments.simulation import configure
 from pfsc_drake.control.fixtures.fixture_guidance import LedTool
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance

@@ -10,7 +10,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters, Scenario
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.yaml.typed import load_file
 

@@ -18,7 +18,7 @@ from diagrams.scenario import (
     Scenario,
 )
 from diagrams.scenario.notch import BallParameters, NotchParameters
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.errors import InputError

@@ -18,7 +18,7 @@ from diagrams.scenario import (
     StartParameters,
 )
 from diagrams.tasks.make import make_task
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix
 from pfsc_drake.geometry.rotation import matrix_to_zyz, zyz_to_matrix

@@ -7,7 +7,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import BrakeParameters, ForcePulse, GainParameters, LawGains
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault

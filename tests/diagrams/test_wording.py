@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.builder import build_station
 from diagrams.wording import coordinate_text, listed, posture_text
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 
 
 def test_coordinates_with_units():

@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 
 _LINK = (

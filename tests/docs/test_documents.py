@@ -17,8 +17,7 @@ import identification.cli
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.tasks.surface import make_surface
-from experiments.catalog.scenario_catalog import scenario_names
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario, scenario_names
 from experiments.sweep.sweep import define_sweep
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from experiments import simulation
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
 from experiments.results.run_log import RunLog
+from experiments.scenario_file import find_scenario
 
 BARE = ("--no-figures", "--no-recording")
 FIRST_MOVE = "1.7"  # s, of pfc_elastic_3r

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.catalog import scenario_catalog
 from experiments.cli import main
+from experiments.scenario_file import CatalogEntry
 from pfsc_drake import InputError
 from reporting.metrics import Metrics
 from reporting.provenance import PROJECT_ROOT
@@ -202,7 +202,7 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
 
 
 def test_list(monkeypatch, scenario, capsys):
-    entries = [scenario_catalog.CatalogEntry("my_run", "3.8.3", "Test [brackets]")]
+    entries = [CatalogEntry("my_run", "3.8.3", "Test [brackets]")]
     monkeypatch.setattr("experiments.cli.list_scenarios", lambda: entries)
     assert main(["list"]) == 0
     assert capsys.readouterr().out.splitlines()[1].split() == [

@@ -7,9 +7,9 @@ import subprocess
 import numpy as np
 import pytest
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.export import export_scenario
 from experiments.replay import check_export
+from experiments.scenario_file import read_scenario
 from tests.compilers import needs_gcc
 
 TICKS = 40

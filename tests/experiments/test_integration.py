@@ -9,9 +9,9 @@ from diagrams.builder import build_station
 from diagrams.integration import is_stable
 from diagrams.scenario import Scenario, SimulationParameters
 from experiments import integration
-from experiments.catalog.scenario_file import read_scenario
 from experiments.integration import choose_integration
 from experiments.results.run_signals import collect_log
+from experiments.scenario_file import read_scenario
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf

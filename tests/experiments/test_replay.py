@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
 from experiments.export import export_scenario
 from experiments.replay import check_export, replay_log
 from experiments.results.run_log import RunLog
+from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from tests.compilers import needs_gcc
 

@@ -8,9 +8,9 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from experiments import simulation
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_signals import collect_log
+from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.yaml.typed import load_file
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.cli import main
 from experiments.preparation import prepare
+from experiments.scenario_file import SCENARIO_DIRECTORY, ScenarioFile
 from pfsc_drake.errors import MAX_MESSAGE, InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from tests.fuzz.mutations import edited, edits, full_scenario, tables

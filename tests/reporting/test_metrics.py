@@ -6,8 +6,7 @@ import math
 import pytest
 
 from pfsc_drake import InputError
-from reporting.metrics import Metric, Metrics
-from reporting.units import NARROW_SPACE, format_quantity
+from reporting.metrics import NARROW_SPACE, Metric, Metrics, format_quantity
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
+from reporting.metrics import format_quantity
 from reporting.progress import ProgressDisplay
 from reporting.provenance import PROJECT_ROOT
 from reporting.terminal import one_line, prepare_streams, print_error
-from reporting.units import format_quantity
 
 
 @pytest.fixture(name="written")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import ScenarioFile
 from experiments.preparation import naming
+from experiments.scenario_file import ScenarioFile
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box
 from experiments.studies.margins.picture import draw_margins

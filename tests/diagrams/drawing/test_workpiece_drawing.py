@@ -10,7 +10,7 @@ from diagrams.drawing.replay import RecordedMotion
 from diagrams.scenario import Keyframe, Line
 from diagrams.scenario.notch import BallParameters, NotchParameters
 from diagrams.surroundings.notch import NotchedWorkpiece, notch_surface
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 
 PERIOD = 0.04
 UP = np.array([0.0, 0.0, 1.0])

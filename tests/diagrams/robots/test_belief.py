@@ -16,7 +16,7 @@ from pydrake.systems.primitives import (
 
 from diagrams.builder import build_station
 from diagrams.scenario import EncoderOptions
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from pfsc_drake.blocks import wiring_blocks
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.safe_stop import SafeStop

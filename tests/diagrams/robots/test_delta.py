@@ -10,8 +10,7 @@ from diagrams.builder import build_station
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.catalog.scenario_file import load_scenario_data
+from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.yaml.typed import load_typed

@@ -6,7 +6,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.robots.force_sensor import sensor_warnings
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 
 
 @pytest.mark.parametrize(("dwell", "late"), [(0.049, True), (0.05, False), (0.051, False)])

@@ -6,7 +6,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, Keyframe, Line
 from diagrams.scenario.notch import BallParameters, NotchParameters
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import simulate
 
 # omega h of stuck bristles: continuous plants, and those that read the friction at their ticks

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 

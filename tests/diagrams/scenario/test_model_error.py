@@ -5,7 +5,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import ModelErrorParameters, RandomModelError, Scenario
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 

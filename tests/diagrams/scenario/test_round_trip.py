@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import scenario_names
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario, scenario_names
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.dumping import dump_typed

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.scenario.plate import CarrierParameters, PlateParameters, RandomMisplacement
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.catalog.scenario_file import load_scenario_data
+from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import quaternion_to_matrix
 from pfsc_drake.yaml.typed import load_typed

@@ -10,8 +10,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.surroundings.notch import notch_surface
 from diagrams.surroundings.notch_motion import place_in_notch
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.catalog.scenario_file import load_scenario_data
+from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed
 

@@ -8,8 +8,7 @@ from pydrake.geometry import HydroelasticContactRepresentation
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
-from experiments.catalog.scenario_file import load_scenario_data
+from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.yaml.typed import load_typed

@@ -11,7 +11,7 @@ from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Plane
 from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.make import make_task
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 

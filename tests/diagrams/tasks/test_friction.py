@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.believed import believed_robot
 from diagrams.builder import build_station
 from diagrams.scenario import JointFrictionParameters
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import FrictionDrift
 

@@ -12,7 +12,7 @@ from diagrams.scenario.operator import OperatorParameters
 from diagrams.surroundings.operator import idle_controls
 from diagrams.surroundings.operator_file import controls_text
 from diagrams.tasks.guidance import stiff_regions
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 
 

@@ -6,7 +6,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, JointFrictionParameters
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.tool_load import joint_torque_function
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from diagrams.surroundings.operator_file import read_controls
-from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
-from experiments.live.pacing import RealTimePace
 from experiments.live.pages import Pages
 from experiments.live.session import LiveSession, Output
+from experiments.live.simulation import RealTimePace
 from experiments.live.start import with_operator
 from experiments.live.status import LiveStatus
 from experiments.live.take import TakeFolders
 from experiments.preparation import prepare
+from experiments.scenario_file import read_scenario
 
 RESET, RECORD, END = "reset (X)", "record (C)", "end (Q)"
 BARE = ("--no-figures", "--no-recording")

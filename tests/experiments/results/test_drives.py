@@ -7,9 +7,9 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.drives import JointLimits
 from experiments.results.run_log import RunLog
+from experiments.scenario_file import find_scenario
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.yaml.typed import load_file

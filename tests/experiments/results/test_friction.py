@@ -7,10 +7,10 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains, Scenario
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.results.friction import friction_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, expected_signals
+from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.yaml.typed import load_file

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
+from experiments.scenario_file import find_scenario
 
 THREE, SIX = "pfc_elastic_3r", "pfc_elastic_6r"
 BARE = ("--no-figures", "--no-recording")

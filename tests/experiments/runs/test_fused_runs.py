@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.catalog.scenario_catalog import SCENARIO_DIRECTORY, find_scenario, scenario_names
+from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario, scenario_names
 from experiments.simulation import configure
 from pfsc_drake.yaml.typed import load_file
 from tests.deferred_code import compiled_at_once, interpreted

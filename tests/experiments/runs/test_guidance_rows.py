@@ -17,7 +17,7 @@ from scipy.signal import lsim
 from diagrams.builder import build_station
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters, Scenario
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from pfsc_drake.yaml.typed import load_typed
 
 pytestmark = pytest.mark.slow

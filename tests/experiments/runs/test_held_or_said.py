@@ -11,8 +11,8 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
+from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 
 SCENARIO, BEARABLE = "pfc_elastic_3r", 1e-3  # m

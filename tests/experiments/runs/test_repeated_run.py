@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,9 @@ import h5py
 import pytest
 import yaml
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
 from experiments.run import run_scenario
+from experiments.scenario_file import read_scenario
 
 BARE = ("--no-figures", "--no-recording")
 

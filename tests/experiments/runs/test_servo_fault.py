@@ -7,8 +7,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_catalog import find_scenario
 from experiments.cli import main
+from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.yaml.typed import load_file

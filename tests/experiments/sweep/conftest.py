@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.sweep.rows import COMPLETED, DIED, FAULT, RunRow
+from experiments.sweep.worker import COMPLETED, DIED, FAULT, RunRow
 from reporting.metrics import Metrics
 
 

@@ -6,9 +6,9 @@ import shlex
 
 import pytest
 
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from experiments.sweep.definition import RECORD, SweepDefinition, SweepRecord
-from experiments.sweep.rows import FAILED, RunRow
+from experiments.sweep.worker import FAILED, RunRow
 from pfsc_drake import InputError
 from reporting.folder import open_results
 

@@ -5,12 +5,11 @@ import signal
 import psutil
 import pytest
 
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from experiments.sweep import many
 from experiments.sweep.many import run_many
-from experiments.sweep.rows import COMPLETED, DIED, REFUSED
 from experiments.sweep.summary import MACHINE_METRICS
-from experiments.sweep.worker import RunTask, run_task
+from experiments.sweep.worker import COMPLETED, DIED, REFUSED, RunTask, run_task
 
 pytestmark = pytest.mark.slow
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.catalog.scenario_file import read_scenario
 from experiments.results.run_log import RunLog
+from experiments.scenario_file import read_scenario
 from pfsc_drake.yaml.reading import dump_yaml
 
 

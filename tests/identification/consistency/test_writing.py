@@ -9,7 +9,7 @@ from pydrake.multibody.tree import MultibodyForces
 from diagrams.builder import build_station
 from diagrams.robots.model import read_robot
 from diagrams.scenario import RobotParameters, Scenario
-from experiments.catalog.scenario_catalog import find_scenario
+from experiments.scenario_file import find_scenario
 from identification.consistency.printed import nearest_to_printed
 from identification.consistency.writing import write_model
 from identification.model.base import random_motion

@@ -9,7 +9,7 @@ from rich.console import Console
 from identification.estimation.repetitions import ParameterRow, TorqueRow
 from identification.report.page import parameter_table, torque_table
 from reporting.page import Table
-from reporting.tables import print_table
+from reporting.terminal import print_table
 
 
 def findings(spread, truth):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import read_scenario
 from experiments.cli import main
+from experiments.scenario_file import read_scenario
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import Box, Error, corners, single_errors
 from experiments.studies.margins.result import MarginAnalysis

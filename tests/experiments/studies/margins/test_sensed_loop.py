@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.scenario import Scenario
-from experiments.catalog.scenario_file import read_scenario
+from experiments.scenario_file import read_scenario
 from experiments.studies.margins.box import Error
 from experiments.studies.margins.loop import StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error

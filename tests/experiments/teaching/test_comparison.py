@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.teaching.nearest import nearest_on_line
+from experiments.teaching.comparison import nearest_on_line
 
 
 def curve(t):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.live.pacing import RealTimePace
+from experiments.live.simulation import RealTimePace
 
 
 class Wall:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments.length import MAX_FRAMES, MAX_TICKS, check_frames, check_length
+from experiments.preparation import MAX_FRAMES, MAX_TICKS, check_frames, check_length
 from pfsc_drake import InputError
 
 STATION = SimpleNamespace(

@@ -1,1 +1,0 @@
-"""Shipped scenarios, and scenario files of a user's own."""
