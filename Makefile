@@ -3,16 +3,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 FUZZ_SECONDS ?= 600
 DEMO_OUT := out/demo
-# a file's tests share what they build; in the order of folders, which ends with short files
+# a file's tests share what they build; in the order of tests/conftest.py
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+# the slowest tests only where they are asked for, as test-all and continuous integration do
+PFSC_TESTS ?= quick
+SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 
-.PHONY: help setup demo test test-quick lint types unit fuzz benchmark models signals clean
+.PHONY: help setup demo test test-all lint types unit fuzz benchmark models signals clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
-	@echo "make test       linters, types and the whole test suite"
-	@echo "make test-quick the tests without those marked slow"
+	@echo "make test       linters, types and the tests, but the dozen that take longest"
+	@echo "make test-all   the same with these; as continuous integration runs it"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
 	@echo "make signals    write docs/signals.md anew from reporting/registry.toml"
@@ -40,11 +43,11 @@ lint: setup
 types: setup
 	$(BIN)/mypy
 
-unit: setup
-	$(PYTEST)
+test-all:
+	@$(MAKE) test PFSC_TESTS=all
 
-test-quick: setup
-	$(PYTEST) -m "not slow"
+unit: setup
+	$(PYTEST) $(SELECTED)
 
 # rounds with a seed each; memory is bounded, so that what devours it fails instead
 fuzz: setup

@@ -1,4 +1,4 @@
-"""How properties are tested, without looking at the clock; and when code is compiled."""
+"""How properties are tested, without looking at the clock; what begins, and when is compiled."""
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -23,6 +23,15 @@ settings.load_profile("suite")
 
 # where machine code is the subject, or speed
 _COMPILED_AT_ONCE = {"compiled", "benchmarks", "live"}
+
+
+# long files, which are not to begin last: workers end together
+_FIRST = ("tests/experiments/", "tests/identification/", "tests/diagrams/")
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the folders of long files."""
+    items.sort(key=lambda item: not item.nodeid.startswith(_FIRST))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -8,6 +8,8 @@ import pytest
 from experiments.cli import main
 from tests.experiments.runs.test_run_fixtures import run, way
 
+pytestmark = pytest.mark.slow
+
 ABOVE = [1.45, 0.02, 0.92]
 # a plane below the tool, near a stretched elbow, and a hand that pulls outwards and into it
 CHANGES = (

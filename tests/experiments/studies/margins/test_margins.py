@@ -58,6 +58,7 @@ def test_six_axes_with_four_equal_poles_do_not_bear_5_percent():
     assert analysis.delay == -1
 
 
+@pytest.mark.slow
 def test_drives_of_a_light_arm_are_not_cut_off_by_the_error_that_is_tried():
     """Weak drives would be at their limits where the believed weight is another at once."""
     weak = "controller.effort_scale=0.4"
@@ -68,6 +69,7 @@ def test_drives_of_a_light_arm_are_not_cut_off_by_the_error_that_is_tried():
         assert case.worst.rate == pytest.approx(rate, rel=0.3)
 
 
+@pytest.mark.slow
 def test_the_fast_pair_bears_the_box_and_has_margins():
     """With four equal poles the weakest drive bears 2 %."""
     fast = analysis_of(
@@ -174,6 +176,7 @@ def test_refused_boxes(wrong):
         Box(**wrong)
 
 
+@pytest.mark.slow
 def test_margins_along_a_surface():
     """Places have both coordinates, and a joint at 2 rad/s is no fault."""
     analysis = analysis_of(
