@@ -113,8 +113,8 @@ def build_station(
         forces |= add_sensor(builder, part, scenario, states | forces)
         if mounting is not None:
             forces |= add_payload(builder, scenario, mounting, place.signals | forces)
-    wishes = {} if operator is None else operator.requests
-    controller, made = add_law(builder, following, place, forces | wishes)
+    requests = {} if operator is None else operator.requests
+    controller, made = add_law(builder, following, place, forces | requests)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
     further, servo = add_drives(builder, part, scenario, signals | drive, initial_state)

@@ -76,7 +76,7 @@ def test_regions_get_switches(tmp_path, settings, monkeypatch):
     write(tmp_path, settings, (50, {"region_wall": 0.0}), regions=regions)
     operator = build_station(settings, SCENARIOS).operator
     assert operator.columns[-2:] == ["region_wall", "region_floor"]
-    port = operator.wishes["regions_on"]
+    port = operator.requests["regions_on"]
     panel = port.get_system()
     context = panel.CreateDefaultContext()
     assert port.Eval(context).tolist() == [1.0, 1.0]
