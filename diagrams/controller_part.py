@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, S
 
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
+from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.fuse import network_of
@@ -124,7 +125,7 @@ class _Search:
                 )
             self._add(system)
             return _names(source)
-        name = source.get_name()
+        name = self._measured_name(source)
         if name in self._inputs:
             name = f"{system.get_name()}_{name}"
         self._inputs[name] = source
@@ -142,6 +143,15 @@ class _Search:
         ports = [system.get_input_port(i) for i in range(system.num_input_ports())]
         sources = [source for port in ports if (source := self._source(port)) is not None]
         return bool(sources) and all(self._is_measured(s.get_system()) for s in sources)
+
+    def _measured_name(self, source: OutputPort) -> str:
+        """Return what is measured there, also if it comes some ticks later."""
+        system = source.get_system()
+        while isinstance(system, BlockSystem) and isinstance(system.block, Hold):
+            earlier = self._source(system.get_input_port())
+            assert earlier is not None  # something is delayed
+            source, system = earlier, earlier.get_system()
+        return source.get_name()
 
     def _source(self, port: InputPort) -> OutputPort | None:
         return self._sources.get((port.get_system(), int(port.get_index())))

@@ -14,16 +14,21 @@ from tests.compilers import needs_gcc
 
 TICKS = 40
 ARM = "pfc_elastic_6r"
-# velocity servos; a redundant arm; a surface and a discrete plant, which steps at a tick before
-OTHERS = ["plate_mounting_tracking", "pfc_panda_7r", "sfc_delta_cylinder"]
+# velocity servos and guidance with a force measured late; a redundant arm; a surface and a
+# discrete plant, which steps at a tick before
+OTHERS = {
+    "vf_forbidden_region": ["sensor.delay=0.002"],
+    "pfc_panda_7r": [],
+    "sfc_delta_cylinder": [],
+}
 
 
 def quiet(*_):
     """Tell nobody of progress."""
 
 
-def exported(name, folder):
-    export = export_scenario(read_scenario(name, []), folder, TICKS * 1e-3, quiet)
+def exported(name, folder, changes=()):
+    export = export_scenario(read_scenario(name, list(changes)), folder, TICKS * 1e-3, quiet)
     return export, np.fromfile(folder / "replay.bin").reshape(TICKS, -1)
 
 
@@ -62,7 +67,10 @@ def test_c_repeats_a_run_to_the_last_bit(elastic):
 @needs_gcc
 @pytest.mark.parametrize("name", OTHERS)
 def test_c_repeats_runs_of_other_kinds(name, tmp_path):
-    _, recorded = exported(name, tmp_path)
+    export, recorded = exported(name, tmp_path, OTHERS[name])
+    wrench = ["measured_wrench"] if name.startswith("vf") else []
+    inputs = [port["name"] for port in export.controller.interface()["inputs"]]
+    assert inputs == ["joint_state", *wrench]
     replay = check_export(tmp_path, quiet, "-O0", steps=10)
     assert (replay.ticks, replay.differing) == (TICKS, 0)
     assert np.ptp(recorded, axis=0).max() > 0.0
