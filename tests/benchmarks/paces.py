@@ -2,7 +2,8 @@
 
 The last is what the same plant reaches when the torques of the run are replayed: a controller that
 takes no time. It is told twice: of the plant alone, and of the plant in its world, with the
-friction of its joints and the forces on it, where it moves as in the run to the last bit. All in
+friction of its joints, the forces on it and what its force sensor feels at each tick, where it
+moves as in the run to the last bit. All in
 one process, in turns and in processor time, as the machine's pace changes from hour to hour; a
 fixed piece of work tells it.
 
@@ -27,6 +28,7 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario
 from experiments.simulation import configure
+from pfsc_drake.systems.plants.joint_reaction import JointReaction
 from pfsc_drake.systems.plants.link_pushes import LinkPushes
 from pfsc_drake.yaml.typed import load_file
 
@@ -125,6 +127,16 @@ def _replay(
             part.connect_pushes(builder, pushes, forces.get("wrench_ext"), joint_state)
         elif forces:
             part.connect_wrench(builder, forces["wrench_ext"], joint_state)
+        if settings.needs_sensor:
+            states = {"joint_state": joint_state, "true_joint_state": joint_state}
+            mount = part.sensor_mount(builder, settings.sensor.joint, states | forces)
+            reaction = mount.reaction
+            if mount.index is not None:
+                joint = builder.AddSystem(JointReaction(mount.index))
+                builder.Connect(reaction, joint.get_input_port())
+                reaction = joint.get_output_port()
+            felt = builder.AddSystem(ZeroOrderHold(period, reaction.size()))
+            builder.Connect(reaction, felt.get_input_port())
     diagram: Diagram = builder.Build()
 
     def start() -> Simulator:
