@@ -1,6 +1,7 @@
 """One builder of stations: a robot, a task and surroundings, each chosen independently."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path as FilePath
 
@@ -56,6 +57,7 @@ def build_station(
     like: Station | None = None,
     *,
     with_slope: bool = False,
+    parametric: bool = False,
 ) -> Station:
     """Build the station of a scenario.
 
@@ -67,6 +69,8 @@ def build_station(
             task and its start are taken.
         with_slope: Whether a workpiece that is pressed on is a spring, with the stiffness that
             contact has there, and the plant continuous.
+        parametric: Whether mass and stiffness parameters of the believed robot, a serial chain,
+            are symbols: such a station is not simulated, but its blocks' networks differentiated.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -79,6 +83,9 @@ def build_station(
     workpiece, mounting = _workpiece(scenario, task), make_mounting(scenario, task)
     spring = _spring(scenario, workpiece) if with_slope else None
     part = _add_robot(builder, scenario, folder, workpiece if spring is None else None)
+    if parametric:
+        assert isinstance(part, Arm)
+        part = replace(part, belief=part.belief.with_symbols())
     task.require_joints(part.robot.dimension)
     believed = part.belief.robot
     begin = cache(

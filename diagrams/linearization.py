@@ -83,6 +83,7 @@ class PeriodDerivative:
         self._map = one_period
         self._blocks = [s for s in diagram.GetSystems() if isinstance(s, BlockSystem)]
         self._slopes = [NetworkSlope(system.network) for system in self._blocks]
+        self._parametric: list[NetworkSlope] = []
         self._memory = [one_period.rows(system) for system in self._blocks]
         self._states = [
             {name: rows[part] for name, part in system.states.items()}
@@ -108,11 +109,26 @@ class PeriodDerivative:
             and all(name in self._blocks[k].network.shown for k, name in self._leading)
         )
 
+    @property
+    def can_be_parametrized(self) -> bool:
+        """Whether what blocks do at a tick moves nothing else before the next."""
+        return self._is_led_by_states
+
+    def parametrize(self, diagram: Diagram) -> None:
+        """Take blocks that depend on parameters, for :meth:`at`.
+
+        Args:
+            diagram: The same but that its blocks have parameters.
+        """
+        found = (diagram.GetSubsystemByName(system.get_name()) for system in self._blocks)
+        self._parametric = [NetworkSlope(system.network) for system in found]
+
     def at(
         self,
         section: Context,
         chosen: np.ndarray | None = None,
         rest: Sequence[RestSlope] = (),
+        parameters: Mapping[str, float] | None = None,
     ) -> SectionDerivative:
         """Return the derivative at a section.
 
@@ -122,24 +138,29 @@ class PeriodDerivative:
                 of what blocks remember and never tell are left zero. A column without a slope, that
             of a flag or a limit that is just reached, is zero.
             rest: What is not the blocks', if it is known: of a diagram whose blocks alone differ.
+            parameters: Values for the parameters of :meth:`parametrize`, instead of the blocks'
+                own. Where other parameters change what the rest is led by, they are not enough.
         """
-        A, start, made = np.eye(self._map.size), section, []
+        A: np.ndarray | None = None
+        start, made = section, []
         for interval in range(self._intervals):
             tick = self._free.next_tick(start)
             if rest and self._is_led_by_states:  # what is no block arrives where it did
-                points = self._points(start, rest[interval].given, tick)
+                points = self._points(start, rest[interval].given, tick, parameters)
                 made.append(rest[interval])
             else:
                 self._free.approach(start)
                 sampled = self._free.as_sampled()
                 given = self._given_at(sampled)
-                points = self._points(sampled, given, tick)
+                points = self._points(sampled, given, tick, parameters)
                 made.append(rest[interval] if rest else self._slope_of_rest(start, sampled, given))
             wanted = chosen if self._intervals == 1 else None
-            A = self._joined(points, made[-1], tick, wanted) @ A
+            step = self._joined(points, made[-1], tick, wanted)
+            A = step if A is None else step @ A
             if interval + 1 < self._intervals:
                 self._free.pass_tick()
                 start = self._free.context.Clone()
+        assert A is not None  # there is an interval
         wires = self._wires(points)
         return SectionDerivative(A if chosen is None else A[np.ix_(chosen, chosen)], made, wires)
 
@@ -205,14 +226,19 @@ class PeriodDerivative:
         ]
 
     def _points(
-        self, root: Context, given: Sequence[Mapping[str, np.ndarray]], time: float
+        self,
+        root: Context,
+        given: Sequence[Mapping[str, np.ndarray]],
+        time: float,
+        parameters: Mapping[str, float] | None = None,
     ) -> list[SlopeAt]:
         """Return the derivatives of all blocks at a tick that is not made yet."""
         points = []
-        for system, slope, u in zip(self._blocks, self._slopes, given, strict=True):
+        slopes = self._slopes if parameters is None else self._parametric
+        for system, slope, u in zip(self._blocks, slopes, given, strict=True):
             own = system.GetMyContextFromRoot(root)
             x = {name: system.state(own, name) for name in system.states}
-            points.append(slope.at(x, u, last_tick(time, system.period)))
+            points.append(slope.at(x, u, last_tick(time, system.period), parameters))
         return points
 
     def _slope_of_rest(

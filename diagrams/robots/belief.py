@@ -9,6 +9,8 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.parametric_chain import ParametricChain, chain_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
 
 
@@ -30,6 +32,17 @@ class Belief:
     def friction(self) -> np.ndarray:
         """Coulomb and viscous friction in units of the true ones, shape (2, N)."""
         return self.error.friction
+
+    def with_symbols(self) -> "Belief":
+        """Return the belief with symbols for the parameters of its robot, a serial chain."""
+        assert isinstance(self.robot, SerialChain)
+        return replace(self, robot=ParametricChain.of(self.robot))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of these symbols, by name."""
+        assert isinstance(self.robot, SerialChain)
+        return chain_parameters(self.robot)
 
     def tool_load(self, load: ToolLoad) -> ToolLoad:
         """Return what is believed to be behind a force/torque sensor.

@@ -118,7 +118,7 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
         return []
     damping = np.array(parameters.boundary_layer_damping)
     # rigid joints among elastic ones have nothing to damp
-    stiffness = np.where(np.isfinite(robot.K_s), robot.K_s, 0.0)
+    stiffness = np.where(robot.elastic_joints, robot.K_s, 0.0)
     rate = float(np.max(stiffness * damping * parameters.sampling_time / robot.D_M))
     if rate <= _FASTEST_DAMPING * (1.0 + 1e-9):
         return []

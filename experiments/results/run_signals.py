@@ -127,7 +127,7 @@ def _add_joints(log: RunLog, station: Station, state: np.ndarray, law: np.ndarra
     drive = law[:, station.law.layout.drive]
     if station.law.linearization.relative_degree > 1:
         log.add("tau_d", drive, limits=station.law.limits)
-    elastic = np.isfinite(chain.K_s)
+    elastic = chain.elastic_joints
     if elastic.any():
         K_s, K_d = chain.K_s[elastic], chain.K_d[elastic]
         tau_J = K_s * (q_M - q_J)[:, elastic] + K_d * (v_M - v_J)[:, elastic]
@@ -150,7 +150,7 @@ def _add_joint_state(log: RunLog, station: Station, state: np.ndarray, suffix: s
         "v_J": station.robot.gather("velocity_limit"),
     }
     names = ["q_J", "v_J"]
-    if np.isfinite(station.robot.K_s).any():  # motors of rigid joints move as the links do
+    if station.robot.elastic_joints.any():  # motors of rigid joints move as the links do
         names += ["q_M", "v_M"]
     for name, values in zip(names, np.hsplit(state, 4), strict=False):
         log.add(f"{name}{suffix}", values, limits=limits.get(f"{name}{suffix}"))

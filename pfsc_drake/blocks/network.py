@@ -16,8 +16,8 @@ class Source(NamedTuple):
     """Where an argument comes from.
 
     Attributes:
-        kind: ``input``, ``state``, ``wire`` or ``tick``.
-        name: Which.
+        kind: ``input``, ``state``, ``wire``, ``tick`` or ``parameter``.
+        name: Which; of several parameters as one vector all names, with blanks between them.
     """
 
     kind: str
@@ -25,6 +25,8 @@ class Source(NamedTuple):
 
 
 TICK = Source("tick", "tick")
+# symbols that no argument brings are parameters
+_FREE = {"allow_free": True}
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,7 @@ def _renamed(node: Node, prefix: str, fed: Mapping[str, Source]) -> Node:
         fed[source.name]
         if source.kind == "input"
         else source
-        if source is TICK or source.kind == "tick"
+        if source.kind in ("tick", "parameter")
         else Source(source.kind, f"{prefix}.{source.name}")
         for source in node.sources
     )
@@ -266,6 +268,8 @@ def _nodes(
     whole = ca.Function(f"{type(block).__name__}_{method}", list(known.values()), results)
     arguments: list[Any] = list(known.values())
     expanded = _expanded(whole) if block.expands else None
+    if expanded is None:
+        _refuse_parameters(whole)
     if expanded is not None:
         whole = expanded
         arguments = [ca.SX.sym(source.name, *symbol.shape) for source, symbol in known.items()]
@@ -296,13 +300,25 @@ def _node(
     """Return one function of some results, of the arguments that they need."""
     used = [i for i in range(len(sources)) if any(needs[row, i] for row in rows)]
     chosen = ca.cse([results[row] for row in rows])
-    function = ca.Function(title, [arguments[i] for i in used], chosen)
-    return Node(function, tuple(sources[i] for i in used), tuple(names[row] for row in rows))
+    given, sources = [arguments[i] for i in used], [sources[i] for i in used]
+    function = ca.Function(title, given, chosen, _FREE)
+    if function.has_free():
+        parameters = function.free_sx()
+        function = ca.Function(title, [*given, ca.vertcat(*parameters)], chosen)
+        sources.append(Source("parameter", " ".join(p.name() for p in parameters)))
+    return Node(function, tuple(sources), tuple(names[row] for row in rows))
 
 
 def _expanded(function: ca.Function) -> ca.Function | None:
     """Return a function of scalars, or None if there is none."""
     try:
-        return function.expand()
+        return function.expand(function.name(), _FREE)
     except RuntimeError:
         return None
+
+
+def _refuse_parameters(function: ca.Function) -> None:
+    """Refuse symbols that are no arguments where they cannot become some."""
+    for inner in function.find_functions():
+        if inner.has_free():
+            raise ValueError(f"{function.name()}: {inner.name()} has parameters without values")

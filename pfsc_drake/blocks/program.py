@@ -276,6 +276,8 @@ class Program:
             return self._states[source.name]
         if source.kind == "input":
             return self._u[source.name]
+        if source.kind == "parameter":  # which has no value in a simulation
+            return ca.MX.nan(len(source.name.split()))
         return self._t if source == TICK else wires[source.name]
 
     def _needs_of(self, node: Node, *, at_start: bool) -> Needs:
@@ -289,6 +291,8 @@ class Program:
     def _source_needs(self, source: Source, *, at_start: bool) -> Needs:
         if source.kind == "wire":
             return self._needs_of(self._maker[source.name], at_start=at_start)
+        if source.kind == "parameter":
+            return frozenset()
         if source.kind != "state":
             return frozenset({source})
         if at_start and source.name in self._starter:
@@ -300,7 +304,7 @@ class Program:
         for source in node.sources:
             if source.kind == "wire":
                 needs |= self._needs_of(self._maker[source.name], at_start=True)
-            else:
+            elif source.kind != "parameter":
                 needs.add(source)
         return frozenset(needs)
 

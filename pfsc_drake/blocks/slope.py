@@ -34,17 +34,29 @@ class NetworkSlope:
         self.order = ordered(network.nodes)
         self._jacobians: dict[int, ca.Function] = {}
 
-    def at(self, x: Mapping[str, np.ndarray], u: Mapping[str, np.ndarray], t: float) -> "SlopeAt":
+    def at(
+        self,
+        x: Mapping[str, np.ndarray],
+        u: Mapping[str, np.ndarray],
+        t: float,
+        parameters: Mapping[str, float] | None = None,
+    ) -> "SlopeAt":
         """Return the derivative at a tick.
 
         Args:
             x: States by name.
             u: Inputs by name.
             t: Number of the tick.
+            parameters: Values of the parameters by name, if the network has some.
         """
         known = {Source("state", name): value for name, value in x.items()}
         known |= {Source("input", name): value for name, value in u.items()}
         known[TICK] = np.array([t])
+        values = parameters or {}
+        for node in [*self.order, *self.network.updates]:
+            for source in node.sources:
+                if source.kind == "parameter" and source not in known:
+                    known[source] = np.array([values[name] for name in source.name.split()])
         for node in self.order:
             results = node.function.call([ca.DM(known[source]) for source in node.sources])
             for name, value in zip(node.results, results, strict=True):
@@ -59,11 +71,11 @@ class NetworkSlope:
             known: Its arguments.
         """
         if id(node) not in self._jacobians:
-            self._jacobians[id(node)] = node.function.jacobian()
+            self._jacobians[id(node)] = _jacobian(node)
         arguments = [ca.DM(known[source]) for source in node.sources]
         nothing = [ca.DM(*node.function.size_out(i)) for i in range(node.function.n_out())]
         blocks = [block.full() for block in self._jacobians[id(node)].call(arguments + nothing)]
-        n = len(node.sources)
+        n = len(_variables(node))
         for column in range(n):
             for k in np.flatnonzero(_unknown(blocks[column::n])):
                 difference = _difference(node.function, arguments, column, int(k))
@@ -137,9 +149,27 @@ class SlopeAt:
             return
         jacobian = dict(zip(node.results, self.slope.jacobian(node, self.known), strict=True))
         for name, rows in weights.items():
-            for source, block in zip(node.sources, jacobian[name], strict=True):
+            for source, block in zip(_variables(node), jacobian[name], strict=True):
                 if block.any():
                     _add(found, source, rows @ block)
+
+
+def _variables(node: Node) -> list[Source]:
+    """Return the sources that a node is differentiated by."""
+    return [source for source in node.sources if source.kind != "parameter"]
+
+
+def _jacobian(node: Node) -> ca.Function:
+    """Return a function of arguments and results like CasADi's own, by no parameter."""
+    function, n = node.function, len(_variables(node))
+    if n == function.n_in():
+        return function.jacobian()
+    arguments, results = function.sx_in(), function.sx_out()
+    y, x = ca.vertcat(*function.call(arguments)), ca.vertcat(*arguments[:n])
+    rows = np.cumsum([0, *(function.numel_out(i) for i in range(function.n_out()))]).tolist()
+    columns = np.cumsum([0, *(function.numel_in(i) for i in range(n))]).tolist()
+    blocks = ca.blocksplit(ca.jacobian(y, x), rows, columns)
+    return ca.Function("jacobian", [*arguments, *results], [b for row in blocks for b in row])
 
 
 def _unknown(blocks: list[np.ndarray]) -> np.ndarray:

@@ -10,6 +10,9 @@ from pfsc_drake import jets
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.jets import Jet
 
+# for functions of a robot whose parameters may be symbols, which no argument brings
+MAY_BE_PARAMETRIC = {"allow_free": True}
+
 
 class RobotModel(Protocol):
     """Kinematics and dynamics of a fully actuated robot on jets.
@@ -23,14 +26,24 @@ class RobotModel(Protocol):
         """Number of joints N."""
 
     @property
+    def elastic_joints(self) -> np.ndarray:
+        """Which joints have a finite stiffness, shape (N,) of bool."""
+        return np.isfinite(self.K_s)
+
+    @property
     def is_elastic(self) -> bool:
         """Whether every joint has a finite stiffness."""
-        return bool(np.isfinite(self.K_s).all())
+        return bool(self.elastic_joints.all())
 
     @property
     def is_rigid(self) -> bool:
         """Whether no joint has a finite stiffness."""
-        return not np.isfinite(self.K_s).any()
+        return not self.elastic_joints.any()
+
+    @property
+    def numeric(self) -> "RobotModel":
+        """The robot with numbers for all parameters: itself, unless some are symbols."""
+        return self
 
     @property
     def viscous_damping(self) -> np.ndarray:
@@ -46,6 +59,11 @@ class RobotModel(Protocol):
     def K_s(self) -> np.ndarray:
         """Joint stiffnesses, shape (N,); infinite when rigid."""
         return self.gather("stiffness")
+
+    @property
+    def springs(self) -> ca.SX:
+        """Stiffnesses of the elastic joints and zeros of the rigid ones, shape (N, 1)."""
+        return ca.SX(np.where(self.elastic_joints, self.K_s, 0.0))
 
     @property
     def K_d(self) -> np.ndarray:

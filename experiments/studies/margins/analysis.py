@@ -70,7 +70,9 @@ def analyse(
         raise InputError("the law gives up before its first tick; run the scenario to see why")
     study = _Study(smoothed, folder, true_loop, way, progress, duration)
     errs = smoothed.model_error.is_given or bool(smoothed.controller.model)
-    own = study.build(Error()) if errs else true_loop
+    progress(0.0, "differentiating")
+    study.is_parametric = true_loop.parametrize(smoothed, folder)
+    own = study.build(Error()) if errs or study.is_parametric else true_loop
     looked_at = [way.instants[i] for i in {0, len(way.instants) // 2}]
     study.chosen = own.variables_in_loop([study.section(own, instant) for instant in looked_at])
     nominal, loops = study.case(own, Error(), way.instants)
@@ -146,17 +148,21 @@ class _Study:
     way: Walk
     progress: ProgressListener
     duration: float
+    is_parametric: bool = False
     chosen: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     # what is no block, at the times of instants
     plants: dict[float, Sequence[RestSlope]] = field(default_factory=dict)
 
     def build(self, error: Error) -> StationLoop:
         self.progress(0.0, f"linearizing, {error}")
-        return StationLoop(error.applied_to(self.settings), self.folder, self.walked)
+        erring = error.applied_to(self.settings)
+        if self.is_parametric:
+            return self.walked.believing(erring, self.folder)
+        return StationLoop(erring, self.folder, self.walked)
 
     def section(self, loop: StationLoop, instant: Instant, unknown: float = 0.0) -> Context:
         """Return an instant as a state of a loop's own station, with a payload [kg]."""
-        if loop is self.walked and unknown == 0.0:
+        if loop.station is self.walked.station and unknown == 0.0:
             return instant.section
         section, load = (
             loop.map.adopted(instant.section),

@@ -1,6 +1,7 @@
 """A station's closed loop, linearized over one sampling period."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -13,10 +14,13 @@ from diagrams.builder import build_station
 from diagrams.integration import continuous_modes
 from diagrams.linearization import PeriodDerivative, RestSlope
 from diagrams.one_period_map import OnePeriodMap
+from diagrams.robots.arm import Arm
+from diagrams.robots.arm_model import believe_arm
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.margins.modes import in_loop
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
@@ -47,7 +51,10 @@ class StationLoop:
         drives: Variables that hold what the drives are told, shape (N,).
         drives_are_servos: Whether these are velocities for servos that sample faster, not torques.
         spring: What the tool presses on, if it does: a spring in place of contact.
+        parameters: What is believed instead of the station's own, by name, see :meth:`believing`.
     """
+
+    parameters: Mapping[str, float] | None = None
 
     def __init__(self, settings: Scenario, folder: Path, like: "StationLoop | None" = None) -> None:
         # blocks as one are simulated three times as fast
@@ -62,6 +69,48 @@ class StationLoop:
         plant = self.map.rows(self.station.part.plant)
         self.derivative = PeriodDerivative(self.map, diagram, self.configure, plant)
         self.drives, self.drives_are_servos = self._find_drives()
+
+    def parametrize(self, settings: Scenario, folder: Path) -> bool:
+        """Make what the controller does a function of mass and stiffness parameters, if it can be.
+
+        It can where a serial arm is led by torques that depend on these by expressions alone; not
+        where poles, servos or a force sensor's compensation are calculated of them beforehand.
+
+        Args:
+            settings: The scenario, with another belief as the case may be.
+            folder: Where its relative file names start.
+
+        Returns:
+            Whether :meth:`believing` can be called.
+        """
+        law = settings.controller.law
+        gains = settings.controller.gains.get(law)
+        of_numbers = (
+            settings.needs_sensor
+            or RELATIVE_DEGREE[law] == 1
+            or gains is None
+            or gains.is_automatic
+            or not isinstance(self.station.part, Arm)
+        )
+        if of_numbers or not (self.rest_is_physics and self.derivative.can_be_parametrized):
+            return False
+        settings = replace(settings, simulation=replace(settings.simulation, fused=True))
+        twin = build_station(settings, folder, like=self.station, with_slope=True, parametric=True)
+        self.derivative.parametrize(twin.diagram)
+        return True
+
+    def believing(self, settings: Scenario, folder: Path) -> "StationLoop":
+        """Return the loop of a controller that believes something else.
+
+        Args:
+            settings: The scenario of :meth:`parametrize` but for mass and stiffness parameters.
+            folder: Where its relative file names start.
+        """
+        part = self.station.part
+        assert isinstance(part, Arm)  # others are not parametrized
+        other = copy(self)
+        other.parameters = believe_arm(part.true, settings, folder)[0].parameters
+        return other
 
     def configure(self, simulator: Simulator) -> None:
         """Let a simulator integrate as the map does.
@@ -176,7 +225,8 @@ class StationLoop:
         core[self.drives] = True
         found = core
         for section in sections:
-            changes = np.abs(self.derivative.at(section).A) > _ROUNDING
+            slope = self.derivative.at(section, parameters=self.parameters)
+            changes = np.abs(slope.A) > _ROUNDING
             found = found | in_loop(changes, core)
         return np.flatnonzero(found)
 
@@ -235,7 +285,7 @@ def linearize(
     Returns:
         The linear loop; None if the law goes to its safe state there.
     """
-    slope = loop.derivative.at(section, chosen, rest)
+    slope = loop.derivative.at(section, chosen, rest, loop.parameters)
     if any(told.any() for name, told in slope.wires.items() if name.endswith(_FAULT)):
         return None
     return LinearLoop(slope.A, np.searchsorted(chosen, loop.drives), slope.rest)

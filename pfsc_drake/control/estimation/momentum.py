@@ -17,7 +17,7 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import kept_if_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.filters import SignalDerivatives
-from pfsc_drake.robot.robot_model import RobotModel, gravity_torque
+from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, gravity_torque
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,7 @@ class MomentumModel:
             ca.cse([ca.densify(self.momentum), ca.densify(self.forces)]),
             ["state"],
             ["momentum", "forces"],
+            MAY_BE_PARAMETRIC,
         )
 
 
@@ -115,7 +116,7 @@ def drive_momentum(robot: RobotModel) -> MomentumModel:
     Args:
         robot: The robot; any of its N joints may be elastic.
     """
-    elastic, state = np.isfinite(robot.K_s), ca.SX.sym("state", 4 * robot.dimension)
+    elastic, state = robot.elastic_joints, ca.SX.sym("state", 4 * robot.dimension)
     v_M = ca.vertsplit(state, robot.dimension)[3]
     momentum, forces = robot.D_M * v_M, -ca.DM(robot.viscous_damping) * v_M
     p_E, beta = _links(robot, state)
@@ -142,10 +143,10 @@ def link_momentum(robot: RobotModel) -> MomentumModel:
     Args:
         robot: The robot; any of its N joints may be elastic.
     """
-    rigid, state = ~np.isfinite(robot.K_s), ca.SX.sym("state", 4 * robot.dimension)
+    rigid, state = ~robot.elastic_joints, ca.SX.sym("state", 4 * robot.dimension)
     v_M = ca.vertsplit(state, robot.dimension)[3]
     p_E, beta = _links(robot, state)
-    rotors = ca.DM(rigid * robot.D_M) * v_M
+    rotors = ca.DM(1.0 * rigid) * robot.D_M * v_M
     damping = ca.DM(rigid * robot.viscous_damping) * v_M
     return MomentumModel(
         state,
@@ -169,8 +170,8 @@ def _links(robot: RobotModel, state: ca.SX) -> tuple[ca.SX, ca.SX]:
 def _joint_torque(robot: RobotModel, state: ca.SX) -> ca.SX:
     """Return ``tau_J`` (2.66) of the elastic joints, zero for the rigid ones, (N, 1)."""
     q_J, v_J, q_M, v_M = ca.vertsplit(state, robot.dimension)
-    elastic = np.isfinite(robot.K_s)
-    K_s, K_d = (ca.sparsify(ca.DM(np.where(elastic, K, 0.0))) for K in (robot.K_s, robot.K_d))
+    K_s, K_d = ca.sparsify(robot.springs), ca.DM(np.where(robot.elastic_joints, robot.K_d, 0.0))
+    K_d = ca.sparsify(K_d)
     return K_s * (q_M - q_J) + K_d * (v_M - v_J)
 
 

@@ -98,7 +98,7 @@ def singular_perturbation(
         _refuse(robot, "singular_perturbation")
     D_E = robot.mass_matrix(state.q_J)
     n_E = _link_torque(robot, [state.q_J, state.v_J, ca.SX(robot.dimension, 1)], 0)
-    tau_J_rate = np.where(np.isfinite(robot.K_s), robot.K_s, 0.0) * (state.v_M - state.v_J)
+    tau_J_rate = robot.springs * (state.v_M - state.v_J)
     fast = -ca.DM(boundary_layer_damping) * tau_J_rate
     return DrivenMotion(
         [state.q_J, state.v_J],
@@ -132,7 +132,7 @@ def visco_elastic(robot: RobotModel, state: DriveState, sampling_time: float) ->
         sampling_time: Sampling time ``T_s`` of the controller [s].
     """
     _require_elastic(robot, "visco_elastic")
-    K_s, K_d, D_M = ca.DM(robot.K_s), ca.DM(robot.K_d), ca.DM(robot.D_M)
+    K_s, K_d, D_M = ca.SX(robot.K_s), ca.DM(robot.K_d), ca.SX(robot.D_M)
     tau_J = K_s * (state.q_M - state.q_J) + K_d * (state.v_M - state.v_J)
     D_E = robot.mass_matrix(state.q_J)
     a_J = _link_acceleration(robot, state, D_E, tau_J)
@@ -169,7 +169,7 @@ def elastic(robot: RobotModel, state: DriveState, sampling_time: float) -> Drive
         sampling_time: Sampling time ``T_s`` of the controller [s]; 0 gives (3.65) as printed.
     """
     _require_elastic(robot, "elastic")
-    K_s, D_M = ca.DM(robot.K_s), ca.DM(robot.D_M)
+    K_s, D_M = ca.SX(robot.K_s), ca.SX(robot.D_M)
     tau_J = K_s * (state.q_M - state.q_J)
     tau_J_rate = K_s * (state.v_M - state.v_J)
     D_E = robot.mass_matrix(state.q_J)

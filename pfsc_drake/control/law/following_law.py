@@ -25,7 +25,7 @@ from pfsc_drake.control.law.posture import Posture
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
 
 
 class LawLayout:
@@ -180,6 +180,7 @@ class FollowingLaw:
             ca.cse([ca.densify(ca.vertcat(*result))]),
             list(u._fields),
             ["result"],
+            MAY_BE_PARAMETRIC,
         )
 
     @cached_property

@@ -12,7 +12,7 @@ from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import Manifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel
 
 RELATIVE_DEGREE = {
     "velocity_servo": 1,
@@ -156,6 +156,7 @@ def _linearizing_function(
         [ca.densify(e) for e in ca.cse(results)],
         ["state", "tau_ext", "manifold_point", *(["progress"] if manifold.follows_time else [])],
         ["Y", "A", "b", "gain", "drift", "offset", "motion"],
+        MAY_BE_PARAMETRIC,
     )
 
 

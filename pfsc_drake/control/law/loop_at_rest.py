@@ -67,7 +67,7 @@ class LoopAtRest:
     ) -> None:
         n = robot.dimension
         self._robot, self._n, self._period = robot, n, period
-        self._elastic = np.isfinite(robot.K_s)
+        self._elastic = robot.elastic_joints
         self._D_E, g, self._G = (np.array(x) for x in _dynamics_at_rest(robot)(rest.q_J))
         self._lead = linearization.lead
         q_M = rest.q_J + g.ravel() / robot.K_s

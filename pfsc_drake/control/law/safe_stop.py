@@ -117,7 +117,8 @@ class SafeStop(Block):
         self, robot: RobotModel, limits: np.ndarray, settings: SafeState, period: float
     ) -> None:
         settings.check(robot.dimension)
-        n = robot.dimension
+        # after a fault nothing is asked by what parameters it would be another
+        n, robot = robot.dimension, robot.numeric
         joints = Joints.of(robot, np.asarray(limits), settings.damping)
         self._start = starting_function(robot, joints, settings.effort_share, period)
         self._step = stopping_step(robot, joints, settings.bandwidth, period)

@@ -94,7 +94,7 @@ class Joints(NamedTuple):
             limits: Of its drives' torques [Nm or N], shape (N,).
             damping: Of every drive at least [Nm s/rad or N s/m], shape (N,).
         """
-        elastic = np.isfinite(robot.K_s)
+        elastic = robot.elastic_joints
         stiffness = np.where(elastic, robot.K_s, 0.0)
         compliance = np.where(elastic, 1.0 / robot.K_s, 0.0)
         constants = (stiffness, compliance, robot.D_M, robot.viscous_damping, limits, damping)

@@ -12,7 +12,7 @@ from pfsc_drake.blocks.cases import any_of, first_of, is_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
+from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, largest_speeds
 
 # 1/s, by which differences of what is compared are forgotten
 _FORGETTING = 20.0
@@ -150,14 +150,14 @@ def _supervision_function(
 
     The last two results are the next sums and unchanged.
     """
-    n, k_s = robot.dimension, robot.K_s
+    n = robot.dimension
     names = ("state", "last", "sums", "unchanged")
     state, last, total, steady = (ca.SX.sym(name, 4 * n) for name in names)
     known, ignored = ca.SX.sym("known"), ca.SX.sym("ignored", 4 * n)
     speed = robot.gather("velocity_limit")
     speed = np.where(np.isfinite(speed), speed, 0.0)
     tolerance = parameters.tolerance + 2.0 * (speed * parameters.filter_time + resolution)
-    bending = np.where(np.isfinite(k_s), _BENDING * np.minimum(limits, 1e300) / k_s, 0.0)
+    bending = robot.elastic_joints * _BENDING * np.minimum(limits, 1e300) / robot.K_s
     now, before, sums = (ca.vertsplit(x, n) for x in (state, last, total))
     unchanged = where(state == last, steady + known, 0.0)
     rests = ca.vertsplit(unchanged, n)
@@ -218,6 +218,7 @@ def _supervision_function(
         ca.cse([ca.densify(ca.SX(result)) for result in results]),
         [*names, "known", "ignored"],
         ["fault", "suspects", "next_sums", "next_unchanged"],
+        MAY_BE_PARAMETRIC,
     )
 
 

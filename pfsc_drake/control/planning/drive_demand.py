@@ -133,7 +133,7 @@ def _demand_function(
         velocity, acceleration = velocity + tau_J[1] / K_s, acceleration + tau_J[2] / K_s
     elif law == "singular_perturbation":
         assert boundary_layer_damping is not None  # the law has refused that
-        elastic = np.isfinite(robot.K_s)
+        elastic = robot.elastic_joints
         fast = -ca.DM(np.where(elastic, boundary_layer_damping, 0.0)) * tau_J[1]
     damping = robot.viscous_damping + (np.zeros(n) if viscous is None else viscous)
     torque = tau_J[0] + ca.DM(robot.D_M) * acceleration + ca.DM(damping) * velocity + fast

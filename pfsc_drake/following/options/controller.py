@@ -173,6 +173,11 @@ class LawGains:
     phi: GainParameters = dc.field(default_factory=GainParameters)
     posture: GainParameters = dc.field(default_factory=GainParameters)
 
+    @property
+    def is_automatic(self) -> bool:
+        """Whether any poles are to be chosen."""
+        return any(gains.is_automatic for gains in (self.eta, self.xi, self.phi, self.posture))
+
     def __post_init__(self) -> None:
         integral = self.posture.integral or self.posture.integral_pole
         require(integral == 0.0, "posture", integral, "gains without an integral part")

@@ -16,9 +16,9 @@ from pfsc_drake.jets import Jet
 from pfsc_drake.robot.serial.links import ChainLink, Linkage
 
 
-def _symbolic(array: np.ndarray | float) -> ca.SX:
-    """Return a constant as an expression whose zeros are structural."""
-    return ca.SX(ca.sparsify(ca.DM(array)))
+def _symbolic(array: np.ndarray | float | ca.SX) -> ca.SX:
+    """Return a constant as an expression whose zeros are structural; symbols as they are."""
+    return array if isinstance(array, ca.SX) else ca.SX(ca.sparsify(ca.DM(array)))
 
 
 @dataclass(frozen=True)
@@ -188,6 +188,14 @@ def _integrate_rotation(R: ca.SX, w: Jet) -> Jet:
     return jets.solve_ode(rate, R, w.order + 1)
 
 
+def _inertia_about_origin(link: ChainLink) -> ca.SX:
+    """Return :attr:`ChainLink.inertia_about_origin`, also of symbols."""
+    if not isinstance(link.p_LC, ca.SX):
+        return _symbolic(link.inertia_about_origin)
+    S_c = ca.skew(link.p_LC)
+    return link.I_C - link.mass * S_c @ S_c
+
+
 def mass_matrix(chain: Linkage, q: ca.SX) -> ca.SX:
     """Return the link-side mass matrix ``D_E(q)`` (2.65a), shape (N, N), by composite bodies.
 
@@ -201,7 +209,7 @@ def mass_matrix(chain: Linkage, q: ca.SX) -> ca.SX:
     p_PL = [p.coefficients[0] for _, p in poses]
     mass = [link.mass for link in chain.links]
     moment = [_symbolic(link.mass * link.p_LC) for link in chain.links]
-    inertia = [_symbolic(link.inertia_about_origin) for link in chain.links]
+    inertia = [_inertia_about_origin(link) for link in chain.links]
     D = ca.SX(n, n)
     for j in reversed(range(n)):
         axis = _symbolic(chain.links[j].axis)
