@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.results.run_log import RunLog
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.text_file import read_text
+from pfsc_drake.yaml.reading import read_text
 from reporting.folder import open_results
 from reporting.metrics import Metrics
 from reporting.page import Report, report_page, write_report

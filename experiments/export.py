@@ -13,7 +13,7 @@ from experiments.preparation import naming, prepare
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import configure
 from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.codegen.project import write_project
+from pfsc_drake.codegen.export import write_project
 from reporting.progress import ProgressListener
 
 

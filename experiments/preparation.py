@@ -15,9 +15,8 @@ from experiments.integration import choose_integration
 from experiments.results.promises import check_targets
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.dumping import dump_typed
-from pfsc_drake.yaml.files import resolve_files
-from pfsc_drake.yaml.typed import load_typed
+from pfsc_drake.yaml.reading import resolve_files
+from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.progress import ProgressListener
 
 MAX_TICKS = 1_000_000  # of the controller; 1000 s at 1 kHz

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.reading import MAX_DEPTH, parse_yaml, read_yaml
-from pfsc_drake.yaml.text_file import find_status
+from pfsc_drake.yaml.reading import MAX_DEPTH, find_status, parse_yaml, read_yaml
 
 SCENARIO_DIRECTORY = Path(__file__).resolve().parent / "scenarios"
 _MAX_PATH = 4096  # characters

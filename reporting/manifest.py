@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from pfsc_drake.yaml.text_file import find_status
+from pfsc_drake.yaml.reading import find_status
 
 MANIFEST = "manifest.json"
 FIGURES = "figures"

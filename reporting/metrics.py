@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.text_file import read_text
+from pfsc_drake.yaml.reading import read_text
 from reporting.registry import known_metric
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {

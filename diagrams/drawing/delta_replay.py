@@ -9,7 +9,7 @@ from diagrams.drawing.replay import RecordedMotion, add_motion
 from diagrams.drawing.workpiece_drawing import look_down_at
 from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer, turn_scene_over
+from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, turn_scene_over
 
 # m, between the path's lowest point and the grid
 _CLEARANCE = 0.15

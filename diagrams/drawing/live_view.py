@@ -14,11 +14,9 @@ from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import draw_workpiece
 from diagrams.robots.delta import DeltaPart
 from diagrams.station import Station
-from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
-from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
-from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
-from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
+from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer, TrailVisualizer
 
 _WAY = Rgba(0.9, 0.25, 0.1, 1.0)
 _PIECES = 400  # of the tool's way that stay

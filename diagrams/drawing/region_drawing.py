@@ -13,7 +13,7 @@ from diagrams.drawing.manifold_drawing import skin_and_lines
 from diagrams.tasks.fixtures import DrawnFixture
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.systems.drawing.region_visualizer import RegionVisualizer
+from pfsc_drake.systems.drawing.surface_visualizer import RegionVisualizer
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from diagrams.drawing.mounting_drawing import MountingLook, add_mounting_drawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.drawing.workpiece_drawing import add_workpiece_drawing, look_down_at
 from diagrams.workpiece import WorkpieceLook
-from pfsc_drake.systems.drawing.color_scale import signed_color
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
-from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
+from pfsc_drake.systems.drawing.surface_visualizer import signed_color
+from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
 
 # towards the camera if the path is in front of the robot, and its distance beside what is seen
 _VIEW = np.array([0.53, -0.79, 0.31])

@@ -8,7 +8,7 @@ from pydrake.multibody.plant import (
 )
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake.systems.plants.contact_wrench import ContactWrench
+from pfsc_drake.systems.plants.reactions import ContactWrench
 
 
 def add_scene(builder: DiagramBuilder, plant: MultibodyPlant) -> SceneGraph:

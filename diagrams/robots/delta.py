@@ -40,9 +40,8 @@ from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_paramet
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
-from pfsc_drake.systems.plants.contact_wrench import ContactWrench
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
-from pfsc_drake.systems.plants.joint_reaction import reaction_index
+from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 from pfsc_drake.yaml.reading import read_yaml
 

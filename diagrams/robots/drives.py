@@ -16,14 +16,12 @@ from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import safe_state, supervision
-from pfsc_drake.physics.bus_delay import BusDelay
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
-from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
+from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
-from pfsc_drake.systems.physics.joint_friction import JointFriction
+from pfsc_drake.systems.physics.joint_friction import HoldingBrakes, JointFriction
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
 
 # integration schemes of fixed step that the bristles of friction are made for

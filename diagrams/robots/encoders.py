@@ -4,8 +4,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.force_torque_sensor import SensorFailure
 from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
-from pfsc_drake.physics.sensor_failure import SensorFailure
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 

@@ -8,11 +8,10 @@ from diagrams.scenario.checks import require
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor
-from pfsc_drake.physics.sensor_failure import SensorFailure
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor, SensorFailure
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
-from pfsc_drake.systems.plants.joint_reaction import JointReaction
+from pfsc_drake.systems.plants.reactions import JointReaction
 
 # of a sampling interval
 _ROUNDING = 1e-6

@@ -14,7 +14,7 @@ from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
-from pfsc_drake.systems.plants.contact_wrench import ContactWrench
+from pfsc_drake.systems.plants.reactions import ContactWrench
 
 # output ports by what they carry
 Ports = dict[str, OutputPort]

@@ -11,8 +11,8 @@ from pydrake.systems.primitives import Adder, MatrixGain
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
-from pfsc_drake.systems.plants.external_wrench import ExternalWrench
-from pfsc_drake.systems.plants.tool_reaction import ToolReaction
+from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.reactions import ToolReaction
 
 
 def connect_actuation(

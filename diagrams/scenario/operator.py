@@ -4,7 +4,7 @@ import dataclasses as dc
 
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.live_hand import LiveHandParameters
-from pfsc_drake.yaml.files import FILE
+from pfsc_drake.yaml.reading import FILE
 
 
 @dc.dataclass

@@ -14,7 +14,7 @@ from diagrams.scenario.checks import (
 )
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
-from pfsc_drake.yaml.files import FILE
+from pfsc_drake.yaml.reading import FILE
 
 _SHORTEST_TOLERANCE = 1e-7  # m
 TASKS = ("full", "tool_axis", "yaw", "none")

@@ -13,7 +13,7 @@ from diagrams.scenario.checks import (
     require_positive,
 )
 from pfsc_drake.geometry.bore import FEWEST_WEDGES
-from pfsc_drake.physics.mounting_parameters import MountingHandParameters
+from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters
 
 STARTS = ("magazine", "held", "frame")

@@ -14,7 +14,7 @@ from diagrams.scenario.checks import (
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
-from pfsc_drake.yaml.files import FILE, NAME_OR_FILE
+from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
 from pfsc_drake.yaml.typed import ONE_OR_MANY
 
 # what moves a DELTA robot

@@ -29,10 +29,10 @@ from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
-from pfsc_drake.physics.force_profile import ForcePulse
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.joint_encoders import EncoderOptions
-from pfsc_drake.physics.link_hand import LinkHandParameters
+from pfsc_drake.physics.link_forces import LinkHandParameters
+from pfsc_drake.physics.scripted_force import ForcePulse
 
 
 @dc.dataclass

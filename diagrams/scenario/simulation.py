@@ -9,7 +9,7 @@ from diagrams.scenario.checks import (
     require,
     require_between,
 )
-from pfsc_drake.physics.sensor_failure import KINDS
+from pfsc_drake.physics.force_torque_sensor import KINDS
 
 # the integrator that is chosen for a robot before it runs
 AUTO = "auto"

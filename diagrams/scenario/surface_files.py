@@ -10,7 +10,7 @@ from diagrams.scenario.checks import (
 )
 from diagrams.scenario.surface_shapes import Placed, Turned
 from pfsc_drake.geometry.size import FARTHEST
-from pfsc_drake.yaml.files import FILE
+from pfsc_drake.yaml.reading import FILE
 
 _UNITS = ("m", "cm", "mm", "inch")
 _BASES = ("auto", "plane", "cylinder")

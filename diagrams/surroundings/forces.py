@@ -14,11 +14,9 @@ from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.blocks.wiring_blocks import Hold, Sum
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import ToolKinematics
-from pfsc_drake.physics.decoupled_force import DecoupledForce
-from pfsc_drake.physics.force_profile import ForceProfile
-from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.physics.scripted_force import DecoupledForce, ForceProfile, ScriptedForce
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 

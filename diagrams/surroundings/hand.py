@@ -6,7 +6,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.task import Task
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place

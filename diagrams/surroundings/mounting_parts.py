@@ -19,7 +19,7 @@ from pfsc_drake.physics.suction import SuctionGripper, holding_cups
 from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.plants.applied_forces import AppliedForces
+from pfsc_drake.systems.plants.external_forces import AppliedForces
 
 
 def add_mounting(

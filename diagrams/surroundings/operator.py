@@ -10,13 +10,12 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from diagrams.scenario import Scenario
 from diagrams.surroundings.operator_file import columns, read_controls
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, REQUESTS
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import ASKED, LiveHand
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.operator_panel import OperatorPanel
-from pfsc_drake.systems.physics.recorded_controls import RecordedControls
+from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
 
 PULL, REQUEST, REGIONS = (
     slice(0, ASKED),

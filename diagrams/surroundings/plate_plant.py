@@ -27,7 +27,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario.plate import PlateContactParameters, PlateParameters
 from pfsc_drake.geometry.bore import bore_wedges
-from pfsc_drake.systems.plants.partner_forces import PartnerForces
+from pfsc_drake.systems.plants.external_forces import PartnerForces
 
 REST_RADIUS = 2e-3  # m, of the bosses on which a plate lies
 PAD = 0.02, 0.01  # m, side and height of what they lie on

@@ -11,13 +11,11 @@ from diagrams.scenario import ForcePulse, Scenario
 from diagrams.tasks.task import Task
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_profile import ForceProfile
-from pfsc_drake.physics.link_forces import LinkForces
-from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
-from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.physics.link_forces import LinkForces, LinkHand, LinkHandParameters
+from pfsc_drake.physics.scripted_force import ForceProfile, ScriptedForce
 from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.plants.link_pushes import LinkPushes
+from pfsc_drake.systems.plants.external_forces import LinkPushes
 
 
 @dataclass

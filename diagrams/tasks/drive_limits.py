@@ -15,8 +15,14 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.control.planning.course import CourseFinder, CourseStart
-from pfsc_drake.control.planning.drive_demand import DriveDemand, DriveLimits, with_pace
-from pfsc_drake.control.planning.pace import Clock, allowed_demand, find_pace
+from pfsc_drake.control.planning.drive_demand import (
+    Clock,
+    DriveDemand,
+    DriveLimits,
+    allowed_demand,
+    find_pace,
+    with_pace,
+)
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import largest_speeds

@@ -15,8 +15,7 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.coordinate import Kind
-from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics, indices
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference

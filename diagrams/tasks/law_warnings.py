@@ -8,18 +8,18 @@ import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.untold_forces import untold_forces, untold_friction
-from pfsc_drake.control.compliance.bearable_inertia import (
+from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
+from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
     bearable_mass_error,
 )
-from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.following.gains import sampled_robot
+from pfsc_drake.following.law import sampled_robot
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.resonance import joint_resonances
 from pfsc_drake.robot.robot_model import RobotModel

@@ -18,9 +18,9 @@ from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     ProjectionStatus,

@@ -4,12 +4,12 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from diagrams.tasks.law_warnings import least_of, slope_at_rest
-from pfsc_drake.control.compliance.bearable_inertia import (
+from pfsc_drake.control.compliance.taring import TARING_BLOCK
+from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_share,
     carried_share,
     load_inertia,
 )
-from pfsc_drake.control.compliance.taring import TARING_BLOCK
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.coordinate import Kind

@@ -16,7 +16,7 @@ from diagrams.tasks.surface import followed_angles, given_quaternion, require_jo
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
-from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.followed import Guided

@@ -20,7 +20,7 @@ from diagrams.tasks.surface import (
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
-from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix

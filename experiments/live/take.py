@@ -13,7 +13,7 @@ from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.dumping import dump_typed
+from pfsc_drake.yaml.typed import dump_typed
 from reporting.folder import check_folder, open_results
 from reporting.progress import ProgressListener
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.text_file import find_status
+from pfsc_drake.yaml.reading import find_status
 from reporting.registry import SIGNALS, KnownSignal
 
 FloatArray = NDArray[np.float64]

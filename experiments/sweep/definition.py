@@ -10,7 +10,7 @@ from typing import Any
 
 from experiments.sweep.worker import RunRow
 from pfsc_drake.errors import InputError
-from pfsc_drake.yaml.text_file import read_text
+from pfsc_drake.yaml.reading import read_text
 from reporting.folder import ResultsFolder
 
 RECORD = "sweep.json"

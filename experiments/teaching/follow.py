@@ -8,8 +8,8 @@ import numpy as np
 from diagrams.scenario import Scenario
 from experiments.teaching.taught import Taught, TeachingOptions, keeps_orientation
 from pfsc_drake.following.options.controller import LawGains
-from pfsc_drake.yaml.dumping import typed_data
 from pfsc_drake.yaml.reading import TAG_KEY, dump_yaml
+from pfsc_drake.yaml.typed import typed_data
 
 CSV_NAME, YAML_NAME = "taught.csv", "follow.yaml"
 TRANSITION, DWELL = 0.3, 0.5  # s

@@ -22,9 +22,8 @@ from identification.output import write_text
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer
-from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
-from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
+from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
 
 _TRAIL = Rgba(0.9, 0.25, 0.1, 1.0)
 _OBSTACLE = Rgba(0.55, 0.58, 0.62, 0.4)

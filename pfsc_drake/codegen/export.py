@@ -1,5 +1,6 @@
-"""Any diagram of blocks that controls as C99, in one call."""
+"""Any diagram of blocks that controls as a project in C99, in one call."""
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -8,7 +9,6 @@ from pydrake.systems.framework import Diagram
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.codegen.c_controller import CController
-from pfsc_drake.codegen.project import write_project
 from pfsc_drake.systems.fuse import fuse
 
 
@@ -53,3 +53,84 @@ def _recorded(controller: CController, inputs: Mapping[str, np.ndarray]) -> np.n
         parts = [*(given[name] for name in network.inputs), *(told[n] for n in network.outputs)]
         rows.append(np.concatenate([np.ravel(part) for part in parts]))
     return np.array(rows)
+
+
+LOG = "replay.bin"
+_HARNESS = Path(__file__).parent / "harness"
+_README = """\
+# {title}
+
+Generated C99: no allocation, nothing but the mathematical library, no memory but what is in
+`controller_state`.
+
+    controller_state state;
+    controller_initialize(&state, &inputs);               /* once, at rest */
+    fault = controller_step(&state, &inputs, &outputs);   /* every {period:g} s */
+
+A fault other than 0 holds until the next `controller_initialize`; the outputs then stop the robot.
+
+| input | size | unit |
+|---|---|---|
+{inputs}
+
+| output | size | unit |
+|---|---|---|
+{outputs}
+
+The state takes {state} bytes, tables {tables} bytes, the source {source} kB. Made from
+{origin}.
+
+- `make` builds `replay`, `replay_random` and `main_rt`; so does CMake: `cmake -B build && cmake
+  --build build`. Other compilers: `make CC=clang OPTIMIZATION=-O2`, with `-std=c99` or
+  `-ffp-contract=off`.
+- `./replay [LOG]` feeds recorded inputs, those of `replay.bin`, and compares the outputs bit by
+  bit; it prints the time of a step. On another machine the sine may differ in the last place.
+- `./replay_random` feeds wrong inputs: they end in a fault, and what drives are told is finite.
+- `make sanitize` does both with the sanitizers of addresses and undefined behaviour.
+- `./main_rt [SECONDS [LOG]]` steps once per sampling time with deadlines and prints a histogram.
+  Put your drivers into its two functions `read_inputs` and `write_outputs`.
+- `interface.json` says the same as these tables, for programs.
+"""
+
+
+def write_project(
+    controller: CController, folder: Path, recorded: np.ndarray | None = None
+) -> list[Path]:
+    """Write a controller and what goes with it, and return all files.
+
+    Args:
+        controller: The controller.
+        folder: Made if it does not exist.
+        recorded: Inputs, then outputs of each tick of a run, in the order of ``interface.json``,
+            shape (ticks, inputs and outputs), for ``replay.bin``.
+
+    Raises:
+        InputError: If something has no translation to C.
+    """
+    written = controller.write(folder)
+    for file in sorted(_HARNESS.iterdir()):
+        written.append(Path(shutil.copyfile(file, folder / file.name)))
+    if recorded is not None:
+        written.append(folder / LOG)
+        np.ascontiguousarray(recorded, dtype=float).tofile(folder / LOG)
+    source = sum(file.stat().st_size for file in written if file.name.startswith("controller"))
+    readme = folder / "README.md"
+    said = controller.interface()
+    readme.write_text(
+        _README.format(
+            title=controller.title,
+            period=controller.period,
+            inputs=_rows(said["inputs"]),
+            outputs=_rows(said["outputs"]),
+            state=said["state_bytes"],
+            tables=said["table_bytes"],
+            origin=f"`{said['scenario']}`, SHA-256 `{said['hash']}`" if said["hash"] else "blocks",
+            source=round(source / 1000),
+        ),
+        encoding="utf-8",
+    )
+    return [*written, readme]
+
+
+def _rows(ports: list[dict[str, object]]) -> str:
+    return "\n".join(f"| `{p['name']}` | {p['size']} | {p['unit']} |" for p in ports)

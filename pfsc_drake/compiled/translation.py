@@ -9,8 +9,7 @@ import numpy as np
 
 from pfsc_drake.compiled.assembly import Assembly
 from pfsc_drake.compiled.code import Code, Table, Tables, Value, Values, elements
-from pfsc_drake.compiled.computed_indices import look_up
-from pfsc_drake.compiled.matrix_instructions import projected, translate_instruction
+from pfsc_drake.compiled.matrix_instructions import look_up, projected, translate_instruction
 from pfsc_drake.compiled.operations import Untranslatable, literal
 
 __all__ = ["Translation", "translate"]

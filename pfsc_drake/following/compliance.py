@@ -7,9 +7,12 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from pfsc_drake.control.compliance.impedance import DAMPING, MASS, STIFFNESS, ImpedanceLaw
-from pfsc_drake.control.compliance.impedance_filter import ImpedanceFilter, ManifoldForceTransform
+from pfsc_drake.control.compliance.impedance_filter import (
+    ImpedanceFilter,
+    LedMotion,
+    ManifoldForceTransform,
+)
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance
-from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.compliance.pressing import Pressing
 from pfsc_drake.control.compliance.tuned_impedance import ImpedanceTuner, TuningParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits

@@ -9,8 +9,7 @@ import numpy as np
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
-from pfsc_drake.control.manifolds.manifold import Manifold
-from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.manifold import Manifold, Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.geometry import PiecewisePolynomialCurve

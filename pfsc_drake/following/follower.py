@@ -15,7 +15,7 @@ from pfsc_drake.control.compliance.measured_wrench import MeasuredWrench
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.timed_reference import StreamedReference, TimedReference
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference

@@ -5,8 +5,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from pfsc_drake.control.law.reference import rest_to_rest
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.following.followed import Followed
 from pfsc_drake.following.follower import Follower
 from pfsc_drake.following.options.follower import FollowerOptions

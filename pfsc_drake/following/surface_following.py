@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.followed import Followed

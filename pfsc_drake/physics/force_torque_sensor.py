@@ -1,7 +1,7 @@
-"""A six-axis force/torque sensor in a fixed joint between flange and tool."""
+"""A six-axis force/torque sensor in a fixed joint between flange and tool, and how it fails."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -10,6 +10,9 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
+from pfsc_drake.jets import Jet
+from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.tool_load import ToolLoad, predicted_load
 
 # ticks whose noise is known at once
 NOISE_TICKS = 128
@@ -127,3 +130,100 @@ def _check(key: str, value: np.ndarray, *, positive: bool) -> None:
     if not (fits and np.all(value > 0.0 if positive else value >= 0.0)):
         allowed = "positive" if positive else "finite, not negative"
         raise InputError(f"{key} = {value.tolist()}: must be 6 {allowed} numbers")
+
+
+FailureKind = Literal["nan", "frozen", "jump"]
+KINDS = ("nan", "frozen", "jump")
+
+
+class SensorFailure(Block):
+    """Passes a measurement through until some of its components fail.
+
+    Ports:
+        measured (input): Any vector, shape (size,).
+        delivered (output): The same; from ``time`` on, the failing components are NaN, rest
+            at what they were at the last tick before, or are off by ``jump``.
+
+    State:
+        Where it freezes: the measurement of the ``last`` tick before the failure.
+
+    Args:
+        size: Size of the measurement.
+        indices: Components that fail.
+        time: When they fail [s].
+        period: Of the ticks [s].
+        kind: How: ``nan``, ``frozen`` or ``jump``.
+        jump: By how much a jumping one is off.
+
+    Raises:
+        InputError: If the kind is not known.
+    """
+
+    def __init__(
+        self,
+        size: int,
+        indices: list[int],
+        time: float,
+        period: float,
+        kind: str = "nan",
+        jump: float = 0.0,
+    ) -> None:
+        if kind not in KINDS:
+            raise InputError(f"kind of a sensor's failure: {kind!r}; must be {', '.join(KINDS)}")
+        self._fails = np.zeros(size)
+        self._fails[indices] = 1.0
+        self._time, self._period, self._kind, self._jump = time, period, kind, jump
+        self.inputs, self.outputs = {"measured": Port(size)}, {"delivered": Port(size)}
+        self.states = {"last": size} if kind == "frozen" else {}
+
+    def initial(self, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"last": u.measured} if self.states else {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        wrong = u.measured + self._jump
+        if self._kind == "nan":
+            wrong = np.nan
+        elif self._kind == "frozen":
+            wrong = x.last
+        return {"delivered": where(ca.DM(self._fails) * self._has_failed(t), wrong, u.measured)}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """See :class:`Block`."""
+        return {"last": where(self._has_failed(t), x.last, u.measured)} if self.states else {}
+
+    def _has_failed(self, t: Any) -> Any:
+        return t * self._period >= self._time
+
+
+def tool_reaction_function(robot: RobotModel, load: ToolLoad) -> ca.Function:
+    """Return what the joint between flange and tool exerts on the tool.
+
+    By Newton and Euler on the tool alone: the opposite of :func:`predicted_load` and of the
+    wrench that acts on the tool, moved to the sensor's origin.
+
+    Args:
+        robot: The robot.
+        load: Everything behind the sensor.
+
+    Returns:
+        ``(q, v, a, wrench) -> reaction``: link coordinates, velocities, accelerations, each
+        (N,); wrench ``[force, torque]`` at the tool point in world axes, shape (6,); reaction
+        ``[torque, force]`` on the tool in S, shape (6,) [Nm, N].
+    """
+    n = robot.dimension
+    q, v, a = (ca.SX.sym(name, n) for name in "qva")
+    wrench = ca.SX.sym("wrench", 6)
+    joints = [Jet.from_derivatives([q[i], v[i], a[i]]) for i in range(n)]
+    predicted, R_WS = predicted_load(robot, load, joints)
+    force, torque = R_WS.T @ wrench[:3], R_WS.T @ wrench[3:]
+    total = predicted + ca.vertcat(force, torque + ca.cross(ca.SX(load.p_ST), force))
+    reaction = -ca.vertcat(total[3:], total[:3])
+    return ca.Function(
+        "tool_reaction",
+        [q, v, a, wrench],
+        ca.cse([ca.densify(reaction)]),
+        ["q", "v", "a", "wrench"],
+        ["reaction"],
+    )

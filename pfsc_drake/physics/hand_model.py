@@ -1,4 +1,4 @@
-"""A human hand on the tool: a spring-damper towards a moving target, that may turn it too."""
+"""A human hand on the tool: a spring-damper towards a moving target that wanders."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,10 +8,54 @@ import numpy as np
 
 from pfsc_drake.blocks.cases import where
 from pfsc_drake.errors import InputError, require
-from pfsc_drake.physics.force_profile import FRAMES, smooth_step
-from pfsc_drake.physics.hand_orientation import OrientationTarget, rotation_vector
-from pfsc_drake.physics.hand_way import HandWay, Place
-from pfsc_drake.physics.wandering import Wander
+from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place, rotation_vector
+from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
+
+
+@dataclass
+class Wander:
+    """A hand that goes here and there within a box, as an operator may who tries everything.
+
+    Attributes:
+        low: Lower corner of the box, in the hand's frame, shape (3,) [m].
+        high: Upper corner, shape (3,) [m].
+        begin: When it takes hold [s].
+        end: Until when it goes on [s].
+        shortest: Shortest time between places [s].
+        longest: Longest time between them [s].
+    """
+
+    low: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    high: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    begin: float = 0.0
+    end: float = 1.0
+    shortest: float = 0.2
+    longest: float = 1.0
+
+    def __post_init__(self) -> None:
+        self.low, self.high = (np.asarray(x, dtype=float) for x in (self.low, self.high))
+        corners = [self.low.tolist(), self.high.tolist()]
+        box = self.low.shape == self.high.shape == (3,) and bool(np.all(self.low <= self.high))
+        require(box, "low, high", corners, "3 numbers each, none of low above that of high")
+        times = [self.begin, self.end]
+        later = bool(np.isfinite(times).all()) and self.begin < self.end
+        require(later, "begin, end", times, "finite numbers, the end after the begin")
+        between = [self.shortest, self.longest]
+        positive = 0.01 <= self.shortest <= self.longest < np.inf
+        require(positive, "shortest, longest", between, "0.01 s or more, the longest the longer")
+
+    def places(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return times [s], shape (k,), ascending, and places [m], shape (k, 3).
+
+        Args:
+            seed: Of the random numbers.
+        """
+        random = np.random.default_rng(seed)
+        count = 2 + int((self.end - self.begin) / self.shortest)
+        times = self.begin + np.cumsum(random.uniform(self.shortest, self.longest, count))
+        times = np.concatenate([[self.begin], times[times < self.end]])
+        return times, random.uniform(self.low, self.high, (len(times), 3))
+
 
 _FARTHEST = 1e4  # m
 _LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float

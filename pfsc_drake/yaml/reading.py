@@ -8,13 +8,104 @@ A document may have MAX_NODES values and keys once its aliases are copies, and M
 both are counted before anything is copied.
 """
 
+import dataclasses
+import os
+import stat
 from pathlib import Path
 from typing import Any, NoReturn
 
 import yaml
 
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.yaml.text_file import read_text
+
+MAX_BYTES = 1_000_000  # of a YAML file
+
+
+def find_status(path: Path) -> os.stat_result | None:
+    """Returns what the system knows of a path; None if there is no such file, or cannot be."""
+    try:
+        return path.stat()
+    except (OSError, ValueError):  # e.g. a name that is too long, a NUL in it
+        return None
+
+
+def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
+    """Returns the text of a regular file.
+
+    Pipes, devices and folders are refused before they are opened: opening one may wait for ever,
+    and reading one may never end.
+
+    Args:
+        path: Of the file; links are followed.
+        max_bytes: Largest size that is read.
+
+    Raises:
+        InputError: If the file cannot be read, is no regular file, is too large or not UTF-8; one
+            line that names it.
+    """
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            kind = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe, socket or device"
+            raise InputError(f"{path}: cannot be read: is {kind}; allowed: a file")
+        if status.st_size > max_bytes:
+            raise InputError(
+                f"{path}: cannot be read: {status.st_size} bytes; allowed: up to {max_bytes}"
+            )
+        with path.open("rb") as file:
+            # what grows meanwhile, and what claims to be empty as files of /proc do
+            content = file.read(max_bytes + 1)
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
+    except ValueError:  # a NUL in the name
+        raise InputError(f"{str(path)!r}: cannot be read: no name of a file") from None
+    if len(content) > max_bytes:
+        raise InputError(f"{path}: cannot be read: allowed: up to {max_bytes} bytes")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: not UTF-8 text") from None
+
+
+# metadata of text, or of a mapping to text, that names a file, or a folder
+FILE = {"file": True}
+# the same of text that is a name of something known unless it has a suffix
+NAME_OR_FILE = {"file": False}
+
+
+def resolve_files(value: Any, folder: Path) -> None:
+    """Makes the names of files in a dataclass absolute, in place, so that it may stand anywhere.
+
+    Empty names and URIs stay as they are.
+
+    Args:
+        value: Dataclass, or a list or mapping with some in it, whose fields are declared with
+            FILE and NAME_OR_FILE.
+        folder: Where relative names start.
+    """
+    if isinstance(value, list):
+        for item in value:
+            resolve_files(item, folder)
+    elif isinstance(value, dict):
+        for item in value.values():
+            resolve_files(item, folder)
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            content = getattr(value, field.name)
+            if "file" not in field.metadata:
+                resolve_files(content, folder)
+            elif isinstance(content, dict):
+                resolved = {key: _resolved(name, folder) for key, name in content.items()}
+                setattr(value, field.name, resolved)
+            elif field.metadata["file"] or Path(content).suffix:
+                setattr(value, field.name, _resolved(content, folder))
+
+
+def _resolved(name: str, folder: Path) -> str:
+    return str((folder / name).resolve()) if name and "://" not in name else name
+
 
 TAG_KEY = "_tag"
 MAX_NODES = 100_000
@@ -61,7 +152,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         The data.
 
     Raises:
-        InputError: if the file is unreadable (see :func:`pfsc_drake.yaml.text_file.read_text`),
+        InputError: if the file is unreadable (see :func:`pfsc_drake.yaml.reading.read_text`),
             no mapping, or refused by :func:`parse_yaml`. One line that names the file and, where
             there is one, the line in it.
     """

@@ -28,8 +28,8 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario
 from experiments.simulation import configure
-from pfsc_drake.systems.plants.joint_reaction import JointReaction
-from pfsc_drake.systems.plants.link_pushes import LinkPushes
+from pfsc_drake.systems.plants.external_forces import LinkPushes
+from pfsc_drake.systems.plants.reactions import JointReaction
 from pfsc_drake.yaml.typed import load_file
 
 # shares of the replayed torque's pace that are aimed at

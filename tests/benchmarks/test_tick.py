@@ -27,8 +27,8 @@ from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.control.law.timed_reference import TimedReference
+from pfsc_drake.control.manifolds.manifold import Projector, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.geometry import (
     FourierCurve,
     Path,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pfsc_drake.compiled.object_store import ObjectStore, user_store
+from pfsc_drake.compiled.native_code import ObjectStore, user_store
 
 CODE = bytes(range(256)) * 10
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 
 
 @pytest.mark.parametrize("symbol", [ca.SX, ca.MX])

@@ -9,7 +9,7 @@ from pydrake.systems.primitives import ZeroOrderHold
 from pfsc_drake.blocks.network import Network
 from pfsc_drake.blocks.program import Program
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.bus_delay import BusDelay
+from pfsc_drake.physics.velocity_servo import BusDelay
 from pfsc_drake.systems.block_system import BlockSystem
 
 T = 1e-3

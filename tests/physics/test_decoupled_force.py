@@ -8,7 +8,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pfsc_drake.control.law.linearization import virtual_output_function
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import FourierCurve, OrientationCurve, Path
-from pfsc_drake.physics.decoupled_force import decoupled_force_function
+from pfsc_drake.physics.scripted_force import decoupled_force_function
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 

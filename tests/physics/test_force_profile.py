@@ -6,7 +6,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.paths.frame import manifold_axes
-from pfsc_drake.physics.force_profile import (
+from pfsc_drake.physics.scripted_force import (
     ForceProfile,
     ForcePulse,
     smooth_pulse,

@@ -21,7 +21,7 @@ from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
-from pfsc_drake.systems.plants.joint_reaction import JointReaction, reaction_index
+from pfsc_drake.systems.plants.reactions import JointReaction, reaction_index
 
 PERIOD = 1e-3
 TOOL_MASS, TOOL_COM = 1.5, np.array([0.0, 0.0, 0.06])

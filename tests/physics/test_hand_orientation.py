@@ -7,9 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint
-from pfsc_drake.physics.hand_orientation import OrientationTarget, rotation_vector
-from pfsc_drake.physics.wandering import Wander
+from pfsc_drake.physics.hand_model import HandModel, HandParameters, HandWaypoint, Wander
+from pfsc_drake.physics.hand_way import OrientationTarget, rotation_vector
 from pfsc_drake.yaml.typed import load_typed
 
 TIMES = np.array([1.0, 3.0, 4.0])

@@ -6,7 +6,7 @@ import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.link_hand import LinkHand, LinkHandParameters
+from pfsc_drake.physics.link_forces import LinkHand, LinkHandParameters
 
 START = np.array([0.4, -0.1, 0.9])
 REST = np.zeros(3)

@@ -9,8 +9,7 @@ from pfsc_drake.blocks.block import Values
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
-from pfsc_drake.physics.mounting_hand import MountingHand, MountingPhase
-from pfsc_drake.physics.mounting_parameters import MountingHandParameters
+from pfsc_drake.physics.mounting_hand import MountingHand, MountingHandParameters, MountingPhase
 
 PERIOD, PINS = 1e-3, 0.012
 GOAL_R = Rotation.from_euler("ZYX", [25.0, 10.0, 180.0], degrees=True)

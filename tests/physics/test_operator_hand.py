@@ -8,14 +8,14 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
 from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.plants.external_wrench import ExternalWrench
+from pfsc_drake.systems.plants.external_forces import ExternalWrench
 
 PERIOD = 1e-3
 UPRIGHT = np.eye(3).ravel()

@@ -8,11 +8,10 @@ from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector
 from pfsc_drake.geometry import FourierCurve, Path
-from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
-from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.physics.scripted_force import ForceProfile, ForcePulse, ScriptedForce
 from pfsc_drake.systems.block_system import BlockSystem
 
 PERIOD = 1e-3

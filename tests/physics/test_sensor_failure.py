@@ -6,7 +6,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.sensor_failure import SensorFailure
+from pfsc_drake.physics.force_torque_sensor import SensorFailure
 from pfsc_drake.systems.block_system import BlockSystem
 
 T = 1e-3

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.hand_model import HandModel, HandParameters
-from pfsc_drake.physics.wandering import Wander
+from pfsc_drake.physics.hand_model import HandModel, HandParameters, Wander
 
 BOX = {"low": [0.1, -0.2, 0.5], "high": [0.3, 0.2, 0.9]}
 

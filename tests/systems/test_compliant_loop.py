@@ -20,8 +20,8 @@ from pfsc_drake.control.compliance.impedance_parameters import (
     ImpedanceParameters,
     Profile,
 )
+from pfsc_drake.control.manifolds.manifold import Projector, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.geometry import (
     Path,
     interpolate_orientation,

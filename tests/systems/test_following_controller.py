@@ -18,8 +18,8 @@ from pfsc_drake.control.law.linearization import RELATIVE_DEGREE, linearize
 from pfsc_drake.control.law.safe_stop import SafeState
 from pfsc_drake.control.law.stabilization import Stabilization, gains_from_poles
 from pfsc_drake.control.law.supervision import SupervisionParameters
+from pfsc_drake.control.manifolds.manifold import Projector, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.control.manifolds.projector import Projector, ToolKinematics
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_access import BlockAccess

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from pfsc_drake.control.manifolds.projector import Projector
+from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.geometry import FourierCurve, Path, PiecewisePolynomialCurve, ProjectionStatus
 from pfsc_drake.systems.block_system import BlockSystem
 

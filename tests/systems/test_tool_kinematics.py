@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.systems.block_system import BlockSystem

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pfsc_drake.yaml.files import FILE, NAME_OR_FILE, resolve_files
+from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE, resolve_files
 
 
 @dataclass

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from pydrake.common.yaml import yaml_load_data
 
 from pfsc_drake import InputError
-from pfsc_drake.yaml.reading import dump_yaml, parse_yaml, read_yaml
-from pfsc_drake.yaml.text_file import MAX_BYTES
+from pfsc_drake.yaml.reading import MAX_BYTES, dump_yaml, parse_yaml, read_yaml
 
 TEXT = """\
 _template: &gains {a: 1, b: [1.0, 2.0]}

@@ -17,13 +17,13 @@ from experiments.studies.margins.result import Case, DriveMargins, MarginAnalysi
 from experiments.studies.margins.smooth import smooth, without_error
 from experiments.studies.margins.touched import TouchedSurface, touched_surface
 from experiments.studies.margins.walk import Instant, Walk, walk
-from pfsc_drake.control.margins.delay import delay_margin
-from pfsc_drake.control.margins.disc import (
+from pfsc_drake.control.margins import (
     BrokenLoop,
     common_disc_margin,
+    delay_margin,
     disc_margins,
+    modes,
 )
-from pfsc_drake.control.margins.modes import modes
 from pfsc_drake.errors import InputError
 from reporting.progress import ProgressListener
 

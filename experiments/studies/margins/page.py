@@ -11,8 +11,7 @@ from experiments.studies.margins.box import Box
 from experiments.studies.margins.picture import draw_margins
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import margins_json, metrics_of, sentences
-from pfsc_drake.yaml.dumping import dump_typed
-from pfsc_drake.yaml.typed import load_typed
+from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
 from reporting.page import Report, report_page, write_report
 from reporting.progress import ProgressListener

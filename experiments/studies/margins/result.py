@@ -9,8 +9,7 @@ import numpy as np
 from experiments.studies.margins.box import Box, Error
 from experiments.studies.margins.touched import TouchedSurface
 from experiments.studies.margins.walk import Instant
-from pfsc_drake.control.margins.disc import DiscMargin
-from pfsc_drake.control.margins.modes import Modes
+from pfsc_drake.control.margins import DiscMargin, Modes
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pydrake.systems.framework import Context
 
 from experiments.studies.margins.loop import STIFFEST, StationLoop, linearize
 from experiments.studies.margins.walk import Instant
-from pfsc_drake.control.margins.modes import modes
+from pfsc_drake.control.margins import modes
 
 # to which factor the stiffest surface that is borne is found
 _FINEST = 1.05

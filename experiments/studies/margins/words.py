@@ -13,7 +13,7 @@ from experiments.studies.margins.result import (
     Place,
 )
 from experiments.studies.margins.touched import TouchedSurface
-from pfsc_drake.control.margins.disc import DiscMargin
+from pfsc_drake.control.margins import DiscMargin
 from reporting.metrics import Metrics
 
 # disc margin and damping ratio from which on a loop is robust and well damped by custom

@@ -20,7 +20,7 @@ import numpy as np
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest
 from pfsc_drake.control.law.stabilization import LoopGains
-from pfsc_drake.control.margins.modes import modes
+from pfsc_drake.control.margins import modes
 
 # of a fast pair, so that no two poles are equal
 _PAIR = 1.4

@@ -12,7 +12,7 @@ from pfsc_drake.checks import (
 )
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
-from pfsc_drake.yaml.files import NAME_OR_FILE
+from pfsc_drake.yaml.reading import NAME_OR_FILE
 from pfsc_drake.yaml.typed import AUTO_OR_MANY
 
 POSTURE_TASKS = ("reference", "limits", "conditioning", "elbow")

@@ -6,7 +6,7 @@ import numpy as np
 
 from pfsc_drake.checks import require, require_not_negative, require_positive
 from pfsc_drake.physics.friction import FrictionDrift
-from pfsc_drake.yaml.files import NAME_OR_FILE
+from pfsc_drake.yaml.reading import NAME_OR_FILE
 
 _SOURCES = ("none", "model", "observer")
 _OBSERVERS = ("disturbance", "kalman")

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.geometry.regions.course import Course
 from pfsc_drake.geometry.regions.placement import axes_along, checked_point
 from pfsc_drake.geometry.regions.region import Distance, Region

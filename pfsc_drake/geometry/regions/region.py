@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 
 Distance = tuple[float, ...]
 # ca.SX or ca.MX, which have no types

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import FootFinder
 from pfsc_drake.geometry.regions.nearest_piece import ON_NO_PIECE, nearest_foot

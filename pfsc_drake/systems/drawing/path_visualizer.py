@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from pfsc_drake.geometry import Path, PathPointLayout
-from pfsc_drake.systems.drawing.moving_frame import draw_frame
+from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _ROOT = "path_following"
 _PATH_COLOR = Rgba(0.15, 0.4, 0.85, 1.0)

@@ -1,13 +1,13 @@
-"""Surface and moving frame in Meshcat."""
+"""Surfaces and regions in Meshcat, coloured by what is felt on them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from pfsc_drake.systems.drawing.moving_frame import draw_frame
+from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
 _ROOT = "surface_following"
 _LINE, _SKIN = Rgba(0.15, 0.4, 0.85, 1.0), Rgba(0.45, 0.65, 0.95, 0.35)
@@ -84,3 +84,73 @@ def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
     return grid.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+_REGION_ROOT = "fixtures"
+
+
+class RegionVisualizer(LeafSystem):
+    """Draws the surfaces that a tool may not cross, and the world's axes at the tool.
+
+    Ports:
+        manifold_point (input): Of the space manifold, the tool point first.
+        region_clock (input, optional): Time of the clock by which regions move [s], shape (1,).
+
+    Args:
+        surfaces: Of each region points on a grid [m], shape (rows, columns, 3), and lines on it
+            [m], each (points, 3).
+        moving: How regions that move are placed at a time of the clock, by their index.
+        size: Of the manifold's point.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+    """
+
+    def __init__(
+        self,
+        surfaces: Sequence[tuple[np.ndarray, Sequence[np.ndarray]]],
+        moving: Mapping[int, Callable[[float], RigidTransform]],
+        size: int,
+        meshcat: Meshcat,
+        period: float,
+    ) -> None:
+        super().__init__()
+        self._surfaces, self._moving, self._meshcat = surfaces, moving, meshcat
+        self._point = self.DeclareVectorInputPort("manifold_point", size)
+        self._clock = self.DeclareVectorInputPort("region_clock", 1)
+        self.DeclareInitializationPublishEvent(self._draw_surfaces)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
+
+    def _draw_surfaces(self, context: Context) -> EventStatus:
+        for i, (skin, lines) in enumerate(self._surfaces):
+            draw_surface(self._meshcat, f"{_REGION_ROOT}/{i}", skin, lines)
+        draw_frame(self._meshcat, f"{_REGION_ROOT}/frame")
+        return EventStatus.Succeeded()
+
+    def _draw(self, context: Context) -> None:
+        position = self._point.Eval(context)[:3]
+        if np.isfinite(position).all():
+            X_WF = RigidTransform(position)
+            self._meshcat.SetTransform(f"{_REGION_ROOT}/frame", X_WF, context.get_time())
+        if not self._clock.HasValue(context):
+            return
+        clock = float(self._clock.Eval(context)[0])
+        for i, placement in self._moving.items():
+            self._meshcat.SetTransform(f"{_REGION_ROOT}/{i}", placement(clock), context.get_time())
+
+
+# red, green, blue of the lowest value, of zero, and of the highest
+_LOW, _ZERO, _HIGH = (0.0, 0.35, 1.0), (0.12, 0.12, 0.12), (1.0, 0.15, 0.0)
+
+
+def signed_color(value: float, largest: float) -> Rgba:
+    """Return the colour of a value: blue below zero, dark at zero, red above.
+
+    Args:
+        value: The value, in any unit.
+        largest: Magnitude of the values that have full colour, in the same unit, positive; what
+            is beyond has full colour, too.
+    """
+    share = min(abs(value) / largest, 1.0)
+    end = _HIGH if value > 0.0 else _LOW
+    red, green, blue = (zero + share * (x - zero) for zero, x in zip(_ZERO, end, strict=True))
+    return Rgba(red, green, blue, 1.0)

@@ -1,11 +1,102 @@
-"""What a tool carries, in Meshcat."""
+"""A tool, its frame and its trail in Meshcat."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from pydrake.geometry import Meshcat, Rgba, Shape
+import numpy as np
+from pydrake.geometry import Cylinder, Meshcat, Rgba, Shape
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
+
+_AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
+_AXIS_LENGTH, _AXIS_RADIUS = 0.08, 0.003
+
+
+def draw_frame(meshcat: Meshcat, place: str) -> None:
+    """Draw a frame at a place of the scene tree; its axes are red, green and blue.
+
+    Args:
+        meshcat: Where to draw.
+        place: Path of the frame, which can then be moved.
+    """
+    for i, color in enumerate(_AXIS_COLORS):
+        direction = np.eye(3)[i]
+        X_FA = RigidTransform(
+            RotationMatrix.MakeFromOneVector(direction, 2), direction * _AXIS_LENGTH / 2
+        )
+        axis = f"{place}/axis_{i}"
+        meshcat.SetObject(axis, Cylinder(_AXIS_RADIUS, _AXIS_LENGTH), color)
+        meshcat.SetTransform(axis, X_FA)
+
+
+_WIDTH = 4.0
+
+
+class TrailVisualizer(LeafSystem):
+    """Draws the way that a point has come, piece by piece.
+
+    Frames carry the time, so that a recording in progress gets them.
+
+    Ports:
+        point (input): World axes [m], shape (3,); nothing is drawn where it is not finite.
+        value (input): What the colour tells, shape (1,), if it tells anything.
+
+    State:
+        Discrete: the point at the last frame [m], shape (3,), NaN before the first, and the
+        number of frames, shape (1,).
+
+    Args:
+        name: Meshcat path of the trail.
+        color: Its colour, or the colour that a value gives the piece that ends there.
+        meshcat: Where to draw, axes of the world.
+        period: Time between frames [s].
+        longest: How many pieces stay; all of them by default.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        color: Rgba | Callable[[float], Rgba],
+        meshcat: Meshcat,
+        period: float,
+        longest: int | None = None,
+    ) -> None:
+        super().__init__()
+        self._longest = longest
+        self._name, self._color, self._meshcat = name, color, meshcat
+        self._last = self.DeclareDiscreteState(np.full(3, np.nan))
+        self._frames = self.DeclareDiscreteState(1)
+        self._point = self.DeclareVectorInputPort("point", 3)
+        if not isinstance(color, Rgba):
+            self.DeclareVectorInputPort("value", 1)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+
+    def _draw(self, context: Context) -> None:
+        ends = np.column_stack(
+            [context.get_discrete_state(self._last).value(), self._point.Eval(context)]
+        )
+        if not np.isfinite(ends).all():
+            return
+        time = context.get_time()
+        frame = int(context.get_discrete_state(self._frames).value()[0])
+        if self._longest is not None:
+            frame %= self._longest
+        piece = f"{self._name}/trail/{frame:05d}"
+        self._meshcat.SetLine(piece, ends, _WIDTH, self._piece_color(context))
+        if time > 0.0:
+            self._meshcat.SetProperty(piece, "visible", False, 0.0)
+        self._meshcat.SetProperty(piece, "visible", True, time)
+
+    def _piece_color(self, context: Context) -> Rgba:
+        if isinstance(self._color, Rgba):
+            return self._color
+        return self._color(float(self.GetInputPort("value").Eval(context)[0]))
+
+    def _remember(self, context: Context, state: DiscreteValues) -> None:
+        state.set_value(self._last, self._point.Eval(context))
+        frames = context.get_discrete_state(self._frames).value()
+        state.set_value(self._frames, frames + 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.compliance.bearable_inertia import (
+from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
     bearable_mass_error,
 )

@@ -7,7 +7,7 @@ import pytest
 
 from diagrams.robots.arm_model import read_arm
 from diagrams.scenario import RobotParameters
-from pfsc_drake.control.compliance.bearable_inertia import (
+from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_share,
     carried_share,
     load_inertia,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
+from pfsc_drake.control.compliance.impedance_filter import LedMotion
 from pfsc_drake.control.compliance.impedance_parameters import (
     CoordinateImpedance,
     ImpedanceParameters,
     Profile,
 )
-from pfsc_drake.control.compliance.led_motion import LedMotion
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.control.fixtures.robot_limits import RobotLimits, limit_kinds
 from pfsc_drake.control.manifolds.path import PathManifold

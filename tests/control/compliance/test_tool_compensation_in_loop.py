@@ -15,16 +15,15 @@ from pfsc_drake.control.compliance.tool_compensation import (
     ToolCompensationParameters,
 )
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.physics.force_profile import ForceProfile, ForcePulse
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters, ForceTorqueSensor
-from pfsc_drake.physics.scripted_force import ScriptedForce
+from pfsc_drake.physics.scripted_force import ForceProfile, ForcePulse, ScriptedForce
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
-from pfsc_drake.systems.plants.external_wrench import ExternalWrench
-from pfsc_drake.systems.plants.joint_reaction import JointReaction, reaction_index
+from pfsc_drake.systems.plants.external_forces import ExternalWrench
+from pfsc_drake.systems.plants.reactions import JointReaction, reaction_index
 from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
 
 PERIOD = 1e-3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.margins.delay import MOST, delay_margin, delayed
+from pfsc_drake.control.margins import MOST, delay_margin, delayed
 
 T = 1e-3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import place_poles
 
-from pfsc_drake.control.margins.disc import NO_MARGIN, BrokenLoop, common_disc_margin, disc_margins
+from pfsc_drake.control.margins import NO_MARGIN, BrokenLoop, common_disc_margin, disc_margins
 
 T = 1e-3
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import expm
 
-from pfsc_drake.control.margins.modes import in_loop, modes
+from pfsc_drake.control.margins import in_loop, modes
 
 T = 1e-3
 

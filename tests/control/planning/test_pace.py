@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.control.planning.drive_demand import DriveDemand, with_pace
-from pfsc_drake.control.planning.pace import Clock, allowed_demand, find_pace
+from pfsc_drake.control.planning.drive_demand import (
+    Clock,
+    DriveDemand,
+    allowed_demand,
+    find_pace,
+    with_pace,
+)
 from pfsc_drake.errors import InputError
 
 STEP = 1e-3

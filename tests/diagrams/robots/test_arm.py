@@ -12,7 +12,7 @@ from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_profile import ForcePulse
+from pfsc_drake.physics.scripted_force import ForcePulse
 from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 
 COMAU = "comau_racer_1_4"

@@ -20,7 +20,7 @@ from experiments.scenario_file import find_scenario
 from pfsc_drake.blocks import wiring_blocks
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.law.safe_stop import SafeStop
-from pfsc_drake.control.manifolds.projector import ToolKinematics
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.block_system import BlockSystem
 

@@ -11,7 +11,7 @@ from diagrams.scenario import GainParameters, LawGains, Scenario
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_profile import ForcePulse
+from pfsc_drake.physics.scripted_force import ForcePulse
 from pfsc_drake.yaml.typed import load_typed
 
 TICK = 1e-3

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     PiecewisePolynomialCurve,

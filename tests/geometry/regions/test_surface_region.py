@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pfsc_drake.compiled.plain_function import PlainFunction
+from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.geometry import (
     FourierCurve,
     SurfaceProjector,

@@ -10,7 +10,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.robot.delta.parameters import load_delta_parameters
 from pfsc_drake.robot.delta.shapes import robot_parts, rod_poses, rod_shape, slide_origins
-from pfsc_drake.systems.drawing.delta_visualizer import DeltaVisualizer, turn_scene_over
+from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, turn_scene_over
 
 ROBOT = DeltaRobot(load_delta_parameters())
 GEOMETRY = ROBOT.parameters.geometry

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.geometry import Rgba
 from pydrake.systems.analysis import Simulator
 
-from pfsc_drake.systems.drawing.trail_visualizer import TrailVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
 
 
 class Scene:

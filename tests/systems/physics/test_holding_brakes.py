@@ -16,7 +16,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from experiments.simulation import configure
 from pfsc_drake.physics.friction import bristles_for_step
-from pfsc_drake.systems.physics.holding_brakes import HoldingBrakes
+from pfsc_drake.systems.physics.joint_friction import HoldingBrakes
 
 INERTIA, HOLDING = 2.0, 50.0  # kg m^2, Nm
 FAULT, DELAY, TICK = 0.1, 0.05, 1e-3  # s

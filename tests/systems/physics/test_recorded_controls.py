@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pfsc_drake.systems.physics.recorded_controls import RecordedControls
+from pfsc_drake.systems.physics.operator_panel import RecordedControls
 
 PERIOD = 1e-3
 

@@ -21,7 +21,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from pfsc_drake.systems.plants.contact_wrench import ContactWrench
+from pfsc_drake.systems.plants.reactions import ContactWrench
 
 MASS, RADIUS, GRAVITY = 0.5, 0.03, 9.81
 TOOL = np.array([0.2, -0.1, 0.4])

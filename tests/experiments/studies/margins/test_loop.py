@@ -12,9 +12,7 @@ from experiments.studies.margins.box import Error
 from experiments.studies.margins.loop import StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
-from pfsc_drake.control.margins.delay import delay_margin, delayed
-from pfsc_drake.control.margins.disc import BrokenLoop, disc_margins
-from pfsc_drake.control.margins.modes import modes
+from pfsc_drake.control.margins import BrokenLoop, delay_margin, delayed, disc_margins, modes
 from pfsc_drake.yaml.typed import load_typed
 
 # ticks at rest, after which the law extrapolates

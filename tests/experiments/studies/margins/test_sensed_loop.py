@@ -11,7 +11,7 @@ from experiments.scenario_file import read_scenario
 from experiments.studies.margins.box import Error
 from experiments.studies.margins.loop import StationLoop, linearize
 from experiments.studies.margins.smooth import smooth, without_error
-from pfsc_drake.control.margins.modes import Modes, modes
+from pfsc_drake.control.margins import Modes, modes
 from pfsc_drake.yaml.typed import load_typed
 
 LIGHT = ("sensor.inertia=none", "compliance.transversal.mass.value=2")

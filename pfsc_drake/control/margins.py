@@ -1,16 +1,4 @@
-"""Disc margins: how wrong gain and phase of the drives may be.
-
-The loop ``x_{k+1} = A x_k`` is looked at where commands are held: variable ``h_i`` of x is what
-drive i is told for the coming interval. Adding w to it gives ``h_i = -T_i w`` with the
-complementary sensitivity ``T_i(z) = -e_i' (z I - A)^-1 A e_i``, the loop's gain being
-``L = T / (1 - T)``. The symmetric disc margin (Seiler, Packard, Gahinet: An Introduction to Disk
-Margins, 2020) is::
-
-    alpha = 1 / max |S - T| / 2,   S = 1 - T
-
-and the loop stays stable when L is multiplied by any complex number in the disc through
-``(2 - alpha) / (2 + alpha)`` and its inverse: gain and phase may be wrong at the same time.
-"""
+"""Margins of a sampled linear loop: its modes, disc margins of the drives, and delay."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,8 +6,99 @@ from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 
-from pfsc_drake.control.margins.modes import modes
+# 1/s; what grows or decays by less is neutral: numbers that nothing calls back
+NEUTRAL = 0.1
+_SMALLEST = 1e-300
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Modes of a sampled loop, the slowest first.
+
+    Attributes:
+        rate: ``log|lambda| / T_s`` [1/s], shape (k,); positive grows.
+        frequency: ``|arg lambda| / T_s`` [rad/s], shape (k,).
+        neutral: Number of modes that neither grow nor decay; they are not among the others.
+    """
+
+    rate: np.ndarray
+    frequency: np.ndarray
+    neutral: int
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping ratios ``-rate / |log lambda / T_s|``, shape (k,)."""
+        return -self.rate / np.hypot(self.rate, self.frequency)
+
+    @property
+    def slowest(self) -> float:
+        """Rate of the slowest or of the fastest growing mode [1/s]; -inf without modes."""
+        return float(self.rate[0]) if len(self.rate) else -np.inf
+
+    @property
+    def slowest_frequency(self) -> float:
+        """Frequency of that mode [rad/s]."""
+        return float(self.frequency[0]) if len(self.rate) else 0.0
+
+    @property
+    def smallest_damping(self) -> float:
+        """The smallest damping ratio; 1 without modes."""
+        return float(np.min(self.damping, initial=1.0))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether nothing grows."""
+        return self.slowest <= 0.0
+
+
+def modes(A: np.ndarray, period: float) -> Modes:
+    """Return the modes of a sampled loop.
+
+    Args:
+        A: Map of one sampling interval, shape (n, n).
+        period: Sampling time ``T_s`` [s].
+    """
+    eigenvalues = np.linalg.eigvals(A)
+    rate = np.log(np.maximum(np.abs(eigenvalues), _SMALLEST)) / period
+    frequency = np.abs(np.angle(eigenvalues)) / period
+    counts = np.abs(rate) > NEUTRAL
+    order = np.argsort(-rate[counts], kind="stable")
+    return Modes(rate[counts][order], frequency[counts][order], int(np.sum(~counts)))
+
+
+def in_loop(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
+    """Return which variables are in a loop with others: what they do comes back to them.
+
+    Counters, memories that are overwritten, integrals without gain and disturbances are not;
+    without them the others behave the same.
+
+    Args:
+        changes: Whether the variable in the column changes that in the row, shape (n, n).
+        core: Whether a variable is of the controlled system itself, shape (n,).
+
+    Returns:
+        Shape (n,): whether a variable is changed by the core and changes it, at however many
+        removes; those of the core included.
+    """
+    reached = _reached(changes, core)
+    reaching = _reached(changes.T, core)
+    return core | (reached & reaching)
+
+
+def _reached(changes: np.ndarray, core: np.ndarray) -> np.ndarray:
+    """Return what is changed by the core, at however many removes, and the core."""
+    n = len(core)
+    # one more node that changes all of the core
+    graph = np.zeros((n + 1, n + 1), dtype=bool)
+    graph[:n, :n], graph[n, :n] = changes.T, core
+    found = breadth_first_order(csr_array(graph), n, return_predecessors=False)
+    reached = np.zeros(n + 1, dtype=bool)
+    reached[found] = True
+    return reached[:n]
+
 
 _POINTS = 400  # frequencies that are looked at first
 _SLOWEST = 0.01  # rad/s; neutral modes are at 0
@@ -163,3 +242,49 @@ def _scaled_norm(M: np.ndarray) -> np.ndarray:
         if largest < _BALANCED:
             break
     return np.linalg.norm(M, 2, axis=(1, 2))
+
+
+MOST = 50  # sampling intervals that are tried
+
+
+def delayed(A: np.ndarray, holds: np.ndarray, intervals: int) -> np.ndarray:
+    """Return the map of a loop whose drives get what they are told some intervals later.
+
+    Args:
+        A: Map of one sampling interval, shape (n, n).
+        holds: Index of each drive's held command, shape (N,).
+        intervals: Further delay in sampling intervals.
+
+    Returns:
+        Shape (n + intervals N, n + intervals N); behind the loop's own variables those of the
+        bus, newest first.
+    """
+    n, N = len(A), len(holds)
+    result = np.zeros((n + intervals * N, n + intervals * N))
+    result[:n, :n] = A
+    if intervals == 0:
+        return result
+    # the last on the bus acts in place of what has just been told
+    result[:n, holds] = 0.0
+    result[:n, n + (intervals - 1) * N :] = A[:, holds]
+    result[np.arange(n, n + N), holds] = 1.0
+    shifted = np.arange((intervals - 1) * N)
+    result[n + N + shifted, n + shifted] = 1.0
+    return result
+
+
+def delay_margin(A: np.ndarray, holds: np.ndarray, period: float) -> int:
+    """Return how many further sampling intervals of delay in all drives a loop bears.
+
+    Args:
+        A: Map of one sampling interval, shape (n, n).
+        holds: Index of each drive's held command, shape (N,).
+        period: Sampling time [s].
+
+    Returns:
+        -1 if the loop is unstable as it is; at most ``MOST``.
+    """
+    for intervals in range(MOST + 1):
+        if not modes(delayed(A, holds, intervals), period).is_stable:
+            return intervals - 1
+    return MOST

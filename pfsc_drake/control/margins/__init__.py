@@ -1,1 +1,0 @@
-"""Margins of linear sampled loops: modes, gain and phase that are borne, delay that is borne."""
