@@ -15,9 +15,8 @@ from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm, add_arm
 from diagrams.robots.delta import DeltaPart, add_delta, is_delta
 from diagrams.robots.drives import add_drives, add_friction, believed_friction
-from diagrams.robots.encoders import add_joint_state, states_to_log
-from diagrams.robots.force_sensor import add_sensor, sensor_warnings
 from diagrams.robots.part import RobotPart
+from diagrams.robots.sensors import add_joint_state, add_sensor, sensor_warnings, states_to_log
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.signal_log import add_log
@@ -31,8 +30,7 @@ from diagrams.surroundings.operator import add_operator
 from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.guidance import MODES, stiff_regions
-from diagrams.tasks.law_warnings import law_warnings
+from diagrams.tasks.law_warnings import MODES, law_warnings, stiff_regions
 from diagrams.tasks.make import make_task
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.sensed_load import sensed_load_warnings

@@ -17,8 +17,7 @@ from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.geometry import euler_margin
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.singularity_name import singularity_name
-from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture
+from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture, singularity_name
 from pfsc_drake.systems.block_access import BlockAccess
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")

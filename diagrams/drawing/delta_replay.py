@@ -4,9 +4,8 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from diagrams.drawing.manifold_drawing import ManifoldDrawing
+from diagrams.drawing.manifold_drawing import ManifoldDrawing, look_down_at
 from diagrams.drawing.replay import RecordedMotion, add_motion
-from diagrams.drawing.workpiece_drawing import look_down_at
 from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, turn_scene_over

@@ -1,18 +1,30 @@
-"""How a manifold is drawn."""
+"""How paths, surfaces, regions and workpieces are drawn."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
-from pydrake.geometry import Meshcat
-from pydrake.systems.framework import DiagramBuilder, InputPort
+from pydrake.geometry import Meshcat, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
+from diagrams.tasks.fixtures import DrawnFixture
+from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
+from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface
+from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
-from pfsc_drake.systems.drawing.surface_visualizer import SurfaceVisualizer, draw_surface
+from pfsc_drake.systems.drawing.surface_visualizer import (
+    RegionVisualizer,
+    SurfaceVisualizer,
+    draw_surface,
+)
+from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer
 
 _POINTS = 600
 # of a surface, in each direction, and of the points of each line
@@ -103,3 +115,90 @@ def skin_and_lines(surface: Surface) -> tuple[np.ndarray, list[np.ndarray]]:
     grid = surface.partials(theta, 0)[..., 0, :]
     stride = (_LINE_POINTS - 1) // (_LINES - 1)
     return grid, [*grid[::stride], *np.swapaxes(grid, 0, 1)[::stride]]
+
+
+@dataclass(frozen=True)
+class SpaceDrawing:
+    """The surfaces of regions, drawn where they are at rest.
+
+    Attributes:
+        fixtures: The regions.
+        manifold: Space as the law sees it.
+    """
+
+    fixtures: Sequence[DrawnFixture]
+    manifold: SpaceManifold
+
+    def outline(self) -> list[np.ndarray]:
+        """See :class:`ManifoldDrawing`."""
+        surfaces = [surface for fixture in self.fixtures for surface in fixture.surfaces]
+        return [line for surface in surfaces for line in skin_and_lines(surface)[1]]
+
+    def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
+        """See :class:`ManifoldDrawing`."""
+        shapes: list[tuple[np.ndarray, list[np.ndarray]]] = []
+        placements = {}
+        for fixture in self.fixtures:
+            for surface in fixture.surfaces:
+                if isinstance(fixture.region, MovingRegion):
+                    placements[len(shapes)] = partial(_placement, fixture.region)
+                shapes.append(skin_and_lines(surface))
+        drawing = builder.AddNamedSystem(
+            "region_visualizer",
+            RegionVisualizer(shapes, placements, self.manifold.layout.size, meshcat, period),
+        )
+        return drawing.GetInputPort("manifold_point")
+
+
+def _placement(region: MovingRegion, clock: float) -> RigidTransform:
+    """Return where what moves with a region is at a time of the clock."""
+    rotation, origin = region.placement(clock)
+    return RigidTransform(RotationMatrix(rotation), origin)
+
+
+_WORKPIECE = Rgba(0.75, 0.72, 0.66, 0.75)
+_VIEW = np.array([0.5, -0.4, 0.35])  # m, from the workpiece to the camera, z upwards
+
+
+def add_workpiece_drawing(
+    builder: DiagramBuilder,
+    look: WorkpieceLook,
+    tool_pose: OutputPort,
+    meshcat: Meshcat,
+    period: float,
+) -> None:
+    """Draw a workpiece, and let what touches it move with the tool.
+
+    Args:
+        builder: Builder of the replay.
+        look: How they are drawn.
+        tool_pose: ``[y_t, R_e]``.
+        meshcat: Where to draw, axes of the inertial frame.
+        period: Time between frames [s].
+    """
+    draw_workpiece(look, meshcat)
+    tool = builder.AddNamedSystem(
+        "tool_visualizer", ToolVisualizer(look.tool_parts, meshcat, period)
+    )
+    builder.Connect(tool_pose, tool.GetInputPort("tool_pose"))
+
+
+def draw_workpiece(look: WorkpieceLook, meshcat: Meshcat) -> None:
+    """Draw a workpiece.
+
+    Args:
+        look: How it is drawn.
+        meshcat: Where to draw, axes of the inertial frame.
+    """
+    surface = look.surface
+    meshcat.SetTriangleMesh("workpiece", surface.vertices.T, surface.triangles.T, _WORKPIECE)
+
+
+def look_down_at(meshcat: Meshcat, target: np.ndarray) -> None:
+    """Turn the camera to a workpiece.
+
+    Args:
+        meshcat: Whose camera it is.
+        target: Where the workpiece is [m], shape (3,), z upwards.
+    """
+    meshcat.SetCameraPose(target + _VIEW, target)

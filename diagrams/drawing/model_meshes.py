@@ -1,14 +1,31 @@
-"""Which mesh files can be drawn, and why others cannot."""
+"""How a robot's model is drawn: which meshes can be, and sticks where none are."""
 
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path as FilePath
+from xml.dom import expatbuilder
+from xml.dom.minidom import Document, Element, Text
 from xml.etree import ElementTree
+from xml.parsers.expat import ExpatError
 
-from pydrake.geometry import Mesh, Meshcat, MeshcatParams
+import numpy as np
+from pydrake.geometry import Box, Cylinder, Mesh, Meshcat, MeshcatParams, Rgba, Shape, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    BodyIndex,
+    Frame,
+    Joint,
+    JointIndex,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+)
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.files.stl import read_stl
-from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.geometry.files.mesh_files import read_stl
+from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Surface
 
 _DRAWN = "obj, gltf, dae and stl"
 
@@ -83,3 +100,186 @@ def _is_collada(file: FilePath) -> bool:
 def _is_stl(file: FilePath) -> bool:
     """Readers of STL files say best what is wrong with one."""
     return True
+
+
+Resolve = Callable[[str], FilePath]
+
+
+@dataclass(frozen=True)
+class NotDrawn:
+    """A link that cannot be drawn, at least in part.
+
+    Attributes:
+        link: Its name.
+        reason: Why, naming the file.
+    """
+
+    link: str
+    reason: str
+
+
+def drawable_text(file: FilePath, resolve: Resolve) -> tuple[str, list[NotDrawn]]:
+    """Return the text of a URDF or SDF file without all that hinders drawing.
+
+    Collision geometry goes, for it is not drawn and may be of kinds that only other parsers
+    take. Visual meshes that cannot be drawn go. Mesh addresses become absolute. A material that
+    is defined again with another content gets a name of its own; textures go.
+
+    Args:
+        file: The model.
+        resolve: From the address of a mesh to its file; may raise InputError.
+
+    Returns:
+        The text, and what cannot be drawn.
+
+    Raises:
+        InputError: If the file is no XML.
+    """
+    try:
+        # without namespaces, since URDF files often do not declare the prefix "drake:"
+        document = expatbuilder.parseString(file.read_bytes(), namespaces=False)
+    except (ExpatError, ValueError, OSError) as error:
+        raise InputError(f"{file}: {error}") from None
+    for collision in list(document.getElementsByTagName("collision")):
+        _remove(collision)
+    _part_materials(document)
+    missing = []
+    for visual in list(document.getElementsByTagName("visual")):
+        for mesh in visual.getElementsByTagName("mesh"):
+            try:
+                _locate(mesh, resolve)
+            except InputError as error:
+                missing.append(NotDrawn(_name_of_link(visual), str(error)))
+                _remove(visual)
+                break
+    return document.toxml(), missing
+
+
+def _locate(mesh: Element, resolve: Resolve) -> None:
+    """Replace a mesh's address by its file.
+
+    Raises:
+        InputError: If that cannot be drawn.
+    """
+    addresses = mesh.getElementsByTagName("uri")  # SDF; URDF has an attribute
+    text = addresses[0].firstChild if addresses else None
+    written = text.data if isinstance(text, Text) else mesh.getAttribute("filename")
+    file = resolve(written.strip())
+    check_mesh_file(file)
+    if isinstance(text, Text):
+        text.data = f"file://{file.resolve()}"  # text has no folder for relative names
+    else:
+        mesh.setAttribute("filename", f"file://{file.resolve()}")
+
+
+def _part_materials(document: Document) -> None:
+    """Give a material that differs from an earlier one of its name a name of its own."""
+    for texture in list(document.getElementsByTagName("texture")):
+        _remove(texture)
+    known: dict[str, str] = {}
+    for number, material in enumerate(list(document.getElementsByTagName("material"))):
+        name, colors = material.getAttribute("name"), material.getElementsByTagName("color")
+        if not name or not colors:
+            continue
+        content = colors[0].getAttribute("rgba")
+        if name in known and material.parentNode is document.documentElement:
+            _remove(material)  # Drake takes each name once there, even with equal contents
+        elif known.setdefault(name, content) != content:
+            material.setAttribute("name", f"{name}#{number}")
+
+
+def _name_of_link(visual: Element) -> str:
+    link = visual.parentNode
+    return link.getAttribute("name") if isinstance(link, Element) else ""
+
+
+def _remove(element: Element) -> None:
+    if element.parentNode is not None:
+        element.parentNode.removeChild(element)
+        element.unlink()
+
+
+_STICK_COLOR = Rgba(0.55, 0.58, 0.62)
+_JOINT_COLOR = Rgba(0.95, 0.55, 0.1)
+_AXIS_COLORS = (Rgba(0.85, 0.1, 0.1), Rgba(0.1, 0.65, 0.2), Rgba(0.1, 0.25, 0.9))
+# of the robot's length: radii of sticks and joints, and the axes of the tool's frame
+_STICK, _JOINT, _AXIS = 0.012, 0.022, 0.08
+_SMALLEST = 1e-6  # of the robot's length, below which two points are one
+
+
+def stick_figure(plant: MultibodyPlant, tool: Frame) -> list[BodyPart]:
+    """Return the parts of a stick figure.
+
+    Every body is drawn by sticks from the joint that carries it to the joints that it carries,
+    and to the tool frame if that is its own; revolute joints as cylinders along their axes,
+    prismatic ones as boxes, others as spheres; the tool frame as three axes (red x, green y,
+    blue z). Thicknesses are in proportion to the robot's length.
+
+    Args:
+        plant: Plant with the robot, finalized.
+        tool: The tool's frame.
+    """
+    joints = [plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices()]
+    bodies = [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
+    sticks = [stick for body in bodies for stick in _sticks(body, joints, tool)]
+    length = sum(float(np.linalg.norm(end - begin)) for _, begin, end in sticks) or 1.0
+    long = [stick for stick in sticks if np.linalg.norm(stick[2] - stick[1]) > _SMALLEST * length]
+    parts = [
+        _stick(body, f"stick_{i}", begin, end, _STICK * length, _STICK_COLOR)
+        for i, (body, begin, end) in enumerate(long)
+    ]
+    parts += [_joint(joint, length) for joint in joints if joint.num_velocities() > 0]
+    X_BT = tool.GetFixedPoseInBodyFrame()
+    parts += [
+        _stick(
+            tool.body(),
+            f"tool_axis_{i}",
+            X_BT.translation(),
+            X_BT @ (_AXIS * length * np.eye(3)[i]),
+            0.3 * _STICK * length,
+            color,
+        )
+        for i, color in enumerate(_AXIS_COLORS)
+    ]
+    return parts
+
+
+def _sticks(
+    body: RigidBody, joints: list[Joint], tool: Frame
+) -> list[tuple[RigidBody, np.ndarray, np.ndarray]]:
+    """Begin and end of each stick of a body, axes of the body [m]."""
+    carried_by = [joint for joint in joints if joint.child_body() is body]
+    begin = _origin(carried_by[0].frame_on_child()) if carried_by else np.zeros(3)
+    ends = [_origin(j.frame_on_parent()) for j in joints if j.parent_body() is body]
+    if tool.body() is body:
+        ends.append(_origin(tool))
+    return [(body, begin, end) for end in ends]
+
+
+def _origin(frame: Frame) -> np.ndarray:
+    """Origin of a frame in its body's [m], shape (3,)."""
+    return frame.GetFixedPoseInBodyFrame().translation()
+
+
+def _stick(
+    body: RigidBody, name: str, begin: np.ndarray, end: np.ndarray, radius: float, color: Rgba
+) -> BodyPart:
+    """A cylinder between two points of a body."""
+    direction = end - begin
+    R_BP = RotationMatrix.MakeFromOneVector(direction, 2)
+    X_BP = RigidTransform(R_BP, (begin + end) / 2.0)
+    return BodyPart(body, name, Cylinder(radius, float(np.linalg.norm(direction))), X_BP, color)
+
+
+def _joint(joint: Joint, length: float) -> BodyPart:
+    """A joint, drawn with the body that it carries."""
+    X_BF = joint.frame_on_child().GetFixedPoseInBodyFrame()
+    size = _JOINT * length
+    form: Shape = Sphere(size)
+    axis = np.array([0.0, 0.0, 1.0])
+    if isinstance(joint, RevoluteJoint):
+        axis, form = joint.revolute_axis(), Cylinder(size, 3.0 * size)
+    elif isinstance(joint, PrismaticJoint):
+        axis, form = joint.translation_axis(), Box(1.6 * size, 1.6 * size, 3.0 * size)
+    X_FP = RigidTransform(RotationMatrix.MakeFromOneVector(axis, 2))
+    return BodyPart(joint.child_body(), f"joint_{joint.name()}", form, X_BF @ X_FP, _JOINT_COLOR)

@@ -15,13 +15,11 @@ from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, RigidBody
 
-from diagrams.drawing.model_meshes import drawn_mesh
-from diagrams.drawing.model_text import NotDrawn, drawable_text
-from diagrams.drawing.stick_figure import stick_figure
+from diagrams.drawing.model_meshes import NotDrawn, drawable_text, drawn_mesh, stick_figure
 from diagrams.robots.model import locate_model
 from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.packages import packages_for
+from pfsc_drake.robot.models.files import packages_for
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart
 
 # where the parser reads text, by the model's suffix; other kinds are read as they are

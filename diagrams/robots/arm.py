@@ -13,15 +13,16 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, Outpu
 
 from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
 from diagrams.robots.belief import Belief
-from diagrams.robots.contact import add_scene, connect_scene
 from diagrams.robots.model import tool_frame
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
+    add_scene,
     add_tool_reaction,
     connect_actuation,
     connect_push,
     connect_resistance,
+    connect_scene,
     connect_torques,
     joint_state_of,
 )

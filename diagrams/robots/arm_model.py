@@ -15,8 +15,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
-from pfsc_drake.robot.serial.chain import SerialChain
+from pfsc_drake.robot.serial.chain import SerialChain, ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
 from pfsc_drake.robot.tool_load import ToolLoad

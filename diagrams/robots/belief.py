@@ -1,4 +1,4 @@
-"""What the controller believes of a robot, apart from what is true of it."""
+"""What a controller believes of a robot, and of how well its motion is measured."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagrams.scenario import Scenario
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.law import Believed, Coefficients
+from pfsc_drake.physics.joint_encoders import encoder_resolution
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
-from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.parametric_chain import ParametricChain, chain_parameters
+from pfsc_drake.robot.serial.chain import ParametricChain, SerialChain, chain_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
 
 
@@ -77,3 +79,27 @@ def naming_model_error() -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"model_error.{error}") from None
+
+
+def believed_robot(
+    scenario: Scenario, robot: RobotModel, friction: Coefficients | None = None
+) -> Believed:
+    """Return what a scenario's controller believes.
+
+    Args:
+        scenario: The scenario.
+        robot: The robot as it is believed.
+        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+
+    Raises:
+        InputError: If the encoders do not suit the robot.
+    """
+    encoders, period = scenario.encoders, scenario.controller.sampling_time
+    late = period if encoders.difference_quotient else 0.0
+    return Believed(
+        robot,
+        friction,
+        np.maximum(*encoder_resolution(robot, encoders)),
+        velocity_delay=late / 2.0,
+        filter_time=encoders.filter_time + late,
+    )

@@ -13,14 +13,15 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
 from diagrams.robots.belief import Belief, naming_model_error
-from diagrams.robots.contact import add_scene, connect_scene
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
+    add_scene,
     add_tool_reaction,
     connect_actuation,
     connect_push,
     connect_resistance,
+    connect_scene,
     joint_state_of,
 )
 from diagrams.scenario import RobotParameters, Scenario, StartParameters
@@ -28,8 +29,7 @@ from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
 from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.delta.believed_delta import believed_delta
-from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
 from pfsc_drake.robot.delta.multibody import (
     DeltaModel,
     add_delta_plant,

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
 
-from diagrams.believed import believed_robot
+from diagrams.robots.belief import believed_robot
 from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
 from diagrams.scenario.checks import require, require_whole_fraction

@@ -3,7 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.multibody.plant import ExternallyAppliedSpatialForceMultiplexer, MultibodyPlant
+from pydrake.geometry import GeometryId, SceneGraph
+from pydrake.multibody.plant import (
+    ContactModel,
+    DiscreteContactApproximation,
+    ExternallyAppliedSpatialForceMultiplexer,
+    MultibodyPlant,
+)
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain
@@ -12,7 +18,7 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.external_forces import ExternalWrench
-from pfsc_drake.systems.plants.reactions import ToolReaction
+from pfsc_drake.systems.plants.reactions import ContactWrench, ToolReaction
 
 
 def connect_actuation(
@@ -149,3 +155,43 @@ def joint_state_of(
     encoders = builder.AddNamedSystem("joint_encoders", MatrixGain(coordinates.rows))
     builder.Connect(plant_state, encoders.get_input_port())
     return encoders.get_output_port()
+
+
+def add_scene(builder: DiagramBuilder, plant: MultibodyPlant) -> SceneGraph:
+    """Let what is added to a plant from now on have contact.
+
+    Args:
+        builder: Builder of the diagram.
+        plant: A discrete plant, not finalized.
+    """
+    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+    plant.set_contact_model(ContactModel.kHydroelastic)
+    return scene_graph
+
+
+def connect_scene(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    tool: list[GeometryId],
+) -> ContactWrench:
+    """Connect a finalized plant with its scene, and return what acts on its tool.
+
+    Args:
+        builder: Builder of the diagram, with the plant in it.
+        plant: The plant.
+        scene_graph: From :func:`add_scene`.
+        tool: Contact geometries of the tool.
+    """
+    builder.Connect(
+        plant.get_geometry_pose_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), plant.get_geometry_query_input_port())
+    contact = builder.AddNamedSystem("contact_wrench", ContactWrench(tool))
+    builder.Connect(
+        plant.get_contact_results_output_port(), contact.GetInputPort("contact_results")
+    )
+    return contact

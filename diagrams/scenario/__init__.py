@@ -1,8 +1,5 @@
 """What a scenario file says: its schema, one file per block."""
 
-from diagrams.scenario.drives import ServoParameters
-from diagrams.scenario.force_sensor import SensorParameters
-from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters, RandomModelError
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import (
@@ -16,9 +13,13 @@ from diagrams.scenario.path import (
     PathParameters,
     Waypoints,
 )
-from diagrams.scenario.robot import RobotParameters
+from diagrams.scenario.robot import RobotParameters, SensorParameters, ServoParameters
 from diagrams.scenario.schema import Scenario, Target
-from diagrams.scenario.simulation import SensorFailureParameters, SimulationParameters
+from diagrams.scenario.simulation import (
+    HoldBackParameters,
+    SensorFailureParameters,
+    SimulationParameters,
+)
 from diagrams.scenario.surface import SurfaceParameters
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import (

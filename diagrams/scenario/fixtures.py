@@ -1,11 +1,216 @@
 """Virtual fixtures of a scenario: regions that a tool led by hand may not enter."""
 
 import dataclasses as dc
+from typing import Union
 
-from diagrams.scenario.checks import require, require_between
-from diagrams.scenario.region import RegionParameters
+import numpy as np
+
+from diagrams.scenario.checks import (
+    require,
+    require_between,
+    require_direction,
+    require_length,
+    require_not_negative,
+    require_numbers,
+    require_place,
+    require_positive,
+)
 from diagrams.scenario.surface import SurfaceOrientationParameters
+from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface_shapes import (
+    Cone,
+    Cylinder,
+    Paraboloid,
+    Placed,
+    Plane,
+    Sphere,
+    Torus,
+    Turned,
+)
 from pfsc_drake.following.options.follower import FixtureOptions
+
+_SIDES, _FACES = ("inside", "outside"), ("above", "below")
+_STIFFNESS = (1.0, 1e6)  # N/m
+_LARGEST = 10.0  # m: how far a region may move
+_LARGEST_DEG = 360.0
+
+
+@dc.dataclass
+class Box(Placed):
+    """A box, as an obstacle; its origin is its middle.
+
+    Attributes:
+        size: Along its three axes [m].
+    """
+
+    size: list[float] = dc.field(default_factory=lambda: [0.1, 0.1, 0.1])
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_numbers("size", self.size, 3)
+        for length in self.size:
+            require_length("size", length)
+
+
+@dc.dataclass
+class Visiting:
+    """A way that comes to rest at every one of several points.
+
+    Attributes:
+        points: Places to visit [m], of a turn [deg]; where the scenario shows the region is 0.
+        velocity: Largest velocity [m/s], of a turn [deg/s].
+        acceleration: Largest acceleration [m/s^2], of a turn [deg/s^2].
+        dwell: Rest before, between and after the moves [s].
+        repeat: Whether it begins again at the end; the last point is then the first.
+    """
+
+    points: list[float] = dc.field(default_factory=lambda: [0.0, 0.1, 0.0])
+    velocity: float = 0.05
+    acceleration: float = 0.5
+    dwell: float = 0.5
+    repeat: bool = True
+
+    def __post_init__(self) -> None:
+        enough = len(self.points) >= 2 and bool(np.isfinite(self.points).all())
+        require(enough, "points", self.points, "two or more finite numbers")
+        for key in ("velocity", "acceleration"):
+            require_positive(key, getattr(self, key))
+        require_not_negative("dwell", self.dwell)
+        back = not self.repeat or self.points[-1] == self.points[0]
+        require(back, "points", self.points, "the last as the first, with repeat: true")
+
+    @property
+    def extent(self) -> float:
+        """Largest distance from where the scenario shows the region [m], or [deg]."""
+        return max(map(abs, self.points))
+
+
+@dc.dataclass
+class Swinging:
+    """A way ``amplitude sin(2 pi frequency (t - begin))`` that begins smoothly.
+
+    Attributes:
+        amplitude: [m], of a turn [deg].
+        frequency: [Hz].
+        begin: Until when it rests [s].
+        ramp: Time in which it comes to its full amplitude [s].
+    """
+
+    amplitude: float = 0.02
+    frequency: float = 0.2
+    begin: float = 0.5
+    ramp: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_positive("amplitude", self.amplitude)
+        require_between("frequency", self.frequency, 1e-4, 100.0, "Hz")
+        require_not_negative("begin", self.begin)
+        require_between("ramp", self.ramp, 1e-3, 1e3, "s")
+
+    @property
+    def extent(self) -> float:
+        """See :class:`Visiting`."""
+        return self.amplitude
+
+
+@dc.dataclass
+class Shift:
+    """A region that moves along a direction.
+
+    Attributes:
+        direction: World axes, of any length.
+        way: ``!Visiting`` or ``!Swinging`` [m].
+    """
+
+    direction: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    way: Visiting | Swinging = dc.field(default_factory=Visiting)
+
+    def __post_init__(self) -> None:
+        require_direction("direction", self.direction)
+        far = self.way.extent <= _LARGEST
+        require(far, "way", self.way.extent, f"no further than {_LARGEST:g} m")
+
+
+@dc.dataclass
+class Turn:
+    """A region that turns about an axis.
+
+    Attributes:
+        axis: World axes, of any length.
+        point: On the axis [m].
+        way: ``!Visiting`` or ``!Swinging`` [deg].
+    """
+
+    axis: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    point: list[float] = dc.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    way: Visiting | Swinging = dc.field(default_factory=Visiting)
+
+    def __post_init__(self) -> None:
+        require_direction("axis", self.axis)
+        require_place("point", self.point)
+        far = self.way.extent <= _LARGEST_DEG
+        require(far, "way", self.way.extent, f"no further than {_LARGEST_DEG:g} deg")
+
+
+# the first is what a shape without a tag means
+RegionShape = Union[  # noqa: UP007
+    Plane, Box, Paraboloid, Cylinder, Cone, Sphere, Torus, Fitted, Revolved, Extruded
+]
+
+
+@dc.dataclass
+class RegionParameters:
+    """A surface that the tool must not cross, and the side on which it may be.
+
+    Planes, cylinders, cones and paraboloids have no ends, whatever part of them the shape tells;
+    nor have extruded profiles and the open ones of surfaces of revolution, which go on straight.
+    A fitted surface ends at its border, and beside it is no region.
+
+    Attributes:
+        shape: ``!Plane``, ``!Box``, ``!Paraboloid``, ``!Cylinder``, ``!Cone``, ``!Sphere``,
+            ``!Torus``, or from a file ``!Fitted``, ``!Revolved``, ``!Extruded``; without a part of
+            a turn, ``angles_deg``.
+        admissible: ``inside`` or ``outside`` of what encloses something; ``above``, on the side of
+            the normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
+            ``outside``, or ``above``.
+        motion: ``!Shift`` or ``!Turn``; null for a region at rest.
+        stiffness: Of a soft region, that pushes back by so much [N/m]; null for a hard one.
+    """
+
+    shape: RegionShape = dc.field(default_factory=Plane)
+    admissible: str = ""
+    motion: Shift | Turn | None = None
+    stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        kind = type(self.shape).__name__
+        sides = _SIDES if encloses(self.shape) else _FACES
+        if isinstance(self.shape, Box):
+            allowed = "outside of a !Box; for its inside a !Plane at each of its sides"
+            require(self.admissible in ("", "outside"), "admissible", self.admissible, allowed)
+        good = self.admissible in ("", *sides)
+        require(good, "admissible", self.admissible, f"{' or '.join(sides)} of this !{kind}")
+        if isinstance(self.shape, Turned):
+            whole = not self.shape.angles_deg
+            allowed = "empty: a region goes all the way round"
+            require(whole, "shape.angles_deg", self.shape.angles_deg, allowed)
+        if self.stiffness is not None:
+            require_between("stiffness", self.stiffness, *_STIFFNESS, "N/m, or null")
+
+    @property
+    def inside(self) -> bool:
+        """Whether what is enclosed is admissible, or what is below."""
+        return self.admissible in ("inside", "below")
+
+
+def encloses(shape: RegionShape) -> bool:
+    """Whether a surface has an inside."""
+    if isinstance(shape, Revolved | Extruded):
+        return shape.closed
+    if isinstance(shape, Fitted):
+        return all(shape.closed)
+    return not isinstance(shape, Plane)
+
 
 _START = ("refuse", "move_out")
 

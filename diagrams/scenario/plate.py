@@ -4,7 +4,6 @@ import dataclasses as dc
 
 import numpy as np
 
-from diagrams.scenario.ball import require_contact_step, require_up_to
 from diagrams.scenario.checks import (
     require,
     require_between,
@@ -12,6 +11,7 @@ from diagrams.scenario.checks import (
     require_numbers,
     require_positive,
 )
+from diagrams.scenario.workpiece import require_contact_step, require_up_to
 from pfsc_drake.geometry.bore import FEWEST_WEDGES
 from pfsc_drake.physics.mounting_hand import MountingHandParameters
 from pfsc_drake.physics.suction import SuctionParameters

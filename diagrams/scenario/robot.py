@@ -1,4 +1,4 @@
-"""Which robot a scenario is about."""
+"""Which robot a scenario is about, with its drives and its force sensor."""
 
 import dataclasses as dc
 from pathlib import Path
@@ -9,9 +9,14 @@ from pydrake.math import RigidTransform, RotationMatrix
 from diagrams.scenario.checks import (
     LARGEST_ANGLE,
     require,
+    require_not_negative,
     require_numbers,
+    require_positive,
 )
+from pfsc_drake.control.compliance.taring import STILL_TIME
+from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
 from pfsc_drake.geometry import zyx_to_matrix
+from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters
 from pfsc_drake.robot.models.elastic_joints import ElasticJoints
 from pfsc_drake.robot.models.reading import ModelOptions
 from pfsc_drake.yaml.reading import FILE, NAME_OR_FILE
@@ -143,4 +148,151 @@ class RobotParameters:
             {name: folder / path for name, path in self.packages.items()},
             self.elastic.joints(),
             self.joint_damping,
+        )
+
+
+_SHORTEST_PERIOD = 1e-6  # s
+
+
+@dc.dataclass
+class LostFrames:
+    """When a bus loses its frames.
+
+    Attributes:
+        begin: From when on [s].
+        end: Until when [s]; not later than ``begin`` for never.
+    """
+
+    begin: float = 0.0
+    end: float = 0.0
+
+    def __post_init__(self) -> None:
+        finite = bool(np.isfinite(self.begin)) and not np.isnan(self.end)
+        require(finite, "begin", [self.begin, self.end], "numbers of seconds")
+
+
+@dc.dataclass
+class ServoParameters:
+    """Velocity controllers of the joints, behind the law ``velocity_servo``.
+
+    Attributes:
+        bandwidth: ``omega`` [rad/s], see :func:`~pfsc_drake.physics.velocity_servo.servo_gains`.
+        integral_rate: Rate at which loads are removed [rad/s]; 0 for no integral part,
+            negative for a quarter of the bandwidth.
+        period: Sampling time [s], from 1e-6 on, a whole fraction of the controller's; 0 for the
+            same.
+        bus_delay: Delay between law and servo [s], a multiple of the controller's
+            sampling time, at most 10,000 of it; 0 for none.
+        lost: When the bus loses what is sent; it needs a delay.
+        watchdog: How long no reference may come over the bus until the servos stop by
+            themselves [s]; 0 for ever.
+    """
+
+    bandwidth: float = 200.0
+    integral_rate: float = -1.0
+    period: float = 0.0
+    bus_delay: float = 0.0
+    lost: LostFrames = dc.field(default_factory=LostFrames)
+    watchdog: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_positive("bandwidth", self.bandwidth)
+        require(
+            bool(np.isfinite(self.integral_rate)),
+            "integral_rate",
+            self.integral_rate,
+            "a finite number",
+        )
+        good = self.period == 0.0 or _SHORTEST_PERIOD <= self.period <= 0.1
+        allowed = f"zero or a positive number, {_SHORTEST_PERIOD:g} to 0.1 s"
+        require(good, "period", self.period, allowed)
+        require_not_negative("bus_delay", self.bus_delay)
+        require_not_negative("watchdog", self.watchdog)
+        loses = self.lost.end > self.lost.begin
+        require(not loses or self.bus_delay > 0.0, "lost", self.lost, "only with a bus_delay")
+
+
+@dc.dataclass
+class SensorParameters:
+    """The force/torque sensor and how its signal is used; only built with compliance.
+
+    In arrays of six, the first three entries are forces [N], the others torques [Nm].
+
+    Attributes:
+        joint: Fixed joint of the model with the sensor in it; its child side is the tool. By
+            default, of those between the last moving link and the tool frame, the nearest to the
+            tool that has mass behind it.
+        measurement_range: Largest magnitude that is measured, shape (6,).
+        bias: Reading without load, shape (6,).
+        noise: Standard deviation of one sample, shape (6,). A sensor that has some and repeats
+            itself to the last bit is lost; 0 where its steps are larger than that.
+        bandwidth: Of the sensor's filter, and of the tool compensation's [Hz].
+        delay: Until the controller has what is measured [s], a multiple of its sampling time,
+            shorter than taring and than what a sensor may stand still.
+        seed: Of the noise.
+        inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
+        unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
+            said before a run alone, see
+            :func:`~diagrams.tasks.sensed_load.sensed_load_warnings`, and for margins.
+        taring_time: Length of the quiet stretch whose mean becomes the bias [s].
+        taring_spread: Largest difference of means over 10 ms within it, shape (6,).
+        taring_bias: Largest bias that is believed, shape (6,).
+        force_dead_band: [N].
+        torque_dead_band: [Nm].
+    """
+
+    joint: str = ""
+    measurement_range: np.ndarray = dc.field(
+        default_factory=lambda: ForceTorqueParameters().measurement_range
+    )
+    bias: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().bias)
+    noise: np.ndarray = dc.field(default_factory=lambda: ForceTorqueParameters().noise)
+    bandwidth: float = 200.0
+    delay: float = 0.0
+    seed: int = 0
+    inertia: str = "differentiated"
+    unknown_mass: float = 0.0
+    taring_time: float = 0.05
+    taring_spread: np.ndarray = dc.field(
+        default_factory=lambda: ToolCompensationParameters().taring_spread
+    )
+    taring_bias: np.ndarray = dc.field(
+        default_factory=lambda: ToolCompensationParameters().taring_bias
+    )
+    force_dead_band: float = 0.0
+    torque_dead_band: float = 0.0
+
+    def __post_init__(self) -> None:
+        # accelerations are known to no component of the station
+        known = self.inertia in ("differentiated", "none")
+        require(known, "inertia", self.inertia, "differentiated, none")
+        require_not_negative("unknown_mass", self.unknown_mass)
+        self.transducer()
+        self.compensation()
+        # until something comes there is nothing to tare, and a sensor that says nothing is lost
+        longest = min(STILL_TIME, self.taring_time)
+        allowed = f"at least 0 and below {longest:g} s"
+        require(0.0 <= self.delay < longest, "delay", self.delay, allowed)
+
+    def transducer(self) -> ForceTorqueParameters:
+        """Return the properties of the sensor itself."""
+        return ForceTorqueParameters(
+            measurement_range=self.measurement_range,
+            bias=self.bias,
+            noise=self.noise,
+            bandwidth=self.bandwidth,
+            seed=self.seed,
+        )
+
+    def compensation(self) -> ToolCompensationParameters:
+        """Return how the tool's load is taken off."""
+        return ToolCompensationParameters(
+            inertia=self.inertia,
+            bandwidth=self.bandwidth,
+            taring_time=self.taring_time,
+            taring_spread=self.taring_spread,
+            taring_bias=self.taring_bias,
+            force_dead_band=self.force_dead_band,
+            torque_dead_band=self.torque_dead_band,
+            noise=self.noise,
         )

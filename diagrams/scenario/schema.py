@@ -10,20 +10,19 @@ from diagrams.scenario.checks import (
     require_not_negative,
     require_positive,
 )
-from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.fixtures import FixtureParameters
-from diagrams.scenario.force_sensor import SensorParameters
-from diagrams.scenario.forces import HoldBackParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
-from diagrams.scenario.notch import NotchParameters
-from diagrams.scenario.operator import OperatorParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.plate import PlateParameters
-from diagrams.scenario.robot import RobotParameters
-from diagrams.scenario.simulation import SimulationParameters
+from diagrams.scenario.robot import RobotParameters, SensorParameters, ServoParameters
+from diagrams.scenario.simulation import (
+    HoldBackParameters,
+    OperatorParameters,
+    SimulationParameters,
+)
 from diagrams.scenario.surface import SurfaceParameters
-from diagrams.scenario.workpiece import WorkpieceParameters
+from diagrams.scenario.workpiece import NotchParameters, WorkpieceParameters
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters

@@ -1,15 +1,15 @@
-"""How a scenario is simulated."""
+"""How a scenario is simulated, what pushes the tool, who leads it."""
 
 import dataclasses as dc
 
 import numpy as np
 from pydrake.systems.analysis import GetIntegrationSchemes
 
-from diagrams.scenario.checks import (
-    require,
-    require_between,
-)
+from diagrams.scenario.checks import require, require_between, require_positive
+from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.force_torque_sensor import KINDS
+from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.yaml.reading import FILE
 
 # the integrator that is chosen for a robot before it runs
 AUTO = "auto"
@@ -83,3 +83,42 @@ class SimulationParameters:
             self.accuracy,
             f"0 (fixed steps) with {' and '.join(stale)}; runge_kutta3 has error control",
         )
+
+
+@dc.dataclass
+class HoldBackParameters:
+    """A wrench that holds the robot back along its path and has no other effect (Sec. 3.8.4).
+
+    Attributes:
+        begin: When it leaves zero [s].
+        end: When it is zero again [s].
+        force: Along the tangent [N], negative against growing ``eta``; 0 for none.
+        ramp: Time from zero to full and back [s].
+    """
+
+    begin: float = 0.0
+    end: float = 1.0
+    force: float = 0.0
+    ramp: float = 0.05
+
+    def __post_init__(self) -> None:
+        require(np.isfinite(self.force), "force", self.force, "a finite number")
+        require_positive("ramp", self.ramp)
+        long_enough = 2.0 * self.ramp <= (self.end - self.begin) * (1.0 + 1e-9)
+        require(long_enough, "end", self.end, "begin + 2 ramp or later")
+
+
+@dc.dataclass
+class OperatorParameters:
+    """A person at the controls: a hand on the tool, and the impedance that yields to it.
+
+    Attributes:
+        inputs: CSV file with what was done, one line per change, see
+            :mod:`diagrams.surroundings.operator`; a live session leaves it empty.
+        hand: The hand.
+        tuning: How the impedance follows what the person sets.
+    """
+
+    inputs: str = dc.field(default="", metadata=FILE)
+    hand: LiveHandParameters = dc.field(default_factory=LiveHandParameters)
+    tuning: TuningParameters = dc.field(default_factory=TuningParameters)

@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame
 
-from diagrams.scenario.ball import SoftBall
+from diagrams.scenario.workpiece import SoftBall
 
 
 def add_soft_ball(

@@ -7,9 +7,8 @@ from diagrams.robots.arm import Arm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
-from diagrams.surroundings.hand import add_hand
 from diagrams.surroundings.mounting import Mounting
-from diagrams.surroundings.mounting_parts import add_mounting
+from diagrams.surroundings.mounting_parts import add_hand, add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
 from diagrams.surroundings.pushes import add_pushes
 from diagrams.tasks.task import StartPoint, Task

@@ -1,22 +1,41 @@
 """What plates, gripper, magazine and frame look like."""
 
-import numpy as np
-from pydrake.geometry import Box, Cylinder, Rgba
-from pydrake.math import RigidTransform
+from dataclasses import dataclass
 
-from diagrams.drawing.mounting_drawing import MountingLook, ring_surface
+import numpy as np
+from pydrake.geometry import Box, Cylinder, Meshcat, Rgba
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.plate_plant import PAD, pin_shape
 from pfsc_drake.geometry.bore import bore_wedges
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Surface
-from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
+from pfsc_drake.systems.drawing.tool_visualizer import ToolPart, ToolVisualizer
 
 _FRAME, _MAGAZINE = Rgba(0.75, 0.72, 0.66, 1.0), Rgba(0.55, 0.62, 0.55, 1.0)
 _CUP, _PLATE = Rgba(0.16, 0.17, 0.19, 1.0), Rgba(0.02, 0.53, 0.82, 0.85)
 _CUP_RADIUS, _CUP_HEIGHT = 0.016, 0.03  # m
 _BOARD, _BAR = 0.006, 0.02  # m
+
+
+@dataclass(frozen=True)
+class MountingLook:
+    """How plates and what belongs to them are drawn.
+
+    Attributes:
+        fixed: What stands in the world.
+        bores: Rings around the bores, world axes.
+        gripper: What moves with the tool.
+        plate: What moves with each plate.
+    """
+
+    fixed: list[ToolPart]
+    bores: Surface
+    gripper: list[ToolPart]
+    plate: list[ToolPart]
 
 
 def mounting_look(mounting: Mounting) -> MountingLook:
@@ -76,3 +95,52 @@ def _plate(plate: PlateParameters) -> list[ToolPart]:
     for i, (x, y) in enumerate(plate.pins.positions):
         parts.append(ToolPart(f"pin_{i}", pin, ACCENT, RigidTransform([x, y, depth])))
     return parts
+
+
+_BORE = Rgba(0.45, 0.47, 0.50, 1.0)
+
+
+def add_mounting_drawing(
+    builder: DiagramBuilder,
+    look: MountingLook,
+    tool_pose: OutputPort,
+    plates: list[OutputPort],
+    meshcat: Meshcat,
+    period: float,
+) -> None:
+    """Draw magazine and frame, and let gripper and plates move.
+
+    Args:
+        builder: Builder of the replay.
+        look: How they are drawn.
+        tool_pose: ``[y_t, R_e by rows]``, shape (12,).
+        plates: The same of each plate.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+    """
+    vertices, triangles = look.bores.vertices.T, look.bores.triangles.T
+    meshcat.SetTriangleMesh("mounting/bores", vertices, triangles, _BORE)
+    for part in look.fixed:
+        meshcat.SetObject(f"mounting/{part.name}", part.shape, part.color)
+        meshcat.SetTransform(f"mounting/{part.name}", part.X_TP)
+    moving = {"gripper": (look.gripper, tool_pose)}
+    moving |= {f"plate_{k + 1}": (look.plate, port) for k, port in enumerate(plates)}
+    for name, (parts, pose) in moving.items():
+        system = builder.AddNamedSystem(
+            f"{name}_visualizer", ToolVisualizer(parts, meshcat, period, f"mounting/{name}")
+        )
+        builder.Connect(pose, system.GetInputPort("tool_pose"))
+
+
+def ring_surface(wedges: np.ndarray) -> Surface:
+    """Return the faces of a ring of wedges that can be seen.
+
+    Args:
+        wedges: Corners as :func:`bore_wedges` gives them, shape (count, 8, 3).
+    """
+    # corners: bit 2 outside, bit 1 side, bit 0 bottom; both orders, to be seen from both sides
+    quads = np.array([[0, 2, 6, 4], [0, 1, 3, 2], [4, 6, 7, 5], [1, 5, 7, 3]])
+    pairs = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    triangles = np.concatenate([pairs, pairs[:, ::-1]])
+    offsets = 8 * np.arange(len(wedges))[:, np.newaxis, np.newaxis]
+    return Surface(wedges.reshape(-1, 3), (offsets + triangles).reshape(-1, 3))

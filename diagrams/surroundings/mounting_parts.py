@@ -1,4 +1,6 @@
-"""What takes part in mounting plates beside the robot: plates, gripper and operator."""
+"""What takes part in mounting plates beside the robot; hands on the tool."""
+
+from collections.abc import Callable
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
@@ -7,19 +9,90 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.hand import connect_hand
 from diagrams.surroundings.mounting import Mounting, tool_transform
 from diagrams.surroundings.plate_plant import add_plate_plant
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
+from pfsc_drake.control.manifolds.manifold import ToolKinematics
+from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand
+from pfsc_drake.physics.operator_hand import OperatorHand
 from pfsc_drake.physics.suction import SuctionGripper, holding_cups
 from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.plants.external_forces import AppliedForces
+
+
+def add_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    task: Task,
+    scenario: Scenario,
+    joint_state: OutputPort,
+) -> list[OutputPort]:
+    """Add the scenario's hand, which sees where the tool really is.
+
+    Its wrench is held together with all other forces, one sampling time more of delay.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        task: What it is to do, for targets in coordinates of its manifold.
+        scenario: The scenario.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+
+    Returns:
+        The wrench on the tool point, world axes, shape (6,) [N, Nm]; none without hand.
+
+    Raises:
+        InputError: If a target is off the path, or the reaction delay no multiple of the
+            sampling time.
+    """
+    if scenario.hand is None:
+        return []
+    hand = connect_hand(builder, robot, task, scenario, joint_state, OperatorHand)
+    return [hand.GetOutputPort("wrench")]
+
+
+def connect_hand(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    task: Task,
+    scenario: Scenario,
+    joint_state: OutputPort,
+    make: Callable[[HandParameters, float, Place], OperatorHand],
+) -> BlockSystem:
+    """Add a hand of some kind that sees where the tool really is.
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot.
+        task: See :func:`add_hand`.
+        scenario: The scenario, with a hand.
+        joint_state: The true ``[q_J, v_J, q_M, v_M]``.
+        make: Makes it of its properties, the sampling time [s] and what tells where coordinates
+            of the manifold are.
+
+    Raises:
+        InputError: See :func:`add_hand`.
+    """
+    parameters, period = scenario.hand, scenario.controller.sampling_time
+    assert parameters is not None
+    if parameters.frame == "manifold":
+        for i, place in enumerate(parameters.places()[1]):
+            task.check_place(place, f"hand.waypoints[{i}].position")
+    try:
+        block = make(parameters, period, task.target())
+    except InputError as error:
+        raise InputError(f"hand.{error}") from None
+    hand = builder.AddNamedSystem("operator_hand", BlockSystem(block, period))
+    view = builder.AddNamedSystem("hand_view", BlockSystem(ToolKinematics(robot), period))
+    builder.Connect(joint_state, view.GetInputPort("joint_state"))
+    builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
+    return hand
 
 
 def add_mounting(

@@ -13,9 +13,9 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.frame import surface_axes
-from pfsc_drake.geometry.surfaces.mesh import surface_mesh
+from pfsc_drake.geometry.surfaces.point import surface_axes
 from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.sweep import surface_mesh
 from pfsc_drake.robot.delta.shapes import ACCENT
 from pfsc_drake.systems.drawing.robot_visualizer import Surface as Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
@@ -98,8 +98,8 @@ class PressedWorkpiece(Workpiece):
     def stiffness(self, force: float) -> float:
         """Return the stiffness of the contact along the normal where it bears a force [N/m].
 
-        See :func:`~diagrams.scenario.ball.SoftBall.stiffness`; the workpiece is rigid, and flat
-        where it is touched.
+        See :meth:`SoftBall.stiffness <diagrams.scenario.workpiece.SoftBall.stiffness>`; the
+        workpiece is rigid, and flat where it is touched.
 
         Args:
             force: [N].

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.believed import believed_robot
+from diagrams.robots.belief import believed_robot
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.space_guidance import SpaceTask

@@ -10,14 +10,14 @@ from diagrams.tasks.surface import given_quaternion, make_surface, normal_offset
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Curve, OrientationCurve, Path, read_waypoints
-from pfsc_drake.geometry.path_on_surface import path_on_surface
-from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.geometry.waypoints_on_surface import (
+from pfsc_drake.geometry.path_on_surface import (
     curve_through,
     normal_orientation,
+    path_on_surface,
     project_waypoints,
 )
+from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.surfaces.surface import Surface
 
 
 def surface_of_path(scenario: Scenario) -> SurfaceParameters | None:

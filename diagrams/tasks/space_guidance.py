@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.region_drawing import SpaceDrawing
+from diagrams.drawing.manifold_drawing import SpaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters

@@ -11,8 +11,8 @@ from diagrams.drawing.manifold_drawing import ManifoldDrawing
 from diagrams.tasks.drive_plan import DrivePlan
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
-from pfsc_drake.geometry.surfaces.report import SurfaceReport
-from pfsc_drake.geometry.surfaces.residuals import Residuals
+from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
+from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem

@@ -50,7 +50,7 @@ from experiments.figures.posture import (
     has_pushes,
 )
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.geometry.surfaces.residuals import Residuals
+from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.registry import FIGURES
 from reporting.style import STYLE, Drawing, Figure, render
 

@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from experiments.results.run_log import FloatArray, RunLog
-from pfsc_drake.geometry.surfaces.residuals import Residuals
+from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from reporting.style import BROAD, COLOURS, INK, REFERENCE, WIDTH, Drawing, fitting_unit
 
 ARROW_COUNT = 5

@@ -11,8 +11,7 @@ from pfsc_drake.control.fixtures.robot_limits import limit_kinds
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.robot.serial.chain import SerialChain
-from pfsc_drake.robot.serial.singularity_name import singularity_name
-from pfsc_drake.robot.singular_posture import singular_posture
+from pfsc_drake.robot.singular_posture import singular_posture, singularity_name
 
 # below it, time is said to be slower than the clock
 _SLOW = 0.95

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagrams.surroundings.operator import Operator
-from diagrams.surroundings.operator_file import controls_text
+from diagrams.surroundings.operator import Operator, controls_text
 from experiments.finished_run import FinishedRun, RunOutcome, write_outcome
 from experiments.preparation import PreparedRun
 from experiments.simulation import SimulationResult
@@ -49,7 +48,7 @@ class ControlRecord:
         self._rows.append(controls.copy())
 
     def text(self) -> str:
-        """Return the content of a file, see :mod:`diagrams.surroundings.operator_file`."""
+        """Return the content of a file, see :mod:`diagrams.surroundings.operator`."""
         return controls_text(self._ticks, self._rows, self._operator.regions)
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from experiments.results.drives import peak_torque, saturation_count
 from experiments.results.run_log import FloatArray, RunLog, peak
 from pfsc_drake.geometry import ShapeReport
-from pfsc_drake.geometry.surfaces.report import SurfaceReport
-from pfsc_drake.geometry.surfaces.residuals import Residuals
+from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
+from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
 from reporting.metrics import Metrics
 
 

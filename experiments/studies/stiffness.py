@@ -17,7 +17,7 @@ from experiments.sweep.many import run_side_by_side
 from experiments.sweep.worker import COMPLETED, RunRow
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import open_results
 from reporting.metrics import Metrics

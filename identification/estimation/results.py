@@ -39,7 +39,7 @@ from identification.measurement.columns import si_unit
 from identification.model.base import BaseParameters
 from identification.output import write_bytes
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.files.regular_file import read_regular_file
+from pfsc_drake.geometry.files.number_table import read_regular_file
 
 FILE_NAME = "identification.h5"
 _MOTION = {"q": "q", "v": "v", "a": "a", "torque_variance": "tau", "mean_torque_variance": "tau"}

@@ -29,8 +29,7 @@ from identification.measurement.record import SIGNALS, MeasuredRobot, Record
 from identification.measurement.synchronization import check_velocities
 from identification.output import write_bytes
 from pfsc_drake.errors import InputError, shortened
-from pfsc_drake.geometry.files.number_table import read_numbers
-from pfsc_drake.geometry.files.regular_file import read_regular_file, unreadable
+from pfsc_drake.geometry.files.number_table import read_numbers, read_regular_file, unreadable
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _PERIOD = re.compile(r"#\s*period\s*\[s\]\s*=\s*(\S+)\s*")

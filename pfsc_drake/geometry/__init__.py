@@ -9,8 +9,8 @@ from pfsc_drake.geometry.curves.orientation import OrientationCurve, interpolate
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.smoothing import noise_level
 from pfsc_drake.geometry.curves.spline import interpolate
-from pfsc_drake.geometry.intersections.corner import find_corners
 from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
+from pfsc_drake.geometry.intersections.meeting import find_corners
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
@@ -19,12 +19,13 @@ from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projection, Projector
 from pfsc_drake.geometry.paths.shape_report import ShapeReport, shape_report
 from pfsc_drake.geometry.paths.taught import Picking, pick_waypoints
-from pfsc_drake.geometry.paths.waypoint_file import (
+from pfsc_drake.geometry.paths.waypoints import (
+    Tolerance,
     WaypointTable,
+    path_from_waypoints,
     read_waypoints,
     waypoints_text,
 )
-from pfsc_drake.geometry.paths.waypoints import Tolerance, path_from_waypoints
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
     angle_between,
@@ -52,13 +53,16 @@ from pfsc_drake.geometry.surfaces.generated import (
 )
 from pfsc_drake.geometry.surfaces.grid import surface_through_grid
 from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
-from pfsc_drake.geometry.surfaces.partials import partial_count, partial_index, partial_orders
 from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.point_file import read_surface_points
 from pfsc_drake.geometry.surfaces.product import ProductSurface
-from pfsc_drake.geometry.surfaces.projection import SurfaceProjection, SurfaceProjector
-from pfsc_drake.geometry.surfaces.report import SurfaceReport, surface_report
+from pfsc_drake.geometry.surfaces.projection import (
+    GlobalProjector,
+    SurfaceProjection,
+    SurfaceProjector,
+)
+from pfsc_drake.geometry.surfaces.regularity import SurfaceReport, surface_report
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, SurfaceFit, fit_scattered
 from pfsc_drake.geometry.surfaces.shapes import (
     Turned,
@@ -70,8 +74,12 @@ from pfsc_drake.geometry.surfaces.shapes import (
     torus,
 )
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
-from pfsc_drake.geometry.surfaces.start import GlobalProjector
-from pfsc_drake.geometry.surfaces.surface import Surface
+from pfsc_drake.geometry.surfaces.surface import (
+    Surface,
+    partial_count,
+    partial_index,
+    partial_orders,
+)
 
 __all__ = [
     "ArcLength",

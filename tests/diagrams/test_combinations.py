@@ -17,7 +17,7 @@ from diagrams.scenario import (
     Line,
     Scenario,
 )
-from diagrams.scenario.notch import BallParameters, NotchParameters
+from diagrams.scenario.workpiece import BallParameters, NotchParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.control.compliance.tool_compensation import SensorFault

@@ -9,7 +9,7 @@ from pydrake.systems.primitives import LinearSystem, ZeroOrderHold
 from diagrams.builder import build_station
 from diagrams.integration import STABILITY, Integration, continuous_modes, is_stable
 from diagrams.scenario import SimulationParameters
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 
 STEP = 1e-3
 

@@ -15,7 +15,7 @@ from experiments.scenario_file import read_scenario
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
 
 RIGID = (

@@ -14,8 +14,7 @@ from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.regions.course import CurveCourse
-from pfsc_drake.geometry.regions.moving import ShiftedRegion
+from pfsc_drake.geometry.regions.moving import CurveCourse, ShiftedRegion
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
 from tests.following.pulled import Pulled

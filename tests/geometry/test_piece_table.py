@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.piece_table import PieceTable
+from pfsc_drake.geometry.curves.polynomial import PieceTable
 
 RNG = np.random.default_rng(3)
 BREAKS = np.cumsum(RNG.uniform(0.1, 1.0, 6))

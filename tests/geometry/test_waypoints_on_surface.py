@@ -7,14 +7,14 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import angle_between, zyx_to_matrix
-from pfsc_drake.geometry.path_on_surface import path_on_surface
-from pfsc_drake.geometry.paths.target import PathTarget
-from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
-from pfsc_drake.geometry.waypoints_on_surface import (
+from pfsc_drake.geometry.path_on_surface import (
     curve_through,
     normal_orientation,
+    path_on_surface,
     project_waypoints,
 )
+from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
 
 RADIUS = 0.2
 TUBE = cylinder(RADIUS, (-0.5, 0.5))

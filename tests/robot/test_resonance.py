@@ -5,7 +5,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.robot.models.files import resolve_model
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.serial.links import ChainLink

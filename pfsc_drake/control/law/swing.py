@@ -155,5 +155,5 @@ class SwingingCourse:
         self.largest_rate = abs(amplitude) * max(2.0 * math.pi * frequency, rising)
 
     def at(self, clock: ca.MX) -> ca.MX:
-        """See :class:`~pfsc_drake.geometry.regions.course.Course`."""
+        """See :class:`~pfsc_drake.geometry.regions.moving.Course`."""
         return self._amplitude * self._unit.at(clock)

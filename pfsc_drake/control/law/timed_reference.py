@@ -12,7 +12,7 @@ from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.checks import require_positive
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.piece_table import PieceTable
+from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.jets import Jet, compose
 
 # of the pace that was planned; backwards likewise

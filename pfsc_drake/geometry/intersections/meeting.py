@@ -1,9 +1,13 @@
-"""Parameters at which surfaces meet: one system of equations, solved by Newton's method."""
+"""Where surfaces meet, by Newton's method; where they touch; corners of three."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.surfaces.regularity import SampleGrid, sample_grid
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _ITERATIONS = 40
@@ -123,3 +127,178 @@ def numbers(place: np.ndarray) -> str:
     """Return a place for a message, [3], m."""
     rounded = np.round(place, 9) + 0.0
     return "[" + ", ".join(f"{value:.6g}" for value in rounded) + "] m"
+
+
+# Radius of the ball around a sample over half of the diagonal to its neighbours: surfaces bend.
+_MARGIN = 1.25
+# More starts would take long; that many are there where surfaces coincide.
+_MOST_STARTS = 20_000
+
+
+def starts(surfaces: Sequence[Surface]) -> np.ndarray:
+    """Parameters of samples that are so near that their surfaces may meet between them.
+
+    Samples are as fine as :func:`sample_grid` makes them; what is of all surfaces lies in
+    the balls around one sample of each.
+
+    Args:
+        surfaces: m = 2 or 3.
+
+    Returns:
+        Shape [n, 2 m], at most 20,000.
+
+    Raises:
+        InputError: The surfaces are everywhere farther from each other; says how far.
+    """
+    grids = [sample_grid(surface) for surface in surfaces]
+    points = [grid.position.reshape(-1, 3) for grid in grids]
+    radii = [_radii(grid).ravel() for grid in grids]
+    theta = [grid.theta.reshape(-1, 2) for grid in grids]
+    near = [_near(points[0], radii[0], points[k], radii[k]) for k in range(1, len(grids))]
+    rows = []
+    for first, others in enumerate(zip(*near, strict=True)):
+        for group in itertools.product(*others):
+            if len(group) < 2 or _touch(points, radii, group):
+                rows.append((first, *group))
+    if not rows:
+        raise InputError(_apart(points))
+    table = np.array(rows)
+    table = table[:: -(-len(table) // _MOST_STARTS)]
+    return np.hstack([own[column] for own, column in zip(theta, table.T, strict=True)])
+
+
+def distinct(meeting: Meeting, theta: np.ndarray, distance: float) -> np.ndarray:
+    """Parameters [n, 2 m] of which no two places are nearer than a distance [m], the first kept."""
+    places = meeting.partials(theta, 0)[0, :, 0]
+    kept: list[int] = []
+    for row, place in enumerate(places):
+        if not kept or np.linalg.norm(places[kept] - place, axis=1).min() > distance:
+            kept.append(row)
+    return theta[kept]
+
+
+def _radii(grid: SampleGrid) -> np.ndarray:
+    """Radii of balls around samples that hold the surface between them, [n_1, n_2]."""
+    square = np.zeros(grid.position.shape[:2])
+    for axis in (0, 1):
+        step = np.moveaxis(grid.spacing(axis), axis, 0)
+        if not grid.closed[axis]:
+            step = np.concatenate([step[:1], step, step[-1:]])
+            longest = np.maximum(step[1:], step[:-1])
+        else:
+            longest = np.maximum(step, np.roll(step, 1, axis=0))
+        square += np.moveaxis(longest, 0, axis) ** 2
+    return np.asarray(_MARGIN * 0.5 * np.sqrt(square))
+
+
+def _near(one: np.ndarray, r: np.ndarray, other: np.ndarray, s: np.ndarray) -> list[list[int]]:
+    """For each ball around the points of one those of another, by radius, that it meets."""
+    found = cKDTree(other).query_ball_point(one, r + s.max())
+    return [
+        [j for j in near if np.linalg.norm(one[i] - other[j]) <= r[i] + s[j]] if near else []
+        for i, near in enumerate(found)
+    ]
+
+
+def _touch(points: list[np.ndarray], radii: list[np.ndarray], group: tuple[int, ...]) -> bool:
+    """Whether the balls of the second and the third surface meet, too."""
+    j, k = group
+    return bool(np.linalg.norm(points[1][j] - points[2][k]) <= radii[1][j] + radii[2][k])
+
+
+def _apart(points: list[np.ndarray]) -> str:
+    far = np.max([cKDTree(other).query(points[0])[0] for other in points[1:]], axis=0)
+    return (
+        f"surfaces: do not meet within their bounds, {far.min():.3g} m between their nearest "
+        "samples; larger or other ones are required"
+    )
+
+
+# Sine of the angle between normals below which surfaces touch: the distance from a place at which
+# they do is found but roughly.
+_TOUCHING = 1e-3
+# Difference of curvatures times the size, below which surfaces that touch are one.
+_ONE = 1e-4
+
+
+def require_crossing(meeting: Meeting, theta: np.ndarray) -> None:
+    """Refuse places at which two surfaces have one tangent plane.
+
+    Args:
+        meeting: Two surfaces of class C^2.
+        theta: Parameters of places that they have in common, [n, 4].
+
+    Raises:
+        InputError: They touch or coincide there; says which and where.
+    """
+    first, second = meeting.normals(theta)
+    sine = np.linalg.norm(np.cross(first, second), axis=1)
+    row = int(np.argmin(sine))
+    if sine[row] > _TOUCHING:
+        return
+    where = numbers(meeting.partials(theta[row : row + 1], 0)[0, 0, 0])
+    same_side = float(np.sign(first[row] @ second[row]))
+    bends = [_bending(meeting, k, theta[row]) for k in (0, 1)]
+    if np.abs(bends[0] - same_side * bends[1]).max() * meeting.size < _ONE:
+        raise InputError(
+            f"surfaces: coincide around {where}; two that cross each other are required"
+        )
+    raise InputError(
+        f"surfaces: touch at {where} instead of crossing each other; an edge is where their "
+        "normals differ"
+    )
+
+
+def _bending(meeting: Meeting, k: int, theta: np.ndarray) -> np.ndarray:
+    """Second fundamental form of surface k in the directions of space, [3, 3], 1/m."""
+    partials = meeting.partials(theta[None], 2)[k, 0]
+    normal = np.cross(partials[1], partials[2])
+    normal /= np.linalg.norm(normal)
+    second = np.array([[partials[3] @ normal, partials[4] @ normal]] * 2)
+    second[1] = partials[4] @ normal, partials[5] @ normal
+    dual = np.linalg.pinv(partials[1:3])
+    return np.asarray(dual @ second @ dual.T)
+
+
+# Volume that three unit normals span, below which they lie in a plane.
+_FLAT = 1e-3
+# Of the size: corners that are nearer to each other are one.
+_ONE_CORNER = 1e-6
+
+
+def find_corners(first: Surface, second: Surface, third: Surface) -> np.ndarray:
+    """All places at which three surfaces meet.
+
+    What is smaller than the samples of :func:`sample_grid` may be overlooked.
+
+    Args:
+        first: Surface of class C^1.
+        second: Another.
+        third: Another.
+
+    Returns:
+        Places [corners, 3], m, one or more, by x, then y, then z.
+
+    Raises:
+        InputError: They meet nowhere within their bounds, or somewhere with normals that lie in a
+            plane, as where an edge of two touches the third; says where.
+    """
+    meeting = Meeting([first, second, third])
+    theta, good = meeting.solve(starts(meeting.surfaces))
+    if not good.any():
+        raise InputError(
+            "surfaces: all three do not meet within their bounds, though they come as near as "
+            f"{meeting.gaps(theta).min():.3g} m; larger or other ones are required"
+        )
+    theta = theta[good]
+    volume = np.abs(np.linalg.det(meeting.normals(theta).transpose(1, 0, 2)))
+    row = int(np.argmin(volume))
+    if volume[row] < _FLAT:
+        where = numbers(meeting.partials(theta[row : row + 1], 0)[0, 0, 0])
+        raise InputError(
+            f"surfaces: an edge of two touches the third at {where}; a corner is where three "
+            "normals do not lie in a plane"
+        )
+    one = _ONE_CORNER * meeting.size
+    places = meeting.partials(distinct(meeting, theta, one), 0)[0, :, 0]
+    return places[np.lexsort(np.round(places / one).T[::-1])]

@@ -12,14 +12,13 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
+from pfsc_drake.geometry.curves.polynomial import PieceTable
 from pfsc_drake.geometry.foot import FootFinder
 from pfsc_drake.geometry.nearest_samples import nearest_samples
 from pfsc_drake.geometry.paths.arc_length import ArcLength
+from pfsc_drake.geometry.paths.frame import Frame
 from pfsc_drake.geometry.paths.point import PathPointLayout
-from pfsc_drake.geometry.paths.run_out import Continuation, continuations
-from pfsc_drake.geometry.paths.table import PathTable, tabulate
-from pfsc_drake.geometry.paths.turned_frame import Frame
-from pfsc_drake.geometry.piece_table import PieceTable
+from pfsc_drake.geometry.paths.table import Continuation, PathTable, continuations, tabulate
 from pfsc_drake.geometry.projection_status import ProjectionStatus
 
 # Of the domain.

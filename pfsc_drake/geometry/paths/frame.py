@@ -1,6 +1,7 @@
-"""Parallel transport frame along a curve."""
+"""Parallel transport frame along a curve, and one that is turned on a closed lap."""
 
 import math
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -177,3 +178,55 @@ def manifold_axes(slope: np.ndarray, e_perp: np.ndarray) -> np.ndarray:
     x, y, z = (x / norm, y / norm, z / norm) if norm > 0.0 else (math.nan,) * 3
     u, v, w = e_perp.tolist()
     return np.array([[x, u, y * w - z * v], [y, v, z * u - x * w], [z, w, x * v - y * u]])
+
+
+class Frame(Protocol):
+    """Orthonormal frame (e_par, e_perp, e_cross) along a curve.
+
+    Attributes:
+        turns: Whether it turns about the tangent, by an angle psi against parallel transport.
+        holonomy: Angle about e_par from e_perp(theta) to e_perp(theta + period), rad.
+        breakpoints: Between two of them it is smooth, [n].
+    """
+
+    turns: bool
+    holonomy: float
+    breakpoints: np.ndarray
+
+    def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Both normal vectors e_perp and e_cross, each [..., 3]."""
+
+    def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """Derivatives 1..order of psi by theta, rad, [..., order]."""
+
+
+class TurnedFrame:
+    """A parallel transport frame turned by an angle psi about the tangent.
+
+    Args:
+        transported: The frame.
+        psi: Curve of the angle, rad, of dimension 1.
+
+    Attributes:
+        turns: True.
+        holonomy: Zero; for open curves only.
+        breakpoints: See `Frame`.
+    """
+
+    turns = True
+    holonomy = 0.0
+
+    def __init__(self, transported: ParallelTransportFrame, psi: Curve) -> None:
+        self._transported, self._psi = transported, psi
+        self.breakpoints = transported.breakpoints
+
+    def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """See `Frame`."""
+        e_perp, e_cross = self._transported.normals(theta)
+        angle = self._psi.derivatives(theta, 0)[..., 0, :]
+        c, s = np.cos(angle), np.sin(angle)
+        return c * e_perp + s * e_cross, c * e_cross - s * e_perp
+
+    def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
+        """See `Frame`."""
+        return self._psi.derivatives(theta, order)[..., 1:, 0]

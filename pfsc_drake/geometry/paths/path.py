@@ -12,8 +12,7 @@ from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
-from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
-from pfsc_drake.geometry.paths.turned_frame import Frame
+from pfsc_drake.geometry.paths.frame import Frame, ParallelTransportFrame
 
 _IRREGULAR = 1e-6
 _SUSPICIOUS = 0.2

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.moving import MovingRegion
-from pfsc_drake.geometry.regions.placement import axes_along
-from pfsc_drake.geometry.regions.region import Distance, Region
+from pfsc_drake.geometry.regions.region import Distance, Region, axes_along
 
 Regions = Mapping[str, Region | MovingRegion]
 

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.regions.placement import Triple
-from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, direction
+from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, Triple, direction
 from pfsc_drake.geometry.surfaces.placement import checked_placement
 
 # Planes whose coefficients differ by less are one, m.

@@ -7,8 +7,14 @@ import casadi as ca
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.regions.placement import axes_along, checked_length, checked_point
-from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, direction
+from pfsc_drake.geometry.regions.region import (
+    FormulaRegion,
+    Symbol,
+    axes_along,
+    checked_length,
+    checked_point,
+    direction,
+)
 
 # A bound, safe from rounding errors.
 _ABOVE = 1.0 + 1e-15

@@ -9,15 +9,13 @@ import numpy as np
 from pfsc_drake.compiled.bound_function import PlainFunction
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.regions.nearest_piece import ON_NO_PIECE, nearest_foot
-from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
+from pfsc_drake.geometry.regions.pieces import ON_NO_PIECE, NearestFoot, Pieces, nearest_foot
 from pfsc_drake.geometry.regions.region import Distance, FormulaRegion, Symbol, direction
 from pfsc_drake.geometry.surfaces.curvature import fundamental_forms
-from pfsc_drake.geometry.surfaces.partials import partial_index
+from pfsc_drake.geometry.surfaces.extended import SurfaceTable
 from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
+from pfsc_drake.geometry.surfaces.surface import Surface, partial_index
 
 # Of the normal on a piece, rad, as far as these numbers of pieces in a direction allow.
 _TURNING = 0.12

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.base import Base, CylinderBase, PlaneBase, axis_of_normals
-from pfsc_drake.geometry.surfaces.neighbours import Neighbourhoods
+from pfsc_drake.geometry.surfaces.coverage import Neighbourhoods
 
 
 class Axis(NamedTuple):

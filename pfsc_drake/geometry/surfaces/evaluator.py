@@ -11,19 +11,15 @@ from numpy.typing import ArrayLike
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.foot import Foot, FootFinder
-from pfsc_drake.geometry.foot_step import first_and_bend, largest_eigenvalue
+from pfsc_drake.geometry.foot import Foot, FootFinder, first_and_bend, largest_eigenvalue
 from pfsc_drake.geometry.nearest_samples import nearest_samples
 from pfsc_drake.geometry.projection_status import ProjectionStatus
-from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
+from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
-from pfsc_drake.geometry.surfaces.partials import partial_count
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.product import checked_product
-from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, SurfaceProjection
-from pfsc_drake.geometry.surfaces.start import GlobalProjector
-from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
+from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, GlobalProjector, SurfaceProjection
+from pfsc_drake.geometry.surfaces.surface import Surface, partial_count
 
 # Of the lengths of the domain: a way after which it is asked whether another place is nearer.
 _FAR = 1.0 / 8.0

@@ -6,10 +6,8 @@ from typing import Literal
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.geometry.files.obj import read_obj_vertices
-from pfsc_drake.geometry.files.ply import read_ply_vertices
-from pfsc_drake.geometry.files.stl import read_stl
 from pfsc_drake.geometry.size import FARTHEST
 
 Unit = Literal["m", "cm", "mm", "inch"]
@@ -87,3 +85,32 @@ def _read_csv(name: str) -> tuple[np.ndarray, list[str]]:
                 " required"
             )
     return points, [f"line {line}" for line in table.lines]
+
+
+def read_profile(file: str | FilePath, columns: list[str]) -> np.ndarray:
+    """Read the points of a profile.
+
+    Args:
+        file: CSV file.
+        columns: That it must have, in any order, and no others.
+
+    Returns:
+        Points in the order of the file, [n, columns], m.
+
+    Raises:
+        InputError: The file cannot be read, columns are unknown or missing, or a value is not a
+            number or beyond 1e4 m.
+    """
+    name = str(file)
+    table = read_numbers(
+        name, "points", lambda place, header: check_columns(place, header, columns, columns)
+    )
+    points = table.rows[:, [table.header.index(label) for label in columns]]
+    far = np.argwhere(np.abs(points) > FARTHEST)
+    if far.size:
+        row, column = far[0]
+        raise InputError(
+            f"{name}, line {table.lines[row]}, column {columns[column]}: {points[row, column]:g} m;"
+            f" at most {FARTHEST:g} m are allowed"
+        )
+    return points

@@ -5,8 +5,12 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.basis import Basis
-from pfsc_drake.geometry.surfaces.partials import partial_orders
-from pfsc_drake.geometry.surfaces.surface import Sampler, Surface, check_partial_order
+from pfsc_drake.geometry.surfaces.surface import (
+    Sampler,
+    Surface,
+    check_partial_order,
+    partial_orders,
+)
 
 # Samples that are evaluated at once.
 _CHUNK = 20_000

@@ -11,13 +11,16 @@ from pfsc_drake.geometry.curves.spline import check_smoothness
 from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.base import Base
 from pfsc_drake.geometry.surfaces.choose_base import BaseChoice, choose_base
-from pfsc_drake.geometry.surfaces.coverage import cover, stand
-from pfsc_drake.geometry.surfaces.neighbours import Neighbourhoods, neighbourhoods
-from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
+from pfsc_drake.geometry.surfaces.coverage import Neighbourhoods, cover, neighbourhoods, stand
+from pfsc_drake.geometry.surfaces.grid_smoothing import smoothest_within
+from pfsc_drake.geometry.surfaces.penalized_surface import (
+    PenalizedSurface,
+    Residuals,
+    check_scatter,
+    residuals,
+)
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.residuals import Residuals, check_scatter, residuals
-from pfsc_drake.geometry.surfaces.smoothest import smoothest_within
 from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.surface import Interval
 

@@ -1,17 +1,18 @@
-"""The DELTA robot with linear drives, as the control laws see it."""
+"""The DELTA robot with linear drives, as the control laws see it, and as it is believed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
 from pfsc_drake import jets
+from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.delta.kinematics import RodMotion, rod_motion
+from pfsc_drake.robot.delta.kinematics import RodMotion, joint_coordinates, rod_motion
 from pfsc_drake.robot.delta.parameters import NUM_ARMS, DeltaParameters
-from pfsc_drake.robot.delta.workspace import joint_coordinates
+from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -176,3 +177,49 @@ class DeltaRobot(RobotModel):
         q = ca.SX.sym("q", NUM_ARMS)
         motion = self._motion([Jet([q_i]) for q_i in ca.vertsplit(q)])
         return ca.Function("delta", [q], [motion.y_t.coefficients[0], motion.jacobian()])
+
+
+def believed_delta(robot: DeltaRobot, error: ModelError) -> DeltaRobot:
+    """Return what is believed of a DELTA robot.
+
+    Its three kinds of links are slides, rods and end-effector with load; the lengths that belong
+    to them are ``l_A``, ``l_BC`` and ``l_EC``.
+
+    Args:
+        robot: The true one.
+        error: By how much it is off, N = 3.
+
+    Raises:
+        InputError: If the robot cannot be like that, or has nothing that could be.
+    """
+    if np.any(error.joint_offset):
+        raise InputError(
+            f"joint_offset = {error.joint_offset.tolist()}; allowed: 0 for a DELTA robot, whose "
+            "slides are homed at their ends"
+        )
+    masses, geometry = robot.parameters.masses, robot.parameters.geometry
+    slide, rod, plate = error.mass
+    load = masses.load * plate + error.tool_mass
+    if load < 0.0:
+        raise InputError(
+            f"tool_mass = {error.tool_mass:g} kg; allowed: {-masses.load * plate:g} kg or more"
+        )
+    l_A, l_BC, l_EC = error.link_length
+    return DeltaRobot(
+        replace(
+            robot.parameters,
+            masses=replace(
+                masses,
+                slide=masses.slide * slide,
+                rod_pair=masses.rod_pair * rod,
+                plate=masses.plate * plate,
+                load=load,
+            ),
+            geometry=replace(
+                geometry,
+                l_A=geometry.l_A * l_A,
+                l_BC=geometry.l_BC * l_BC,
+                l_EC=geometry.l_EC * l_EC,
+            ),
+        )
+    )

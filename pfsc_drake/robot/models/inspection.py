@@ -6,7 +6,7 @@ and lets the rest through. Here each is refused in one line that names file, lin
 
 from dataclasses import dataclass, field
 
-from pfsc_drake.robot.models.mimic import Mimic, mimics_of
+from pfsc_drake.robot.models.joint_edits import Mimic, mimics_of
 from pfsc_drake.robot.models.model_parts import (
     DRIVE_NUMBERS,
     MOMENTS,

@@ -21,14 +21,13 @@ from pydrake.multibody.tree import (
 )
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.robot.models.drake_messages import DrakeMessages, collected_messages, one_line
 from pfsc_drake.robot.models.elastic_joints import (
     ElasticJoints,
     add_springs,
     make_elastic,
     set_joint_damping,
 )
-from pfsc_drake.robot.models.inclusion import read_with_inclusions
+from pfsc_drake.robot.models.files import packages_for, read_with_inclusions
 from pfsc_drake.robot.models.inspection import ModelFacts, inspect_model
 from pfsc_drake.robot.models.joint_edits import (
     actuator_of,
@@ -36,11 +35,15 @@ from pfsc_drake.robot.models.joint_edits import (
     joints_of,
     moving_joints,
     sprung_joints,
+    with_followers,
 )
-from pfsc_drake.robot.models.mimic import with_followers
-from pfsc_drake.robot.models.model_text import usable_text
+from pfsc_drake.robot.models.model_text import (
+    DrakeMessages,
+    collected_messages,
+    one_line,
+    usable_text,
+)
 from pfsc_drake.robot.models.model_xml import ModelXml, read_model_xml
-from pfsc_drake.robot.models.packages import packages_for
 from pfsc_drake.robot.models.placement import fix_joints, place_base
 
 _ROOTS = {".urdf": "robot", ".sdf": "sdf", ".xml": "mujoco"}

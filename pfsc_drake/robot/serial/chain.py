@@ -1,16 +1,19 @@
 """A serial chain of revolute and prismatic joints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
+from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial import newton_euler
-from pfsc_drake.robot.serial.links import Linkage
+from pfsc_drake.robot.serial.links import ChainLink, Linkage
 
 
 @dataclass(frozen=True)
@@ -53,3 +56,193 @@ class SerialChain(Linkage, RobotModel):
     def mass_matrix(self, q: ca.SX) -> ca.SX:
         """Return the link-side mass matrix, see :func:`newton_euler.mass_matrix`."""
         return newton_euler.mass_matrix(self, q)
+
+
+# by which the sum of two principal moments may be below the third
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class ToolMass:
+    """The tool among what is fixed to the last link.
+
+    Attributes:
+        mass: [kg]; 0 where the last link is the tool.
+        p_LC: Its centre of mass in the last link frame [m], shape (3,).
+        name: Of its body, for messages.
+    """
+
+    mass: float
+    p_LC: np.ndarray
+    name: str = "tool"
+
+
+def believed_chain(chain: SerialChain, error: ModelError, tool: ToolMass) -> SerialChain:
+    """Return what is believed of a chain.
+
+    Args:
+        chain: The true one, N links.
+        error: By how much it is off, N links.
+        tool: The tool on it.
+
+    Raises:
+        InputError: If no body can have the believed mass properties of the tool.
+    """
+    links = []
+    for i, link in enumerate(chain.links):
+        R, p = link.R_PF, link.p_PF
+        if i > 0:  # the first joint stands in the world, at the end of no link
+            p = p * error.link_length[i - 1]
+        offset = error.joint_offset[i]
+        if link.is_revolute:
+            turn = Rotation.from_rotvec(offset * link.axis).as_matrix()
+            R = R @ turn if offset else R
+        else:
+            p = p + offset * (R @ link.axis)
+        links.append(
+            replace(
+                link,
+                R_PF=R,
+                p_PF=p,
+                mass=link.mass * error.mass[i],
+                p_LC=link.p_LC + error.center[i],
+                I_C=link.I_C * error.mass[i] * error.inertia[i],
+                reflected_inertia=link.reflected_inertia * error.rotor_inertia[i],
+                stiffness=link.stiffness * error.stiffness[i],
+            )
+        )
+    links[-1] = _with_other_tool(links[-1], chain.R_LT, error, tool)
+    return replace(chain, links=tuple(links), p_LT=chain.p_LT * error.link_length[-1])
+
+
+def _with_other_tool(
+    link: ChainLink, R_LT: np.ndarray, error: ModelError, tool: ToolMass
+) -> ChainLink:
+    """Return the last link with the tool's mass and centre as believed.
+
+    The tool's inertia about its own centre stays, so that only two point masses differ.
+    """
+    mass, p_LC = tool.mass * error.mass[-1], tool.p_LC + error.center[-1]
+    moved = p_LC + R_LT @ error.tool_center
+    if error.tool_mass == 0.0 and not np.any(error.tool_center * mass):
+        return link
+    allowed = f"more than {-mass:.4g} kg, the tool's mass"
+    if mass == 0.0:
+        allowed = f"0 kg or more; '{tool.name}', which carries the tool frame, has no mass to lose"
+    if not mass + error.tool_mass > 0.0:
+        raise InputError(f"tool_mass = {error.tool_mass:g} kg; allowed: {allowed}")
+    # moments of mass of order 0, 1, 2 about the link's origin add up
+    zeroth = link.mass + error.tool_mass
+    first = link.mass * link.p_LC - mass * p_LC + (mass + error.tool_mass) * moved
+    I_L = link.inertia_about_origin - mass * _point(p_LC)
+    I_L = I_L + (mass + error.tool_mass) * _point(moved)
+    center = first / zeroth
+    I_C = I_L - zeroth * _point(center)
+    principal = np.linalg.eigvalsh(I_C)
+    if principal[0] < 0.0 or principal[:2].sum() < principal[2] * (1.0 - _ROUNDING):
+        raise InputError(
+            f"tool_mass = {error.tool_mass:g} kg, tool_center = {error.tool_center.tolist()} m; "
+            f"allowed: those of a body, which has principal moments of inertia unlike "
+            f"{np.round(principal, 6).tolist()} kg m^2"
+        )
+    return replace(link, mass=zeroth, p_LC=center, I_C=I_C)
+
+
+def _point(p: np.ndarray) -> np.ndarray:
+    """Return the inertia of a unit point mass about the origin [m^2], shape (3, 3)."""
+    return p @ p * np.eye(3) - np.outer(p, p)
+
+
+_PARAMETERS = ("mass", "p_LC", "I_C", "reflected_inertia", "stiffness")
+
+
+@dataclass(frozen=True)
+class ParametricChain(SerialChain):
+    """A chain with symbols for masses, their places and inertias, rotor inertias and stiffnesses.
+
+    Expressions of its dynamics have these symbols in them, free. They are the same in all chains
+    of N links, so that what was made of one is found again for another.
+
+    Attributes:
+        nominal: A chain with numbers, of the same geometry and limits.
+    """
+
+    nominal: SerialChain = field(kw_only=True)
+
+    @classmethod
+    def of(cls, chain: SerialChain) -> "ParametricChain":
+        """Return a chain with symbols in place of its numbers.
+
+        Args:
+            chain: The chain, N links; which joints are elastic is no parameter.
+        """
+        links = []
+        for link, symbols in zip(chain.links, _symbols(chain.dimension), strict=True):
+            stiffness = symbols["stiffness"] if np.isfinite(link.stiffness) else link.stiffness
+            links.append(replace(link, **(symbols | {"stiffness": stiffness})))
+        return cls(tuple(links), chain.R_LT, chain.p_LT, chain.gravity, nominal=chain)
+
+    @property
+    def numeric(self) -> SerialChain:
+        """See :class:`RobotModel`."""
+        return self.nominal
+
+    @property
+    def elastic_joints(self) -> np.ndarray:
+        """See :class:`RobotModel`."""
+        return self.nominal.elastic_joints
+
+    @property
+    def D_M(self) -> ca.SX:
+        """Symbols of the rotor inertias, shape (N, 1)."""
+        return ca.vertcat(*[link.reflected_inertia for link in self.links])
+
+    @property
+    def K_s(self) -> ca.SX:
+        """Symbols of the joint stiffnesses, shape (N, 1)."""
+        return ca.vertcat(*[link.stiffness for link in self.links])
+
+    @property
+    def springs(self) -> ca.SX:
+        """See :class:`RobotModel`."""
+        return ca.vertcat(
+            *[
+                k if np.isfinite(n) else 0.0
+                for k, n in zip(ca.vertsplit(self.K_s), self.nominal.K_s, strict=True)
+            ]
+        )
+
+    def gather(self, attribute: str) -> np.ndarray:
+        """See :class:`RobotModel`.
+
+        Raises:
+            TypeError: If that is a parameter, which has no value.
+        """
+        if attribute in _PARAMETERS:
+            raise TypeError(f"{attribute}: a symbolic parameter of this robot")
+        return self.nominal.gather(attribute)
+
+
+def chain_parameters(chain: SerialChain) -> dict[str, float]:
+    """Return the values of the symbols of :class:`ParametricChain`, by name.
+
+    Args:
+        chain: A chain with numbers.
+    """
+    values: dict[str, float] = {}
+    for link, symbols in zip(chain.links, _symbols(chain.dimension), strict=True):
+        for attribute, symbol in symbols.items():
+            entries = np.ravel(getattr(link, attribute), order="F")
+            names = [entry.name() for entry in symbol.elements()]
+            values |= dict(zip(names, entries.tolist(), strict=True))
+    return values
+
+
+@cache
+def _symbols(num_links: int) -> list[dict[str, ca.SX]]:
+    """Return the symbols of each link by attribute."""
+    shapes = {"mass": (1, 1), "p_LC": (3, 1), "I_C": (3, 3)}
+    return [
+        {name: ca.SX.sym(f"{name}_{i}", *shapes.get(name, (1, 1))) for name in _PARAMETERS}
+        for i in range(num_links)
+    ]

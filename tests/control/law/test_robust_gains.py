@@ -12,7 +12,7 @@ from pfsc_drake.control.law.robust_gains import (
 )
 from pfsc_drake.control.law.stabilization import LoopGains, Stabilization, gains_from_poles
 from pfsc_drake.control.margins import modes
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 
 THETA = 0.7
 

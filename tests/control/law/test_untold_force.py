@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagrams.tasks.untold_forces import largest_yield
 from pfsc_drake.control.law.linearization import decoupling_function
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import (
@@ -11,7 +12,6 @@ from pfsc_drake.control.law.stabilization import (
     Stabilization,
     gains_from_poles,
 )
-from pfsc_drake.control.law.untold_force import largest_yield
 
 THETA = 0.7
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from pfsc_drake.geometry import FourierCurve, zyx_to_matrix
 from pfsc_drake.geometry.path_on_surface import path_on_surface
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.partials import partial_orders
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid, torus
+from pfsc_drake.geometry.surfaces.surface import partial_orders
 
 # about horizontal, within reach of six axes
 TILT = zyx_to_matrix([0.3, -0.2, 0.15])

@@ -6,7 +6,7 @@ from pydrake.geometry import Box, Cylinder, Sphere
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from diagrams.drawing.stick_figure import stick_figure
+from diagrams.drawing.model_meshes import stick_figure
 
 INERTIAL = (
     '<inertial><mass value="1"/>'

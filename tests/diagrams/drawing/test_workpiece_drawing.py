@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station, build_station_replay, draw_station
 from diagrams.drawing.replay import RecordedMotion
 from diagrams.scenario import Keyframe, Line
-from diagrams.scenario.notch import BallParameters, NotchParameters
+from diagrams.scenario.workpiece import BallParameters, NotchParameters
 from diagrams.surroundings.notch import NotchedWorkpiece, notch_surface
 from experiments.scenario_file import SCENARIO_DIRECTORY
 

@@ -5,7 +5,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, Keyframe, Line
-from diagrams.scenario.notch import BallParameters, NotchParameters
+from diagrams.scenario.workpiece import BallParameters, NotchParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import simulate
 

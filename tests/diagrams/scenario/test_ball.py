@@ -7,7 +7,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ContactModel
 from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.scenario.ball import SoftBall
+from diagrams.scenario.workpiece import SoftBall
 from diagrams.surroundings.contact_geometry import add_rigid_surface, add_soft_ball
 
 

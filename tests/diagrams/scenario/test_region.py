@@ -2,7 +2,7 @@
 
 import pytest
 
-from diagrams.scenario.region import (
+from diagrams.scenario.fixtures import (
     Box,
     RegionParameters,
     Shift,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario.operator import OperatorParameters
+from diagrams.scenario.simulation import OperatorParameters
 from diagrams.surroundings import operator as surroundings
-from diagrams.surroundings.operator_file import columns, controls_text
+from diagrams.surroundings.operator import columns, controls_text
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.surroundings.operator_file import columns, controls_text, read_controls
+from diagrams.surroundings.operator import columns, controls_text, read_controls
 from pfsc_drake.errors import InputError
 
 REGIONS = ["cylinder"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from diagrams.believed import believed_robot
 from diagrams.builder import build_station
+from diagrams.robots.belief import believed_robot
 from diagrams.scenario import JointFrictionParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError

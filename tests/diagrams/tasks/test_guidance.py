@@ -8,10 +8,9 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from diagrams.scenario.operator import OperatorParameters
-from diagrams.surroundings.operator import idle_controls
-from diagrams.surroundings.operator_file import controls_text
-from diagrams.tasks.guidance import stiff_regions
+from diagrams.scenario.simulation import OperatorParameters
+from diagrams.surroundings.operator import controls_text, idle_controls
+from diagrams.tasks.law_warnings import stiff_regions
 from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 

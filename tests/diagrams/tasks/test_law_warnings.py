@@ -8,7 +8,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
-from pfsc_drake.robot.resonance import joint_resonances
+from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_file
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"

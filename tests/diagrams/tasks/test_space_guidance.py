@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.region import RegionParameters, Shift, Swinging
+from diagrams.scenario.fixtures import RegionParameters, Shift, Swinging
 from diagrams.scenario.surface_shapes import Plane
 from diagrams.tasks.make import make_task
 from pfsc_drake.errors import InputError

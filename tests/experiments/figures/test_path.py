@@ -6,7 +6,7 @@ import pytest
 from experiments.figures.all import draw_figures
 from experiments.figures.path import draw_notch_position, draw_path, draw_surface_fit
 from experiments.results.run_log import RunLog
-from pfsc_drake.geometry.surfaces.residuals import Residuals
+from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
 

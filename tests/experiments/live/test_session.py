@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from diagrams.surroundings.operator_file import read_controls
+from diagrams.surroundings.operator import read_controls
 from experiments.cli import main
 from experiments.live.pages import Pages
 from experiments.live.session import LiveSession, Output

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Scenario
-from diagrams.scenario.drives import ServoParameters
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.scenario.robot import ServoParameters
 from experiments.results.guidance import (
     deepest_violation,
     guidance_metrics,

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from diagrams.scenario.notch import BallParameters
+from diagrams.scenario.workpiece import BallParameters
 from experiments.cli import main
 
 # N/m, of Tab. 3.2; m, of the scenario

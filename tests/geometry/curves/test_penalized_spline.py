@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
+from pfsc_drake.geometry.curves.smoothing import PenalizedSpline
 
 RNG = np.random.default_rng(5)
 THETA = np.sort(RNG.uniform(0.0, 2.0, 60))

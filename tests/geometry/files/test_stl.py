@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.files.stl import read_stl
+from pfsc_drake.geometry.files.mesh_files import read_stl
 
 # a tetrahedron, corners counterclockwise from outside
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3.5]])

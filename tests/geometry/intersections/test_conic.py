@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pfsc_drake.geometry.intersections.conic import line_or_ellipse
+from pfsc_drake.geometry.intersections.edge import line_or_ellipse
 
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
 

@@ -7,7 +7,7 @@ import pytest
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve
-from pfsc_drake.geometry.regions.course import CurveCourse
+from pfsc_drake.geometry.regions.moving import CurveCourse
 
 
 def evaluated(course):

@@ -15,8 +15,7 @@ from pfsc_drake.geometry import (
     surface_of_revolution,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.regions.plane_curve import PlaneCurve
-from pfsc_drake.geometry.regions.profile import ExtrudedRegion, RevolvedRegion
+from pfsc_drake.geometry.regions.profile import ExtrudedRegion, PlaneCurve, RevolvedRegion
 from pfsc_drake.geometry.regions.shapes import ConeRegion, CylinderRegion, HalfSpace
 from tests.geometry.regions.brute_force import BruteForce, gradient
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.mesh import surface_mesh
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
+from pfsc_drake.geometry.sweep import surface_mesh
 
 SPACING = 5e-3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.profile_file import read_profile
+from pfsc_drake.geometry.surfaces.point_file import read_profile
 
 
 def test_columns_in_any_order(tmp_path):

@@ -6,12 +6,12 @@ import pytest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.grid import surface_through_grid
 from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
-from pfsc_drake.geometry.surfaces.partials import partial_count, partial_index, partial_orders
 from pfsc_drake.geometry.surfaces.spline_surface import (
     UniformKnots,
     interpolated_surface,
     uniform_spline_surface,
 )
+from pfsc_drake.geometry.surfaces.surface import partial_count, partial_index, partial_orders
 
 RNG = np.random.default_rng(5)
 

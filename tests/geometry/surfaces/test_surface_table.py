@@ -9,9 +9,8 @@ import pytest
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import FourierCurve, Turned, cylinder, extruded_surface, paraboloid, torus
 from pfsc_drake.geometry.curves.spline import interpolate
-from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
+from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.generated import translated_surface
-from pfsc_drake.geometry.surfaces.surface_table import SurfaceTable
 
 
 def _wave(axis, closed=False):

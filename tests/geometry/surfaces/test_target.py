@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pfsc_drake.geometry.surfaces.point import SurfaceTarget
 from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
-from pfsc_drake.geometry.surfaces.target import SurfaceTarget
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from identification.excitation.clearance import (
     soft_min,
 )
 from identification.model.subject import load_subject
-from pfsc_drake.robot.delta.workspace import rod_independence
+from pfsc_drake.robot.delta.kinematics import rod_independence
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import os
 
 from pydrake.multibody.parsing import PackageMap
 
-from pfsc_drake.robot.models.inclusion import MOST_INCLUSIONS, read_with_inclusions
+from pfsc_drake.robot.models.files import MOST_INCLUSIONS, read_with_inclusions
 
 INCLUDE = "<include><uri>{}</uri></include>"
 

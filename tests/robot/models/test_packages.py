@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.models.packages import packages_for
+from pfsc_drake.robot.models.files import models_directory, packages_for
 
 XML = (
     "<package format='2'><name>{}</name><version>1.0.0</version><description>x</description>"

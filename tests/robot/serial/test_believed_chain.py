@@ -15,7 +15,7 @@ from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
 from pfsc_drake.robot.robot_model import pose_function
-from pfsc_drake.robot.serial.believed_chain import ToolMass, believed_chain
+from pfsc_drake.robot.serial.chain import ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 N = 6

@@ -8,8 +8,8 @@ import pytest
 
 from pfsc_drake.control.law.actuation import joint_jets
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, gravity_function
+from pfsc_drake.robot.serial.chain import ParametricChain, chain_parameters
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.robot.serial.parametric_chain import ParametricChain, chain_parameters
 from tests.robot.serial.test_newton_euler import CHAINS, random_chain_plant
 
 

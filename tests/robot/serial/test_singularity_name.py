@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.robot.robot_model import pose_function
-from pfsc_drake.robot.serial.singularity_name import joint_axes, singularity_name
-from pfsc_drake.robot.singular_posture import singular_posture
+from pfsc_drake.robot.singular_posture import joint_axes, singular_posture, singularity_name
 
 X, Y, Z = np.eye(3)
 UPPER_ARM, FOREARM = 0.7, 0.6  # m, of the arms in conftest.py

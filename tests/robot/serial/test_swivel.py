@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.serial.singularity_name import joint_axes
 from pfsc_drake.robot.serial.swivel import swivel_angle, upward_direction
+from pfsc_drake.robot.singular_posture import joint_axes
 from tests.control.conftest import BENT_7, Robot
 
 JOINTS = (1, 3, 5)
