@@ -34,9 +34,9 @@ from experiments.outcomes import (
 from experiments.scenario_file import expand_home, list_scenarios
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
-from reporting.commands import FAULT, interruptible, run_app, show_page
 from reporting.progress import ProgressDisplay
 from reporting.registry import as_data, as_text
+from reporting.terminal import FAULT, interruptible, run_app, show_page
 
 if TYPE_CHECKING:
     from reporting.page import Report
@@ -370,8 +370,7 @@ def margins_command(
     """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
     from experiments.scenario_file import read_scenario
     from experiments.studies.margins.box import Box
-    from experiments.studies.margins.page import write_margins
-    from experiments.studies.margins.table import case_table, place_table, summary
+    from experiments.studies.margins.page import case_table, place_table, summary, write_margins
 
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])

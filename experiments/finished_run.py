@@ -16,15 +16,24 @@ from diagrams.scenario import Scenario
 from diagrams.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
-from experiments.results.drives import JointLimits, plan_metrics, saturation_warnings
-from experiments.results.friction import friction_metrics
+from experiments.results.drives import (
+    JointLimits,
+    friction_metrics,
+    plan_metrics,
+    saturation_warnings,
+)
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
-from experiments.results.guidance_audit import Promise, audit
 from experiments.results.mounting import mounting_metrics
 from experiments.results.path import path_following_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
-from experiments.results.press import press_metrics
-from experiments.results.promises import broken_promises, set_promises, unpromised_distance
+from experiments.results.promises import (
+    Promise,
+    audit,
+    broken_promises,
+    set_promises,
+    unpromised_distance,
+)
+from experiments.results.pushes import press_metrics
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log

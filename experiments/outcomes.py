@@ -9,9 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from reporting.commands import FAULT, NOT_WRITTEN, WRONG_INPUT, print_page
-from reporting.interruption import INTERRUPTED
-from reporting.terminal import print_error
+from reporting.processes import INTERRUPTED
+from reporting.terminal import FAULT, NOT_WRITTEN, WRONG_INPUT, print_error, print_page
 
 if TYPE_CHECKING:
     from experiments.export import Export

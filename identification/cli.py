@@ -15,7 +15,7 @@ from rich.console import Console
 
 from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
-from identification.excitation.command import information_command
+from identification.excitation.recording import information_command
 from identification.options import (
     Bounds,
     Excitation,
@@ -27,15 +27,15 @@ from identification.options import (
     Tool,
     Units,
     Validation,
+    check_folder,
     read_integer,
     read_number,
     read_pairs,
     read_range,
     read_reading,
 )
-from identification.output import check_folder
-from reporting.commands import interruptible, run_app, show_page
 from reporting.progress import fraction_display
+from reporting.terminal import interruptible, run_app, show_page
 
 if TYPE_CHECKING:
     from identification.model.subject import Subject

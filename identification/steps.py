@@ -29,7 +29,7 @@ from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
-from identification.output import make_folder
+from identification.options import make_folder
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.models.files import models_directory

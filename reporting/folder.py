@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pfsc_drake.errors import InputError
-from reporting.manifest import (
+from reporting.provenance import (
     FIGURES,
     MANIFEST,
     UNFINISHED,
@@ -56,7 +56,7 @@ class ResultsFolder:
         :meth:`explain_problems`.
 
         Args:
-            name: See :mod:`reporting.manifest`: a result's, or ``figures/NAME.png``.
+            name: See :mod:`reporting.provenance`: a result's, or ``figures/NAME.png``.
             content: Of the file; text becomes UTF-8.
 
         Returns:

@@ -9,8 +9,8 @@ from string import Template
 from urllib.parse import quote
 
 from reporting.folder import ResultsFolder
-from reporting.manifest import FIGURES
 from reporting.metrics import NARROW_SPACE, Metric, Metrics, format_quantity
+from reporting.provenance import FIGURES
 from reporting.registry import known_metric
 from reporting.style import Figure
 

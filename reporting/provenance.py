@@ -1,8 +1,14 @@
-"""What identifies a run: scenario, revision of the sources, versions of the libraries."""
+"""What identifies a run: scenario, sources, libraries; and which files it left."""
 
+import json
+import os
+import re
 import subprocess
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
+
+from pfsc_drake.yaml.reading import find_status
 
 PROJECT_ROOT = Path(__file__).resolve().parents[1]
 
@@ -63,3 +69,112 @@ def _version(distribution: str) -> str:
         return metadata.version(distribution)
     except metadata.PackageNotFoundError:
         return "unknown"
+
+
+MANIFEST = "manifest.json"
+FIGURES = "figures"
+RESULTS = (
+    "scenario.yaml",
+    "operator.csv",
+    "log.h5",
+    "metrics.json",
+    "recording.html",
+    "report.html",
+    "margins.json",
+    "sweep.json",
+    "sweep.csv",
+    "sweep.parquet",
+    "taught.csv",
+    "follow.yaml",
+)
+UNFINISHED = ".unfinished"  # a file while it is being written
+
+_FIGURE = re.compile(rf"{FIGURES}/\w+\.png")
+_PROGRAM = "pfsc_drake"
+
+
+def manifest_text(kind: str, files: Iterable[str]) -> str:
+    """Return the content of a manifest.
+
+    Args:
+        kind: Kind of results, e.g. ``run``.
+        files: Their names in the folder.
+    """
+    content = {"program": _PROGRAM, "results": kind, "files": list(files)}
+    return json.dumps(content, indent=2) + "\n"
+
+
+def listed_results(folder: Path) -> list[str]:
+    """Return the names of the files that the manifest of a folder lists; none without one.
+
+    Args:
+        folder: That :func:`find_obstacle` has nothing to say against.
+    """
+    manifest = _read_manifest(folder)
+    return [] if manifest is None else manifest[1]
+
+
+def find_obstacle(folder: Path, kind: str, inputs: Sequence[Path]) -> str | None:
+    """Return why results must not be written into a folder; None if they may.
+
+    Args:
+        folder: An existing folder.
+        kind: Kind of results.
+        inputs: Files that the results are made from.
+
+    Raises:
+        OSError: If the folder cannot be read.
+    """
+    names = _names(folder)
+    for name in (*RESULTS, MANIFEST):
+        if any(_is_same(folder / name, source) for source in inputs):
+            return f"its {name} is an input of this {kind}"
+    manifest = _read_manifest(folder)
+    kind_there, own = (kind, []) if manifest is None else manifest
+    if kind_there != kind:
+        return f"it holds the results of a {kind_there}"
+    if manifest is not None:
+        own = [*own, MANIFEST, UNFINISHED]
+    for name in _named_like_results(folder, names):
+        if name not in own or not _is_regular(folder / name):
+            return f"it holds {name}, which no {kind} has written"
+    return None
+
+
+def _named_like_results(folder: Path, names: Sequence[str]) -> list[str]:
+    """Everything of a folder that stands where results do."""
+    found = [name for name in (*RESULTS, MANIFEST, UNFINISHED) if name in names]
+    if FIGURES in names:
+        figures = folder / FIGURES
+        if figures.is_symlink() or not figures.is_dir():
+            return [*found, FIGURES]
+        found += sorted(f"{FIGURES}/{name}" for name in _names(figures))
+    return found
+
+
+def _read_manifest(folder: Path) -> tuple[str, list[str]] | None:
+    """Kind of results and names of their files; None without manifest of this program."""
+    try:
+        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if content["program"] != _PROGRAM:
+            return None
+        kind, names = str(content["results"]), [str(name) for name in content["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    # a manifest is a file like any other: it cannot name what no result is called
+    return kind, [name for name in names if name in RESULTS or _FIGURE.fullmatch(name)]
+
+
+def _names(folder: Path) -> list[str]:
+    """Names of everything in a folder."""
+    return [entry.name for entry in folder.iterdir()]
+
+
+def _is_regular(file: Path) -> bool:
+    return file.is_file() and not file.is_symlink()
+
+
+def _is_same(file: Path, other: Path) -> bool:
+    """Whether both names stand for one file; names that no file can have stand for none."""
+    one, two = find_status(file), find_status(other)
+    return one is not None and two is not None and os.path.samestat(one, two)

@@ -15,6 +15,8 @@ from experiments.figures.drives import (
     draw_deflection,
     draw_efforts,
     draw_friction,
+    draw_friction_coefficients,
+    draw_friction_estimate,
     draw_pace,
     draw_velocities,
     draw_virtual_input,
@@ -28,7 +30,6 @@ from experiments.figures.forces import (
     has_forces,
     has_varying_damping,
 )
-from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
 from experiments.figures.guidance import (
     draw_contact,
     draw_energy,

@@ -17,7 +17,7 @@ from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.live_hand import LiveHandParameters
 from pfsc_drake.yaml.typed import load_typed
-from reporting.interruption import noticed_interruption
+from reporting.processes import noticed_interruption
 
 # s, of one take
 DURATION = 600.0

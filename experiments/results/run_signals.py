@@ -5,12 +5,11 @@ from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
 from diagrams.station import Station
-from experiments.results.friction import add_friction
+from experiments.results.drives import add_friction
 from experiments.results.guidance import add_guidance
 from experiments.results.mounting import add_mounting_signals
 from experiments.results.posture import add_posture
-from experiments.results.press import add_pressing
-from experiments.results.pushes import add_link_signals
+from experiments.results.pushes import add_link_signals, add_pressing
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.compliance.impedance import DAMPING, STIFFNESS
 from pfsc_drake.control.fixtures.robot_limits import limit_kinds

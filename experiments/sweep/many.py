@@ -17,8 +17,7 @@ from experiments.scenario_file import ScenarioFile
 from experiments.sweep.worker import DIED, FAILED, RunRow, RunTask, program_revision, run_task
 from pfsc_drake.errors import InputError, shortened
 from reporting import processes
-from reporting.interruption import noticed_interruption
-from reporting.processes import local_cluster
+from reporting.processes import local_cluster, noticed_interruption
 from reporting.terminal import one_line
 
 if TYPE_CHECKING:

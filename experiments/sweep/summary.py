@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.sweep.samples import Sample
+from experiments.sweep.definition import Sample
 from experiments.sweep.worker import COMPLETED, DIED, FAILED, FAULT, REFUSED, RunRow
 from reporting.metrics import Metric, Metrics, format_quantity
 

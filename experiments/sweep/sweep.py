@@ -9,11 +9,16 @@ from rich.console import Console
 
 from diagrams.scenario import Scenario
 from experiments.scenario_file import ScenarioFile, apply_override, read_scenario
-from experiments.sweep.definition import SweepDefinition, SweepRecord
+from experiments.sweep.definition import (
+    Sample,
+    SweepDefinition,
+    SweepRecord,
+    draw_samples,
+    parse_variations,
+)
 from experiments.sweep.figures import draw_sweep
 from experiments.sweep.many import count_cores, run_many
 from experiments.sweep.progress import SweepProgress
-from experiments.sweep.samples import Sample, draw_samples, parse_variations
 from experiments.sweep.summary import (
     choose_metric,
     count_ends,
@@ -31,9 +36,9 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
 from reporting.folder import ResultsFolder, check_folder, open_results
-from reporting.interruption import noticed_interruption
 from reporting.metrics import Metrics
 from reporting.page import report_page, write_report
+from reporting.processes import noticed_interruption
 from reporting.provenance import standard_attributes
 
 _KIND = "sweep"
@@ -108,7 +113,7 @@ def define_sweep(
 
     Args:
         scenario: Name of a shipped scenario, or path of a YAML file.
-        vary: ``key.path=values`` each, see :mod:`experiments.sweep.samples`.
+        vary: ``key.path=values`` each, see :mod:`experiments.sweep.definition`.
         overrides: ``key.path=value`` each, the same for all runs.
         duration: Simulated time [s] instead of the scenario's.
         samples: Number of random draws.

@@ -7,8 +7,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from experiments.results.run_log import FloatArray, RunLog
-from experiments.teaching.follow import DWELL
-from experiments.teaching.taught import Taught, seen_tool, true_tool
+from experiments.teaching.taught import DWELL, Taught, seen_tool, true_tool
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     Path,

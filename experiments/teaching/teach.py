@@ -14,9 +14,16 @@ from experiments.teaching.comparison import (
     compare_followed,
     comparison_metrics,
 )
-from experiments.teaching.follow import CSV_NAME, YAML_NAME, follow_text
 from experiments.teaching.pictures import draw_pictures
-from experiments.teaching.taught import Taught, TeachingOptions, read_run, taught_path
+from experiments.teaching.taught import (
+    CSV_NAME,
+    YAML_NAME,
+    Taught,
+    TeachingOptions,
+    follow_text,
+    read_run,
+    taught_path,
+)
 from pfsc_drake.geometry import waypoints_text
 from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.page import Report, report_page, write_report

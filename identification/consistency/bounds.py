@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.consistency.pseudo_inertia import Layout, linear_terms
-from identification.model.comau_base import shipped_or_own
+from identification.model.analytic_base import shipped_or_own
 from identification.model.parameters import LINK_PARAMETERS, PER_LINK
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError

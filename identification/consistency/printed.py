@@ -11,13 +11,12 @@ from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.nearest import ConsistentParameters, Prediction, nearest_consistent
 from identification.consistency.program import PRIOR_WEIGHT
 from identification.excitation.fourier import FourierTrajectory
-from identification.model.analytic_base import analytic_base
-from identification.model.comau_base import load_printed_identification
+from identification.model.analytic_base import analytic_base, load_printed_identification
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject, load_subject
-from identification.output import check_folder
+from identification.options import check_folder
 from pfsc_drake.robot.models.files import models_directory
-from reporting.commands import interruptible
+from reporting.terminal import interruptible
 
 # for how many measurements the motion of Tab. C.2 counts: its torques then are nearer to those of
 # Tab. C.3 by a quarter to a half, for 1 % more of chi squared

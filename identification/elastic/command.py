@@ -11,11 +11,19 @@ import typer
 from rich.console import Console
 
 from identification.elastic.estimate import JointEstimate
-from identification.options import Names, Robot, Scales, Units, read_number, read_reading
-from identification.output import check_folder, write_text
-from reporting.commands import interruptible
+from identification.options import (
+    Names,
+    Robot,
+    Scales,
+    Units,
+    check_folder,
+    read_number,
+    read_reading,
+    write_text,
+)
 from reporting.page import Table
 from reporting.progress import fraction_display
+from reporting.terminal import interruptible
 
 
 def elastic_command(
@@ -51,7 +59,7 @@ def elastic_command(
     from identification.measurement.files import read_record, write_record
     from identification.measurement.imperfections import shipped_imperfections
     from identification.model.subject import load_subject
-    from identification.output import make_folder
+    from identification.options import make_folder
     from identification.steps import load_excitation
     from reporting.terminal import print_table
 

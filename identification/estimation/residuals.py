@@ -15,8 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import f as fisher
 
-from identification.estimation.least_squares import estimate
-from identification.estimation.noise import mean_torque_spectrum
+from identification.estimation.least_squares import estimate, mean_torque_spectrum
 from identification.measurement.periods import HARMONICS_KEPT, AveragedMotion, average
 from identification.measurement.record import Record
 from identification.model.base import BaseParameters

@@ -37,7 +37,7 @@ from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
 from identification.measurement.columns import si_unit
 from identification.model.base import BaseParameters
-from identification.output import write_bytes
+from identification.options import write_bytes
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import read_regular_file
 

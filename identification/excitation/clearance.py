@@ -20,8 +20,7 @@ from identification.excitation.balls import (
     points_of_last_link,
     without_inner,
 )
-from identification.excitation.cell import Cell, Obstacle
-from identification.excitation.scene import WORLD, RobotScene
+from identification.excitation.scene import WORLD, Cell, Obstacle, RobotScene
 from identification.model.subject import Subject
 from pfsc_drake import jets
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot

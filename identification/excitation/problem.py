@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from identification.excitation.cell import Cell
 from identification.excitation.clearance import (
     PostureLimits,
     delta_posture_limits,
@@ -15,7 +14,7 @@ from identification.excitation.clearance import (
 from identification.excitation.criterion import CRITERIA, BaseRegressorKernels
 from identification.excitation.fourier import check_harmonics, check_period
 from identification.excitation.limits import JointLimits, numbers
-from identification.excitation.scene import RobotScene
+from identification.excitation.scene import Cell, RobotScene
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
 from identification.model.regressor import Regressor

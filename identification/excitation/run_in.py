@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from identification.excitation.fourier import FourierTrajectory, samples_per_period
-from identification.output import write_text
+from identification.options import write_text
 from pfsc_drake.compiled.native_code import native_code
 from pfsc_drake.errors import InputError
 

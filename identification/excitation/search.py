@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.excitation.cell import Cell
 from identification.excitation.criterion import Information, information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import Given, JointLimits, chosen_limits
@@ -19,7 +18,7 @@ from identification.excitation.problem import (
     excitation_problem,
     tightened,
 )
-from identification.excitation.scene import RobotScene, cell_of
+from identification.excitation.scene import Cell, RobotScene, cell_of
 from identification.excitation.verification import (
     Verification,
     check_excited,

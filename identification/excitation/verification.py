@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.excitation.balls import ends, points_of_last_link
-from identification.excitation.cell import Cell
 from identification.excitation.clearance import delta_posture_limits, height_of
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
 from identification.excitation.limits import Given, JointLimits, chosen_limits, numbers, used_shares
 from identification.excitation.local_search import random_motion_about
 from identification.excitation.problem import ExcitationProblem, believed_parameters
-from identification.excitation.scene import RobotScene, cell_of
+from identification.excitation.scene import Cell, RobotScene, cell_of
 from identification.excitation.swept_clearance import SweptClearance, swept_clearance
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor

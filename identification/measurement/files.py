@@ -27,7 +27,7 @@ from identification.measurement.checks import check_record
 from identification.measurement.columns import RawSignal, Reading, make_record, parse_name, si_unit
 from identification.measurement.record import SIGNALS, MeasuredRobot, Record
 from identification.measurement.synchronization import check_velocities
-from identification.output import write_bytes
+from identification.options import write_bytes
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.files.number_table import read_numbers, read_regular_file, unreadable
 

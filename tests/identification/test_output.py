@@ -7,9 +7,9 @@ import typer
 
 from identification.cli import main
 from identification.measurement.files import read_record, write_record
-from identification.output import check_folder, write_text
+from identification.options import check_folder, write_text
 from pfsc_drake.errors import InputError, WriteError
-from reporting.commands import run_app
+from reporting.terminal import run_app
 
 ROBOT = "festo_expt_45"
 

@@ -12,8 +12,7 @@ import pytest
 
 from pfsc_drake import InputError
 from reporting.folder import check_folder, open_results
-from reporting.manifest import MANIFEST, RESULTS
-from reporting.provenance import PROJECT_ROOT
+from reporting.provenance import MANIFEST, PROJECT_ROOT, RESULTS
 
 
 @pytest.fixture(name="out")

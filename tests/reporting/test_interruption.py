@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from reporting.interruption import noticed_interruption, raised_interruption
+from reporting.processes import noticed_interruption, raised_interruption
 from reporting.provenance import PROJECT_ROOT
 
 
@@ -67,7 +67,7 @@ def test_other_threads_have_no_signals():
 def test_imports_end_with_one_line(library):
     """Whatever a library would make of the exception while it is being imported."""
     code = (
-        "from reporting.interruption import leave_when_interrupted; leave_when_interrupted();"
+        "from reporting.processes import leave_when_interrupted; leave_when_interrupted();"
         "import builtins, os, signal; original = builtins.__import__\n"
         "def interrupted(*arguments):\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"

@@ -11,12 +11,17 @@ from pydrake.systems.framework import Context
 from diagrams.linearization import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
-from experiments.studies.margins.box import Box, Error, corners, single_errors
+from experiments.studies.margins.box import (
+    Box,
+    Error,
+    corners,
+    single_errors,
+    smooth,
+    without_error,
+)
 from experiments.studies.margins.loop import LinearLoop, StationLoop, linearize
 from experiments.studies.margins.result import Case, DriveMargins, MarginAnalysis, Place
-from experiments.studies.margins.smooth import smooth, without_error
-from experiments.studies.margins.touched import TouchedSurface, touched_surface
-from experiments.studies.margins.walk import Instant, Walk, walk
+from experiments.studies.margins.walk import Instant, TouchedSurface, Walk, touched_surface, walk
 from pfsc_drake.control.margins import (
     BrokenLoop,
     common_disc_margin,

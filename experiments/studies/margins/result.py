@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from experiments.studies.margins.box import Box, Error
-from experiments.studies.margins.touched import TouchedSurface
-from experiments.studies.margins.walk import Instant
+from experiments.studies.margins.walk import Instant, TouchedSurface
 from pfsc_drake.control.margins import DiscMargin, Modes
 
 

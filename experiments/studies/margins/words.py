@@ -12,7 +12,7 @@ from experiments.studies.margins.result import (
     MarginAnalysis,
     Place,
 )
-from experiments.studies.margins.touched import TouchedSurface
+from experiments.studies.margins.walk import TouchedSurface
 from pfsc_drake.control.margins import DiscMargin
 from reporting.metrics import Metrics
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.figures.friction import draw_friction_coefficients, draw_friction_estimate
+from experiments.figures.drives import draw_friction_coefficients, draw_friction_estimate
 from experiments.results.run_log import RunLog
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains, Scenario
-from experiments.results.friction import friction_metrics
+from experiments.results.drives import friction_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, expected_signals
 from experiments.scenario_file import find_scenario

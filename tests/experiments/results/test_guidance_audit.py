@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.results.guidance_audit import Promise, audit
+from experiments.results.promises import Promise, audit
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions

@@ -5,8 +5,8 @@ import struct
 import numpy as np
 import pytest
 
+from experiments.sweep.definition import draw_samples, parse_variations
 from experiments.sweep.figures import MAX_PANELS, draw_sweep
-from experiments.sweep.samples import draw_samples, parse_variations
 from experiments.sweep.summary import measure_spreads, table_columns
 from experiments.sweep.worker import RunRow
 from reporting.style import DPI, WIDTH

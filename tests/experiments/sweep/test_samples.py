@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.sweep.samples import draw_samples, parse_variations
+from experiments.sweep.definition import draw_samples, parse_variations
 from pfsc_drake import InputError
 
 

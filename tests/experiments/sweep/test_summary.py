@@ -6,7 +6,7 @@ import io
 import pytest
 from pyarrow import BufferReader, parquet
 
-from experiments.sweep.samples import draw_samples, parse_variations
+from experiments.sweep.definition import draw_samples, parse_variations
 from experiments.sweep.summary import (
     choose_metric,
     count_ends,

@@ -13,8 +13,7 @@ from experiments.cli import main
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
 from experiments.teaching.comparison import compare_fit, compare_followed, line_of
-from experiments.teaching.follow import follow_scenario
-from experiments.teaching.taught import TeachingOptions, taught_path
+from experiments.teaching.taught import TeachingOptions, follow_scenario, taught_path
 from experiments.teaching.teach import KIND, write_teach_in
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import read_waypoints

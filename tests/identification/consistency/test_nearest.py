@@ -9,7 +9,7 @@ from identification.consistency.nearest import Prediction, nearest_consistent, r
 from identification.consistency.printed import nearest_to_printed
 from identification.consistency.pseudo_inertia import pseudo_inertia, spread
 from identification.excitation.fourier import FourierTrajectory
-from identification.model.comau_base import load_printed_identification
+from identification.model.analytic_base import load_printed_identification
 from identification.model.parameters import true_parameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.estimation.noise import (
+from identification.estimation.least_squares import (
     NoiseSpectrum,
     coloured_covariance,
     mean_torque_spectrum,

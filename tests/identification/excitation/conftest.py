@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from identification.excitation.cell import load_cell
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
 from identification.excitation.problem import excitation_problem
-from identification.excitation.scene import RobotScene
+from identification.excitation.scene import RobotScene, load_cell
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject

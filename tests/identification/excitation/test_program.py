@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 
-from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.fourier import fourier_basis
 from identification.excitation.limits import chosen_limits
 from identification.excitation.local_search import LocalSearch
 from identification.excitation.problem import excitation_problem, tightened
 from identification.excitation.program import ExcitationProgram
+from identification.excitation.scene import Cell, Obstacle
 
 TIMES = np.linspace(0.1, 4.6, 7)
 

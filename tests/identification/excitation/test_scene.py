@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from identification.excitation.balls import cover
-from identification.excitation.cell import Cell, Obstacle, load_cell
-from identification.excitation.scene import RobotScene
+from identification.excitation.scene import Cell, Obstacle, RobotScene, load_cell
 from pfsc_drake.errors import InputError
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import psutil
 import pytest
 
-from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.local_search import LocalSearch, random_motion_about
+from identification.excitation.scene import Cell, Obstacle
 from identification.excitation.search import search
 from identification.excitation.verification import verify_excitation
 from identification.model.base import base_parameters

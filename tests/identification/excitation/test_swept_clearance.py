@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from identification.excitation import swept_clearance as swept_clearance_module
-from identification.excitation.cell import Cell, Obstacle
 from identification.excitation.fourier import FourierTrajectory
-from identification.excitation.scene import RobotScene
+from identification.excitation.scene import Cell, Obstacle, RobotScene
 from identification.excitation.swept_clearance import swept_clearance
 
 

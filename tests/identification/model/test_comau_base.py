@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from identification.model.comau_base import load_printed_identification, printed_base
+from identification.model.analytic_base import load_printed_identification, printed_base
 from identification.model.parameters import parameter_names, true_parameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.parameters import load_parameters

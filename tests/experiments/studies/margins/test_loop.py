@@ -8,9 +8,8 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.scenario import Scenario
 from experiments.scenario_file import read_scenario
-from experiments.studies.margins.box import Error
+from experiments.studies.margins.box import Error, smooth, without_error
 from experiments.studies.margins.loop import StationLoop, linearize
-from experiments.studies.margins.smooth import smooth, without_error
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.margins import BrokenLoop, delay_margin, delayed, disc_margins, modes
 from pfsc_drake.yaml.typed import load_typed

@@ -10,9 +10,8 @@ from diagrams.scenario import Scenario
 from experiments.cli import main
 from experiments.scenario_file import read_scenario
 from experiments.studies.margins.analysis import analyse
-from experiments.studies.margins.box import Box, Error, corners, single_errors
+from experiments.studies.margins.box import Box, Error, corners, single_errors, smooth
 from experiments.studies.margins.result import MarginAnalysis
-from experiments.studies.margins.smooth import smooth
 from experiments.studies.margins.words import one_line, sentences
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed

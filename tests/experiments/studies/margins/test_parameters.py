@@ -7,9 +7,8 @@ import pytest
 
 from diagrams.scenario import Scenario
 from experiments.scenario_file import read_scenario
-from experiments.studies.margins.box import Error
+from experiments.studies.margins.box import Error, smooth, without_error
 from experiments.studies.margins.loop import StationLoop
-from experiments.studies.margins.smooth import smooth, without_error
 from experiments.studies.margins.walk import walk
 from pfsc_drake.yaml.typed import load_typed
 

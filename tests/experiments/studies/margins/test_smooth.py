@@ -4,7 +4,7 @@ import pytest
 
 from diagrams.scenario import Scenario
 from diagrams.scenario.workpiece import WorkpieceParameters
-from experiments.studies.margins.smooth import smooth
+from experiments.studies.margins.box import smooth
 
 
 @pytest.mark.parametrize("workpiece", [None, WorkpieceParameters()])

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.studies.margins import touched
+from experiments.studies.margins import walk
 from experiments.studies.margins.loop import STIFFEST, LinearLoop
-from experiments.studies.margins.touched import touched_surface
+from experiments.studies.margins.walk import touched_surface
 
 STIFFNESS, PERIOD, FREQUENCY = 3e4, 1e-3, 200.0
 
@@ -20,7 +20,7 @@ def test_the_stiffest_that_is_borne(limit, monkeypatch):
         rotation = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
         return LinearLoop(radius * np.array(rotation), np.zeros(0))
 
-    monkeypatch.setattr(touched, "linearize", linear)
+    monkeypatch.setattr(walk, "linearize", linear)
     loop = SimpleNamespace(
         spring=SimpleNamespace(stiffness=STIFFNESS),
         map=SimpleNamespace(period=PERIOD),
