@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loads
 PFSC_TESTS ?= quick
 SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 
-.PHONY: help setup demo test test-all lint types unit fuzz benchmark models signals clean
+.PHONY: help setup demo test test-all lint types unit fuzz benchmark models signals architecture clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
@@ -19,6 +19,7 @@ help:
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
 	@echo "make signals    write docs/signals.md anew from reporting/registry.toml"
+	@echo "make architecture  draw docs/architecture.svg anew"
 	@echo "make models     write the robot models anew from their parameters"
 
 setup: $(VENV)/.installed
@@ -68,6 +69,10 @@ benchmark: setup
 # the page of signals, metrics and figures
 signals: setup
 	$(BIN)/python -m reporting.registry > docs/signals.md
+
+# the picture of what imports what
+architecture: setup
+	$(BIN)/python -m docs.architecture
 
 models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer

@@ -17,6 +17,7 @@ from diagrams.robots.delta import DeltaPart, add_delta, is_delta
 from diagrams.robots.drives import add_drives, add_friction, believed_friction
 from diagrams.robots.part import RobotPart
 from diagrams.robots.sensors import add_joint_state, add_sensor, sensor_warnings, states_to_log
+from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.signal_log import add_log
@@ -36,7 +37,6 @@ from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.sensed_load import sensed_load_warnings
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
-from diagrams.workpiece import Workpiece
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart

@@ -9,12 +9,12 @@ from pydrake.systems.framework import Context, Diagram
 
 from diagrams.fault_description import FaultScene, describe, first_instant
 from diagrams.robots.part import RobotPart
+from diagrams.robots.workpiece import FurtherLength, Workpiece
 from diagrams.signal_log import SignalLog
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.operator import Operator
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.task import StartPoint, Task
-from diagrams.workpiece import FurtherLength, Workpiece
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path

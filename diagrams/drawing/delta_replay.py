@@ -4,9 +4,9 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from diagrams.drawing.manifold_drawing import ManifoldDrawing, look_down_at
 from diagrams.drawing.replay import RecordedMotion, add_motion
-from diagrams.workpiece import WorkpieceLook
+from diagrams.robots.workpiece import WorkpieceLook
+from diagrams.tasks.drawing import ManifoldDrawing, look_down_at
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, turn_scene_over
 

@@ -24,10 +24,10 @@ from diagrams.robots.plant_wiring import (
     connect_scene,
     joint_state_of,
 )
+from diagrams.robots.workpiece import Workpiece, upwards
 from diagrams.scenario import RobotParameters, Scenario, StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
-from diagrams.workpiece import Workpiece, upwards
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
 from pfsc_drake.robot.delta.multibody import (

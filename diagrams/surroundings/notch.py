@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 
+from diagrams.robots.workpiece import FurtherLength, Workpiece, WorkpieceLook, upwards
 from diagrams.scenario.workpiece import NotchParameters
 from diagrams.surroundings.contact_geometry import add_rigid_surface, add_soft_ball
-from diagrams.workpiece import FurtherLength, Workpiece, WorkpieceLook, upwards
 from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.sweep import swept_surface
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL

@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 
+from diagrams.robots.workpiece import FurtherLength, Workpiece, WorkpieceLook
 from diagrams.scenario.workpiece import WorkpieceParameters
 from diagrams.surroundings.contact_geometry import add_rigid_surface, add_soft_ball
-from diagrams.workpiece import FurtherLength, Workpiece, WorkpieceLook
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix

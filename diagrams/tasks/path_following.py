@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
+from diagrams.tasks.drawing import PathDrawing
 from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path

@@ -6,10 +6,10 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.manifold_drawing import SpaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
+from diagrams.tasks.drawing import SpaceDrawing
 from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints

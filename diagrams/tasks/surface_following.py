@@ -7,9 +7,9 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.manifold_drawing import SurfaceDrawing
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_numbers
+from diagrams.tasks.drawing import SurfaceDrawing
 from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.surface import (
     given_quaternion,

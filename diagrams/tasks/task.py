@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.drawing.manifold_drawing import ManifoldDrawing
+from diagrams.tasks.drawing import ManifoldDrawing
 from diagrams.tasks.drive_plan import DrivePlan
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport

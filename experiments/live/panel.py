@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from diagrams.drawing.live_view import LiveFrame, LiveView
+from diagrams.live_view import LiveFrame, LiveView
 from diagrams.surroundings.operator import PULL, REGIONS, REQUEST, idle_controls
 from experiments.live.controls import Slider, TunedParameter
 from experiments.live.pages import Pages

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from diagrams.drawing.live_view import LiveView
+from diagrams.live_view import LiveView
 from experiments.finished_run import RunOutcome
 from experiments.live.controls import tuned_parameters
 from experiments.live.pages import Pages

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from diagrams.drawing.live_view import LiveFrame
+from diagrams.live_view import LiveFrame
 from diagrams.scenario import Scenario
 from diagrams.station import FoundFault, Station
 from diagrams.surroundings.operator import PULL

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagrams.scenario.wording import coordinate_text
 from diagrams.station import Station
 from diagrams.tasks.drive_plan import DrivePlan
-from diagrams.wording import coordinate_text
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault

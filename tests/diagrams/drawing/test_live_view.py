@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station, draw_station
-from diagrams.drawing.live_view import LiveFrame, LiveView
+from diagrams.live_view import LiveFrame, LiveView
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
 

@@ -9,7 +9,6 @@ import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
-from diagrams.drawing.manifold_drawing import PathDrawing
 from diagrams.drawing.replay import (
     RecordedMotion,
     RecordedPushes,
@@ -19,6 +18,7 @@ from diagrams.drawing.replay import (
 )
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.scenario import Line, PathParameters, RobotParameters
+from diagrams.tasks.drawing import PathDrawing
 from diagrams.tasks.path import make_path
 from pfsc_drake.geometry import PathPointLayout
 

@@ -12,8 +12,8 @@ from diagrams.robots.arm_model import ArmModel
 from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
+from diagrams.scenario.wording import posture_text
 from diagrams.tasks.make import make_task
-from diagrams.wording import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.model_error import ModelError

@@ -6,7 +6,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from diagrams.drawing.manifold_drawing import SurfaceDrawing
+from diagrams.tasks.drawing import SurfaceDrawing
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder

@@ -9,11 +9,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
 from diagrams.drawing.delta_replay import arrange_scene
-from diagrams.drawing.manifold_drawing import draw_workpiece
 from diagrams.drawing.replay import body_origins, camera_and_target
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.delta import DeltaPart
 from diagrams.station import Station
+from diagrams.tasks.drawing import draw_workpiece
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
 from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer, TrailVisualizer

@@ -10,8 +10,8 @@ from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
+from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.fixtures import DrawnFixture
-from diagrams.workpiece import WorkpieceLook
 from pfsc_drake.control.manifolds.manifold import PlaceManifold
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.geometry import Path, PathPointLayout
