@@ -12,30 +12,38 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
-from diagrams.robots.arm import Arm, add_arm
-from diagrams.robots.delta import DeltaPart, add_delta, is_delta
-from diagrams.robots.drives import add_drives, add_friction, believed_friction
+from diagrams.robots.arm import Arm
+from diagrams.robots.delta import DeltaPart
+from diagrams.robots.drives import (
+    add_drives,
+    add_friction,
+    believed_friction,
+)
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import add_joint_state, add_sensor, sensor_warnings, states_to_log
+from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log, taring_warnings
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
-from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.signal_log import add_log
 from diagrams.station import Station
+from diagrams.station_parts import (
+    add_robot,
+    choose_mounting,
+    friction_options,
+    make_spring,
+    make_workpiece,
+    outside,
+    servo_options,
+)
 from diagrams.surroundings.forces import add_surroundings
-from diagrams.surroundings.mounting import Mounting, make_mounting
+from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_look import mounting_look
 from diagrams.surroundings.mounting_parts import add_payload
-from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.surroundings.operator import add_operator
-from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
 from diagrams.tasks.law_warnings import MODES, law_warnings, stiff_regions
 from diagrams.tasks.make import make_task
-from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.sensed_load import sensed_load_warnings
-from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -45,7 +53,6 @@ from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
-from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
 
 def build_station(
@@ -78,9 +85,9 @@ def build_station(
     """
     builder = DiagramBuilder()
     task = make_task(scenario, folder, progress) if like is None else like.task
-    workpiece, mounting = _workpiece(scenario, task), make_mounting(scenario, task)
-    spring = _spring(scenario, workpiece) if with_slope else None
-    part = _add_robot(builder, scenario, folder, workpiece if spring is None else None)
+    workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
+    spring = make_spring(scenario, workpiece) if with_slope else None
+    part = add_robot(builder, scenario, folder, workpiece if spring is None else None)
     if parametric:
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())
@@ -97,37 +104,54 @@ def build_station(
     law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
-    friction = believed_friction(part, scenario, folder)
+    rubbing = friction_options(scenario, folder)
+    friction = believed_friction(part, scenario.controller.friction.believed, rubbing)
     link_state = part.coordinates.link_rows @ initial_state
     start_posture = link_state[: part.robot.dimension]
     following = Following(scenario, believed, task, law, start_posture, on_motors, friction)
     keep_drive_limits(scenario, task, law, CourseStart(rest().q_J, start.place), friction)
 
     true_state = part.joint_state(builder)
-    joint_state = add_joint_state(builder, true_state, part.robot, scenario)
+    period, failures = scenario.controller.sampling_time, scenario.simulation
+    joint_state = add_joint_state(
+        builder,
+        true_state,
+        part.robot,
+        scenario.encoders,
+        failures.sensor_failure,
+        period,
+        scenario.encoder_period,
+    )
     place = add_place(builder, following, joint_state)
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
-    operator = add_operator(builder, scenario, folder)
+    operator = None
+    if scenario.operator is not None:
+        operator = add_operator(
+            builder, scenario.operator, scenario.switched_regions, period, folder
+        )
     forces = add_surroundings(
-        builder, part, task, scenario, around, start, operator, mounting, spring
+        builder, part, task, outside(scenario), around, start, operator, mounting, spring
     )
     if scenario.needs_sensor:
         states = {"joint_state": joint_state, "true_joint_state": true_state}
-        forces |= add_sensor(builder, part, scenario, states | forces)
+        failure = failures.force_sensor_failure
+        forces |= add_sensor(builder, part, scenario.sensor, failure, period, states | forces)
         if mounting is not None:
-            forces |= add_payload(builder, scenario, mounting, place.signals | forces)
+            forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
     requests = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | requests)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    further, servo = add_drives(builder, part, scenario, signals | drive, initial_state)
+    further, servo = add_drives(
+        builder, part, servo_options(scenario), period, signals | drive, initial_state
+    )
     signals |= further
     faults = [controller.GetOutputPort("fault")]
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
-    signals |= add_friction(builder, part, true_state, scenario, folder, faults)
-    signals |= states_to_log(scenario, true_state, joint_state)
+    signals |= add_friction(builder, part, true_state, rubbing, faults)
+    signals |= states_to_log(true_state, joint_state)
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
@@ -144,8 +168,7 @@ def build_station(
             + part.start_warnings(scenario.start, start_posture, start.target)
             + law_warnings(scenario, believed, law, link_state, rest())
             + stiff_regions(scenario)
-            + sensor_warnings(scenario)
-            + _load_warnings(scenario, part, law, rest)
+            + _sensor_warnings(scenario, part, law, rest)
         )
 
     diagram = builder.Build()
@@ -171,49 +194,16 @@ def build_station(
     )
 
 
-def _load_warnings(
+def _sensor_warnings(
     scenario: Scenario, part: RobotPart, law: FollowingLaw, rest: Callable[[], RestPosture]
 ) -> list[str]:
     if not scenario.needs_sensor:
         return []
+    late = []
+    if scenario.compliance.needs_sensor:
+        late = taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
     load = part.believed_load(scenario.sensor.joint)
-    return sensed_load_warnings(scenario, part.belief.robot, load, law, rest())
-
-
-def _workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
-    period = scenario.controller.sampling_time
-    if scenario.workpiece is not None:
-        require(scenario.notch is None, "notch", "given", "null where there is a workpiece")
-        require_whole_fraction("workpiece.time_step", scenario.workpiece.time_step, period)
-        if not isinstance(task, SurfaceTask):
-            raise InputError("workpiece = given: must be null where the task is no surface")
-        return PressedWorkpiece(task.surface, task.place, scenario.workpiece)
-    if scenario.notch is None:
-        return None
-    require_whole_fraction("notch.time_step", scenario.notch.time_step, period)
-    if not isinstance(task, PathTask):
-        raise InputError("notch = given: must be null where the task is no path")
-    return NotchedWorkpiece(task.path, scenario.notch)
-
-
-def _spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
-    """Return what a workpiece that is pressed on is to the tool, if there is one."""
-    press = scenario.compliance.press
-    if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
-        return None
-    period = scenario.controller.sampling_time
-    return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), period)
-
-
-def _add_robot(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None,
-) -> RobotPart:
-    if is_delta(scenario.robot.model):
-        return add_delta(builder, scenario, folder, workpiece)
-    return add_arm(builder, scenario, folder, workpiece)
+    return late + sensed_load_warnings(scenario, part.belief.robot, load, law, rest())
 
 
 def _start(

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import Frame, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
 from diagrams.robots.arm_model import ArmModel, believe_arm, read_arm
-from diagrams.robots.belief import Belief
+from diagrams.robots.belief import Belief, BeliefSource
 from diagrams.robots.model import tool_frame
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
@@ -28,7 +28,7 @@ from diagrams.robots.plant_wiring import (
 )
 from diagrams.robots.start_posture import posture_warnings, start_posture, tilt_warnings
 from diagrams.robots.workpiece import Workpiece
-from diagrams.scenario import Scenario, StartParameters
+from diagrams.scenario import StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import MULTIBODY
 from pfsc_drake.errors import InputError
@@ -153,11 +153,11 @@ class Arm(RobotPart):
             forces: One system or more with the ports ``applied_spatial_force`` and ``tau_ext``.
         """
 
-    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
+    def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
         """See :class:`RobotPart`."""
-        belief, source = believe_arm(self.true, scenario, folder)
-        if scenario.needs_sensor:
-            belief.tool_load(source.tool_load(scenario.sensor.joint))
+        belief, model = believe_arm(self.true, source)
+        if sensor_joint is not None:
+            belief.tool_load(model.tool_load(sensor_joint))
 
     def believed_load(self, joint: str) -> ToolLoad:
         """See :class:`RobotPart`."""
@@ -263,55 +263,48 @@ class CoupledArm(Arm):
 
 
 def add_arm(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None = None,
+    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece | None = None
 ) -> Arm:
     """Add the plant of a serial arm, continuous unless its tool may touch something.
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario.
-        folder: Where relative file names start.
+        source: Which arm, and where what is believed of it comes from.
         workpiece: What its tool may touch, if anything.
 
     Raises:
         InputError: If the model cannot be read, is no chain of joints, its rotors are not known,
             or what is to be believed of it makes no arm.
     """
-    plant, allowed = scenario.robot.plant, f"{MULTIBODY}; only a DELTA robot has another"
+    plant, allowed = source.robot.plant, f"{MULTIBODY}; only a DELTA robot has another"
     require(plant == MULTIBODY, "robot.plant", plant, allowed)
-    if scenario.robot.rotor_coupling:
-        return _add_coupled_arm(builder, scenario, folder, workpiece)
+    if source.robot.rotor_coupling:
+        return _add_coupled_arm(builder, source, workpiece)
     if workpiece is not None:
-        return _add_touching_arm(builder, scenario, folder, workpiece)
-    true = read_arm(scenario.robot, folder)
+        return _add_touching_arm(builder, source, workpiece)
+    true = read_arm(source.robot, source.folder)
     builder.AddNamedSystem("plant", true.plant)
-    return MultibodyArm(true, *believe_arm(true, scenario, folder))
+    return MultibodyArm(true, *believe_arm(true, source))
 
 
 def _add_coupled_arm(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None,
+    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece | None
 ) -> CoupledArm:
-    coupled = scenario.robot.rotor_coupling
+    coupled, folder = source.robot.rotor_coupling, source.folder
     allowed = "empty where the robot touches a workpiece; the full model has no contact"
     require(workpiece is None, "robot.rotor_coupling", coupled, allowed)
-    true = read_arm(scenario.robot, folder)
+    true = read_arm(source.robot, folder)
     try:
         robot = load_parameters(folder / coupled if FilePath(coupled).suffix else coupled)
         plant = FullElasticPlant(true.chain, mounts_from_parameters(true.chain, robot))
     except InputError as error:
         raise InputError(f"robot.rotor_coupling: {error}") from None
     builder.AddNamedSystem("plant", plant)
-    return CoupledArm(true, *believe_arm(true, scenario, folder), plant)
+    return CoupledArm(true, *believe_arm(true, source), plant)
 
 
 def _add_touching_arm(
-    builder: DiagramBuilder, scenario: Scenario, folder: FilePath, workpiece: Workpiece
+    builder: DiagramBuilder, source: BeliefSource, workpiece: Workpiece
 ) -> MultibodyArm:
     """Add a discrete plant; of the robot only what touches the workpiece has geometry in it."""
     allowed = "0 on a robot that turns its tool: the ball sits at the tool point"
@@ -321,9 +314,9 @@ def _add_touching_arm(
 
     def add_workpiece(plant: MultibodyPlant) -> None:
         scene_graph.append(add_scene(builder, plant))
-        geometries.extend(workpiece.add(plant, tool_frame(plant, scenario.robot)))
+        geometries.extend(workpiece.add(plant, tool_frame(plant, source.robot)))
 
-    true = read_arm(scenario.robot, folder, workpiece.time_step, add_workpiece)
+    true = read_arm(source.robot, source.folder, workpiece.time_step, add_workpiece)
     builder.AddNamedSystem("plant", true.plant)
     contact = connect_scene(builder, true.plant, scene_graph[0], geometries)
-    return MultibodyArm(true, *believe_arm(true, scenario, folder), contact)
+    return MultibodyArm(true, *believe_arm(true, source), contact)

@@ -8,9 +8,9 @@ from pathlib import Path as FilePath
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint
 
-from diagrams.robots.belief import Belief, naming_model_error
+from diagrams.robots.belief import Belief, BeliefSource, naming_model_error
 from diagrams.robots.model import read_robot, tool_frame
-from diagrams.scenario import RobotParameters, Scenario
+from diagrams.scenario import RobotParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.joint_edits import inboard_joints
 from pfsc_drake.robot.models.parameters import VariantParameters, load_parameters
@@ -121,50 +121,48 @@ def read_arm(
     return ArmModel(plant, *chain_from_plant(plant, tool), tool, warnings)
 
 
-def believe_arm(true: ArmModel, scenario: Scenario, folder: FilePath) -> tuple[Belief, ArmModel]:
+def believe_arm(true: ArmModel, source: BeliefSource) -> tuple[Belief, ArmModel]:
     """Return what the controller believes of an arm, and the model that this starts from.
 
     Args:
         true: The arm of the plant.
-        scenario: The scenario.
-        folder: Where its relative file names start.
+        source: Where the belief comes from.
 
     Raises:
         InputError: If what is to be believed cannot be read or suits no such arm.
     """
-    source = _source(true, scenario, folder)
-    error, believed = scenario.model_error.error(true.chain.gather("is_revolute")), source.chain
-    if scenario.model_error.is_given:
+    model = _model(true, source)
+    error, believed = source.error.error(true.chain.gather("is_revolute")), model.chain
+    if source.error.is_given:
         with naming_model_error():
-            believed = believed_chain(source.chain, error, source.tool_mass())
-    sees_truth = source is true and not error.moves_tool
-    return Belief(believed, error, sees_truth), source
+            believed = believed_chain(model.chain, error, model.tool_mass())
+    sees_truth = model is true and not error.moves_tool
+    return Belief(believed, error, sees_truth), model
 
 
-def _source(true: ArmModel, scenario: Scenario, folder: FilePath) -> ArmModel:
-    model, key = scenario.controller.model, "controller.model"
+def _model(true: ArmModel, source: BeliefSource) -> ArmModel:
+    """Return the model that a belief starts from."""
+    model, key = source.model, "controller.model"
     if not model:
         return true
     try:
         if FilePath(model).suffix in (".yaml", ".yml"):
-            source = _from_parameters(folder / model, true, scenario, folder)
+            found = _from_parameters(source.folder / model, true, source)
         else:
-            source = read_arm(replace(scenario.robot, model=model), folder)
+            found = read_arm(replace(source.robot, model=model), source.folder)
     except InputError as error:
         message = str(error).removeprefix("robot.model: ")
         raise InputError(f"{key}: {message}") from None
-    kinds, own = source.chain.gather("kind").tolist(), true.chain.gather("kind").tolist()
+    kinds, own = found.chain.gather("kind").tolist(), true.chain.gather("kind").tolist()
     if kinds != own:
         raise InputError(
             f"{key} = {model}: has the joints {', '.join(kinds)}; allowed: the robot's, "
             f"{', '.join(own)}"
         )
-    return source
+    return found
 
 
-def _from_parameters(
-    file: FilePath, true: ArmModel, scenario: Scenario, folder: FilePath
-) -> ArmModel:
+def _from_parameters(file: FilePath, true: ArmModel, source: BeliefSource) -> ArmModel:
     """Read the variant of a parameter file that has joints like the plant's."""
     robot, elastic = load_parameters(file), not true.chain.is_rigid
     axes = len(robot.links)
@@ -184,4 +182,4 @@ def _from_parameters(
     with tempfile.TemporaryDirectory() as scratch:
         model = FilePath(scratch) / f"{variant.name}.sdf"
         model.write_text(write_sdf(robot, variant), encoding="utf-8")
-        return read_arm(replace(scenario.robot, model=str(model)), folder)
+        return read_arm(replace(source.robot, model=str(model)), source.folder)

@@ -3,17 +3,36 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import RobotParameters
+from diagrams.scenario.model_error import ModelErrorParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import Believed, Coefficients
-from pfsc_drake.physics.joint_encoders import encoder_resolution
+from pfsc_drake.physics.joint_encoders import EncoderOptions, encoder_resolution
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import ParametricChain, SerialChain, chain_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
+
+
+@dataclass(frozen=True)
+class BeliefSource:
+    """Where what a controller believes of a robot comes from.
+
+    Attributes:
+        robot: Which robot the plant is.
+        model: Another model that is believed; empty for the plant's own.
+        error: By how much that is believed wrongly.
+        folder: Where relative file names start.
+    """
+
+    robot: RobotParameters
+    model: str
+    error: ModelErrorParameters
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -82,19 +101,22 @@ def naming_model_error() -> Iterator[None]:
 
 
 def believed_robot(
-    scenario: Scenario, robot: RobotModel, friction: Coefficients | None = None
+    robot: RobotModel,
+    encoders: EncoderOptions,
+    period: float,
+    friction: Coefficients | None = None,
 ) -> Believed:
-    """Return what a scenario's controller believes.
+    """Return what a controller believes of a robot, and of how well its motion is measured.
 
     Args:
-        scenario: The scenario.
         robot: The robot as it is believed.
+        encoders: What measures its joints.
+        period: Sampling time of the controller [s].
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
 
     Raises:
         InputError: If the encoders do not suit the robot.
     """
-    encoders, period = scenario.encoders, scenario.controller.sampling_time
     late = period if encoders.difference_quotient else 0.0
     return Believed(
         robot,

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody, SpatialIn
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
-from diagrams.robots.belief import Belief, naming_model_error
+from diagrams.robots.belief import Belief, BeliefSource, naming_model_error
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
@@ -25,7 +25,10 @@ from diagrams.robots.plant_wiring import (
     joint_state_of,
 )
 from diagrams.robots.workpiece import Workpiece, upwards
-from diagrams.scenario import RobotParameters, Scenario, StartParameters
+from diagrams.scenario import (
+    RobotParameters,
+    StartParameters,
+)
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
 from pfsc_drake.errors import InputError
@@ -64,9 +67,10 @@ class DeltaPart(RobotPart):
     robot: DeltaRobot
     belief: Belief
 
-    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
-        """See :class:`RobotPart`."""
-        _believe(self.robot, scenario, folder)
+    def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
+        """See :class:`RobotPart`; no load of the sensor is too light."""
+        del sensor_joint
+        _believe(self.robot, source)
 
     @property
     def coordinates(self) -> PlantCoordinates:  # type: ignore[override]
@@ -269,30 +273,30 @@ def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
 
 
 def add_delta(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    folder: FilePath,
-    workpiece: Workpiece | None,
+    builder: DiagramBuilder, source: BeliefSource, step: float, workpiece: Workpiece | None
 ) -> DeltaPart:
     """Add a DELTA robot.
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario.
-        folder: Where relative file names start.
+        source: Which robot, and where what is believed of it comes from.
+        step: Longest one of bodies that touch nothing [s].
         workpiece: What its tool may touch, if anything.
 
     Raises:
-        InputError: If the scenario asks for something that a DELTA robot does not have.
+        InputError: If it cannot be read, or is to have what no DELTA robot has.
     """
-    robot = load_delta_robot(scenario.robot.model, folder)
-    _check(scenario)
-    belief = _believe(robot, scenario, folder)
-    if scenario.robot.plant == ANALYTIC:
+    robot = load_delta_robot(source.robot.model, source.folder)
+    for key, none in asdict(RobotParameters()).items():
+        value = asdict(source.robot)[key]
+        given = key not in ("model", "tool_frame", "plant") and value != none
+        require(not given, f"robot.{key}", value, "none for a DELTA robot")
+    belief = _believe(robot, source)
+    if source.robot.plant == ANALYTIC:
         allowed = f"{MULTIBODY} where the robot touches a workpiece"
         require(workpiece is None, "robot.plant", ANALYTIC, allowed)
         return AnalyticDelta(robot, belief, builder.AddNamedSystem("plant", DeltaPlant(robot)))
-    step = workpiece.time_step if workpiece else _free_step(scenario)
+    step = workpiece.time_step if workpiece else step
     plant = builder.AddNamedSystem("plant", MultibodyPlant(step))
     scene_graph = add_scene(builder, plant) if workpiece else None
     model = add_delta_plant(plant, robot.parameters, with_load=False)
@@ -304,45 +308,29 @@ def add_delta(
     return ConstrainedDelta(robot, belief, plant, model, tool, contact)
 
 
-def _free_step(scenario: Scenario) -> float:
-    """Return the step of bodies that touch nothing: the largest that ticks are multiples of [s]."""
-    period, longest = scenario.controller.sampling_time, scenario.simulation.max_step
+def free_step(period: float, longest: float) -> float:
+    """Return the step of bodies that touch nothing: the largest that ticks are multiples of [s].
+
+    Args:
+        period: From tick to tick [s].
+        longest: What it may be at most [s].
+    """
     return period / math.ceil(period / longest - _ROUNDING)
 
 
-def _believe(robot: DeltaRobot, scenario: Scenario, folder: FilePath) -> Belief:
+def _believe(robot: DeltaRobot, source: BeliefSource) -> Belief:
     """Return what the controller believes of a robot."""
-    source, model = robot, scenario.controller.model
+    start, model = robot, source.model
     if model:
         allowed = f"parameters of a DELTA robot: a YAML file, {', '.join(SHIPPED_ROBOTS)}"
         require(is_delta(model), "controller.model", model, allowed)
-        source = load_delta_robot(model, folder)
-    error, believed = scenario.model_error.error(robot.gather("is_revolute")), source
-    if scenario.model_error.is_given:
+        start = load_delta_robot(model, source.folder)
+    error, believed = source.error.error(robot.gather("is_revolute")), start
+    if source.error.is_given:
         with naming_model_error():
-            believed = believed_delta(source, error)
+            believed = believed_delta(start, error)
     same = believed.parameters.geometry == robot.parameters.geometry
     return Belief(believed, error, sees_truth=same)
-
-
-def _check(scenario: Scenario) -> None:
-    """Refuse what is said of robots that turn their tool or bend."""
-    start, robot, law = scenario.start, scenario.robot, scenario.controller.law
-    drives = "the drives of a DELTA robot are stiff and take forces"
-    require(law == "rigid", "controller.law", law, f"rigid, {drives}")
-    one = "none; one pose of the slides belongs to each position"
-    require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
-    for key, none in asdict(RobotParameters()).items():
-        value = asdict(robot)[key]
-        given = key not in ("model", "tool_frame", "plant") and value != none
-        require(not given, f"robot.{key}", value, "none for a DELTA robot")
-    turned = "none; a DELTA robot only translates"
-    require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
-    keyframes = scenario.path.orientation.keyframes
-    require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
-    if scenario.surface is not None:
-        kind = scenario.surface.orientation.kind
-        require(kind == "none", "surface.orientation.kind", kind, turned)
 
 
 def _weld_gripper(

@@ -1,7 +1,7 @@
 """What is between the law's output and the plant's joints: hold, servo, bus, friction."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -10,13 +10,21 @@ from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer
 
 from diagrams.robots.belief import believed_robot
 from diagrams.robots.part import Drives, RobotPart
-from diagrams.scenario import BrakeParameters, JointFrictionParameters, Scenario
+from diagrams.scenario import (
+    BrakeParameters,
+    JointFrictionParameters,
+    ServoParameters,
+    SimulationParameters,
+)
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.simulation import AUTO
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import safe_state, supervision
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
+from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
@@ -30,10 +38,50 @@ FRICTION_INTEGRATORS = ("runge_kutta3", "runge_kutta5")
 _BRISTLES_PER_STEP = 0.5
 
 
+@dataclass(frozen=True)
+class ServoOptions:
+    """Velocity servos of the joints, and how they are watched.
+
+    Attributes:
+        servo: Their gains and the bus to them.
+        controller: The controller that commands them.
+        faults: What is a fault, and how it ends.
+        encoders: What measures the joints.
+    """
+
+    servo: ServoParameters
+    controller: ControllerParameters
+    faults: FaultParameters
+    encoders: EncoderOptions
+
+
+@dataclass(frozen=True)
+class FrictionOptions:
+    """What brakes the drives of a plant, and how it is integrated.
+
+    Attributes:
+        friction: Coefficients of the joints, if any are given.
+        own: Whether the drives have the friction that the robot's own parameters tell; None if they
+            do where none is given.
+        brakes: Holding brakes, if there are any.
+        simulation: How the plant is integrated.
+        period: Sampling time of the controller [s].
+        folder: Where relative file names start.
+    """
+
+    friction: JointFrictionParameters
+    own: bool | None
+    brakes: BrakeParameters | None
+    simulation: SimulationParameters
+    period: float
+    folder: FilePath
+
+
 def add_drives(
     builder: DiagramBuilder,
     part: RobotPart,
-    scenario: Scenario,
+    servos: ServoOptions | None,
+    period: float,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
 ) -> tuple[dict[str, OutputPort], ServoAccess | None]:
@@ -42,7 +90,8 @@ def add_drives(
     Args:
         builder: Builder of the diagram.
         part: The robot.
-        scenario: The scenario.
+        servos: Of a law that commands velocities; None where it commands torques.
+        period: Sampling time of the controller [s].
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
         initial_state: State of the plant at the start, for which servos are designed.
 
@@ -53,11 +102,10 @@ def add_drives(
     Raises:
         InputError: If the servos do not suit the robot or the controller.
     """
-    period, torque = scenario.controller.sampling_time, ports["drive"]
-    chain, signals, access = part.belief.robot, {}, None
-    if scenario.controller.law == "velocity_servo":
+    torque, chain, signals, access = ports["drive"], part.belief.robot, {}, None
+    if servos is not None:
         q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
-        servo = _add_servo(builder, chain, scenario, ports, q_J)
+        servo = _add_servo(builder, chain, servos, ports, q_J)
         access, period = ServoAccess(servo), servo.period
         torque = servo.GetOutputPort("drive_torque")
         signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
@@ -70,27 +118,26 @@ def add_drives(
 def _add_servo(
     builder: DiagramBuilder,
     chain: RobotModel,
-    scenario: Scenario,
+    options: ServoOptions,
     ports: dict[str, OutputPort],
     q_J: np.ndarray,
 ) -> VelocityServo:
     """Add velocity servos, and return them."""
-    servo, tick = scenario.servo, scenario.controller.sampling_time
+    servo, controller, faults = options.servo, options.controller, options.faults
+    tick = controller.sampling_time
     period = servo.period or tick
     ratio = require_whole_fraction("servo.period", period, tick)
     rate = None if servo.integral_rate < 0.0 else servo.integral_rate
     gains = servo_gains(joint_inertia(chain, q_J), servo.bandwidth, period, rate)
-    effort = chain.gather("effort_limit") * scenario.controller.effort_scale
-    seen = believed_robot(scenario, chain)
-    watched = replace(
-        supervision(scenario.controller.law, scenario.faults, seen), joint_limits=False
-    )
+    effort = chain.gather("effort_limit") * controller.effort_scale
+    seen = believed_robot(chain, options.encoders, tick)
+    watched = replace(supervision(controller.law, faults, seen), joint_limits=False)
     system = builder.AddNamedSystem(
         "velocity_servo",
         VelocityServo(
             chain,
             VelocityServoLaw(gains, effort),
-            safe_state(scenario.controller, chain, scenario.faults),
+            safe_state(controller, chain, faults),
             watched,
             servo.watchdog or np.inf,
         ),
@@ -117,18 +164,16 @@ def add_friction(
     builder: DiagramBuilder,
     part: RobotPart,
     joint_state: OutputPort,
-    scenario: Scenario,
-    folder: FilePath,
+    options: FrictionOptions,
     faults: Sequence[OutputPort] = (),
 ) -> dict[str, OutputPort]:
-    """Add the scenario's friction and brakes, and return the friction's signal for the log.
+    """Add friction and brakes, and return the friction's signal for the log.
 
     Args:
         builder: Builder of the diagram.
         part: The robot.
         joint_state: Its true ``[q_J, v_J, q_M, v_M]``.
-        scenario: The scenario.
-        folder: Where relative file names start.
+        options: What there is of both.
         faults: Nonzero after a fault, for the brakes.
 
     Returns:
@@ -137,8 +182,8 @@ def add_friction(
     Raises:
         InputError: If the friction does not suit the robot or the integration.
     """
-    drives, n, brakes = part.drives, part.robot.dimension, scenario.faults.brakes
-    coefficients = _coefficients(scenario, part, folder)
+    drives, n, brakes = part.drives, part.robot.dimension, options.brakes
+    coefficients = _coefficients(options, part)
     if coefficients is None and brakes is None:
         return {}
     if not np.all(drives.inertia > 0.0):
@@ -152,15 +197,15 @@ def add_friction(
     motors = np.eye(4 * n)[3 * n :]
     resistances, signals = [], {}
     if coefficients is not None:
-        bristles = _bristles(scenario, *coefficients, drives)
+        bristles = _bristles(options, *coefficients, drives)
         friction = builder.AddNamedSystem(
-            "joint_friction", JointFriction(bristles, scenario.friction.drift, motors)
+            "joint_friction", JointFriction(bristles, options.friction.drift, motors)
         )
         builder.Connect(joint_state, friction.GetInputPort("velocity"))
         resistances.append(friction.GetOutputPort("resistance"))
         signals["friction_torque"] = friction.GetOutputPort("friction_torque")
     if brakes is not None:
-        holding = _add_brakes(builder, part, scenario, brakes, faults)
+        holding = _add_brakes(builder, part, options, brakes, faults)
         velocity = builder.AddNamedSystem("motor_velocity", MatrixGain(motors))
         builder.Connect(joint_state, velocity.get_input_port())
         builder.Connect(velocity.get_output_port(), holding.GetInputPort("velocity"))
@@ -182,7 +227,7 @@ def _sum(builder: DiagramBuilder, ports: list[OutputPort]) -> OutputPort:
 def _add_brakes(
     builder: DiagramBuilder,
     part: RobotPart,
-    scenario: Scenario,
+    options: FrictionOptions,
     parameters: BrakeParameters,
     faults: Sequence[OutputPort],
 ) -> HoldingBrakes:
@@ -197,8 +242,8 @@ def _add_brakes(
     torque = np.broadcast_to(given, n) if given.size else part.robot.gather("effort_limit")
     if not np.isfinite(torque).all():
         raise InputError("faults.brakes.torque: the robot's drives have no limit; give numbers")
-    bristles = _bristles(scenario, np.array(torque), np.zeros(n), part.drives)
-    sizes, period = [port.size() for port in faults], scenario.controller.sampling_time
+    bristles = _bristles(options, np.array(torque), np.zeros(n), part.drives)
+    sizes, period = [port.size() for port in faults], options.period
     brakes = builder.AddNamedSystem(
         "holding_brakes", HoldingBrakes(bristles, sum(sizes), parameters.delay, period)
     )
@@ -210,24 +255,23 @@ def _add_brakes(
 
 
 def believed_friction(
-    part: RobotPart, scenario: Scenario, folder: FilePath
+    part: RobotPart, given: JointFrictionParameters, options: FrictionOptions
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the coefficients f_c and f_v that the controller believes, each (N,), if any.
 
-    Those of ``controller.friction.believed``, else those of the plant with the belief's error.
-
     Args:
         part: The robot.
-        scenario: The scenario.
-        folder: Where relative file names start.
+        given: ``controller.friction.believed``; if it is empty, those of the plant are believed,
+            with the belief's error.
+        options: Friction of the plant.
 
     Raises:
         InputError: If they do not suit the robot.
     """
-    given = scenario.controller.friction.believed
     if given.is_given:
-        return _given_coefficients(given, part.robot, folder, "controller.friction.believed")
-    true = _coefficients(scenario, part, folder)
+        key = "controller.friction.believed"
+        return _given_coefficients(given, part.robot, options.folder, key)
+    true = _coefficients(options, part)
     if true is None:
         return None
     factors = part.belief.friction
@@ -235,22 +279,22 @@ def believed_friction(
 
 
 def _bristles(
-    scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+    options: FrictionOptions, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
     """Return friction whose bristles suit how the plant is integrated, however it drifts."""
-    drift = scenario.friction.drift
+    drift = options.friction.drift
     stiffest = f_c * (1.0 if drift is None else max(1.0, drift.factor))
-    return replace(_bristles_now(scenario, stiffest, f_v, drives), coulomb=f_c)
+    return replace(_bristles_now(options, stiffest, f_v, drives), coulomb=f_c)
 
 
 def _bristles_now(
-    scenario: Scenario, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
+    options: FrictionOptions, f_c: np.ndarray, f_v: np.ndarray, drives: Drives
 ) -> BristleFriction:
     if drives.step is not None:
         return bristles_for_step(
             f_c, f_v, drives.inertia, drives.step, frequency=_BRISTLES_PER_STEP
         )
-    simulation = scenario.simulation
+    simulation = options.simulation
     allowed = (AUTO, *FRICTION_INTEGRATORS)
     if simulation.accuracy == 0.0 and simulation.integrator not in allowed:
         raise InputError(
@@ -258,19 +302,19 @@ def _bristles_now(
             f"{', '.join(allowed)}, or error control"
         )
     # stiff enough for the step of the integration, or of the hold if that is shorter
-    step = min(simulation.max_step, scenario.controller.sampling_time)
+    step = min(simulation.max_step, options.period)
     return bristles_for_step(f_c, f_v, drives.inertia, step)
 
 
 def _coefficients(
-    scenario: Scenario, part: RobotPart, folder: FilePath
+    options: FrictionOptions, part: RobotPart
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the friction of the scenario, else of the robot's parameters, else None."""
-    own, wanted = part.drives.own_friction, scenario.drive_friction
+    """Return the friction that is given, else that of the robot's parameters, else None."""
+    own, wanted = part.drives.own_friction, options.own
     allowed = "null; the parameters of this robot tell no friction, 'friction' does"
     require(own is not None or wanted is None, "drive_friction", wanted, allowed)
-    if scenario.friction.is_given:
-        return _given_coefficients(scenario.friction, part.robot, folder, "friction")
+    if options.friction.is_given:
+        return _given_coefficients(options.friction, part.robot, options.folder, "friction")
     return None if wanted is False else own
 
 

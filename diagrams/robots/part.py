@@ -2,13 +2,12 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
-from diagrams.robots.belief import Belief
-from diagrams.scenario import Scenario, StartParameters
+from diagrams.robots.belief import Belief, BeliefSource
+from diagrams.scenario import StartParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.robot_model import RobotModel
@@ -149,12 +148,13 @@ class RobotPart(ABC):
         raise InputError("masses of this robot's plant cannot be changed once it is made")
 
     @abstractmethod
-    def check_belief(self, scenario: Scenario, folder: FilePath) -> None:
+    def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
         """Refuse what no controller could believe of this robot; nothing is built.
 
         Args:
-            scenario: A scenario for the same robot.
-            folder: Where its relative file names start.
+            source: Where the belief comes from; of the same robot.
+            sensor_joint: The joint with a force sensor in it, or empty for the default one; None
+                without a sensor.
 
         Raises:
             InputError: If what is to be believed makes no robot, or no tool.

@@ -3,12 +3,16 @@
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart, SensorMount
-from diagrams.scenario import Scenario
+from diagrams.scenario import SensorFailureParameters, SensorParameters
 from diagrams.scenario.checks import require
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.force_torque_sensor import ForceTorqueSensor, SensorFailure
+from pfsc_drake.physics.force_torque_sensor import (
+    ForceTorqueParameters,
+    ForceTorqueSensor,
+    SensorFailure,
+)
 from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
@@ -20,7 +24,10 @@ def add_joint_state(
     builder: DiagramBuilder,
     joint_state: OutputPort,
     robot: RobotModel,
-    scenario: Scenario,
+    encoders: EncoderOptions,
+    failure: SensorFailureParameters,
+    period: float,
+    encoder_period: float,
 ) -> OutputPort:
     """Add what encoders make of the joint state, and return ``[q_J, v_J, q_M, v_M]`` as measured.
 
@@ -28,14 +35,21 @@ def add_joint_state(
         builder: Builder of the diagram.
         joint_state: The true one.
         robot: The robot.
-        scenario: The scenario.
+        encoders: The encoders.
+        failure: How one of them fails, if any does.
+        period: Sampling time of the controller [s].
+        encoder_period: That of the encoders, which servos may read more often [s].
 
     Raises:
         InputError: If the encoders do not suit the robot, or a sensor is to fail that does
             not exist.
     """
-    measured = _add_imperfection(builder, joint_state, robot, scenario)
-    failure = scenario.simulation.sensor_failure
+    measured = joint_state
+    if encoders != EncoderOptions():
+        block = JointEncoders(robot, encoders, encoder_period)
+        real = builder.AddNamedSystem("encoder_increments", BlockSystem(block, encoder_period))
+        builder.Connect(joint_state, real.GetInputPort("joint_state"))
+        measured = real.GetOutputPort("joint_state")
     if failure.time < 0.0:
         return measured
     size = 4 * robot.dimension
@@ -43,7 +57,7 @@ def add_joint_state(
         raise InputError(
             f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
         )
-    indices, period = [failure.component], scenario.controller.sampling_time
+    indices = [failure.component]
     if failure.whole_joint:
         indices = list(range(failure.component % robot.dimension, size, robot.dimension))
     failing = SensorFailure(size, indices, failure.time, period, failure.kind, failure.size)
@@ -55,40 +69,18 @@ def add_joint_state(
     return broken.GetOutputPort("delivered")
 
 
-def states_to_log(
-    scenario: Scenario, joint_state: OutputPort, measured: OutputPort
-) -> dict[str, OutputPort]:
+def states_to_log(joint_state: OutputPort, measured: OutputPort) -> dict[str, OutputPort]:
     """Return ``joint_state`` for the log, and ``joint_state_measured`` where it is not the truth.
 
     That is with imperfect encoders, and where a sensor is to fail.
 
     Args:
-        scenario: The scenario.
         joint_state: The true one.
         measured: What the law gets, see :func:`add_joint_state`.
     """
-    if scenario.encoders == EncoderOptions() and scenario.simulation.sensor_failure.time < 0.0:
+    if measured is joint_state:
         return {"joint_state": measured}
     return {"joint_state": joint_state, "joint_state_measured": measured}
-
-
-def _add_imperfection(
-    builder: DiagramBuilder,
-    joint_state: OutputPort,
-    robot: RobotModel,
-    scenario: Scenario,
-) -> OutputPort:
-    """Add increments and difference quotients, if there are any."""
-    options = scenario.encoders
-    if options == EncoderOptions():
-        return joint_state
-    period = scenario.controller.sampling_time
-    if scenario.controller.law == "velocity_servo":
-        period = scenario.servo.period or period
-    encoders = JointEncoders(robot, options, period)
-    real = builder.AddNamedSystem("encoder_increments", BlockSystem(encoders, period))
-    builder.Connect(joint_state, real.GetInputPort("joint_state"))
-    return real.GetOutputPort("joint_state")
 
 
 # of a sampling interval
@@ -98,7 +90,9 @@ _ROUNDING = 1e-6
 def add_sensor(
     builder: DiagramBuilder,
     part: RobotPart,
-    scenario: Scenario,
+    parameters: SensorParameters,
+    failure: SensorFailureParameters,
+    period: float,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Add a force/torque sensor with taring and compensation of the tool behind it.
@@ -106,7 +100,9 @@ def add_sensor(
     Args:
         builder: Builder of the diagram.
         part: The robot.
-        scenario: The scenario.
+        parameters: The sensor.
+        failure: How it fails, if it does.
+        period: Sampling time of the controller [s].
         ports: ``joint_state`` as measured, ``true_joint_state``, and ``wrench_ext`` if anything
             acts on the tool.
 
@@ -117,9 +113,8 @@ def add_sensor(
     Raises:
         InputError: If the sensor does not suit the robot or the sampling time.
     """
-    parameters, period = scenario.sensor, scenario.controller.sampling_time
     mount = part.sensor_mount(builder, parameters.joint, ports)
-    sensor = _add_transducer(builder, mount, scenario)
+    sensor = _add_transducer(builder, mount, parameters.transducer(), period)
     block = ToolCompensation(
         part.belief.robot,
         mount.believed_load,
@@ -128,8 +123,8 @@ def add_sensor(
         period,
     )
     compensation = builder.AddNamedSystem("tool_compensation", BlockSystem(block, period))
-    reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), scenario)
-    reading = _delay(builder, reading, scenario)
+    reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), failure, period)
+    reading = _delay(builder, reading, parameters.delay, period)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     signals = {"wrench_measured": "wrench", "tared": "tared", "sensor_fault": "fault"}
@@ -137,9 +132,13 @@ def add_sensor(
     return found | {"wrench_sensor": reading}
 
 
-def _add_transducer(builder: DiagramBuilder, mount: SensorMount, scenario: Scenario) -> BlockSystem:
+def _add_transducer(
+    builder: DiagramBuilder,
+    mount: SensorMount,
+    parameters: ForceTorqueParameters,
+    period: float,
+) -> BlockSystem:
     """Add what the sensor itself makes of the load on it."""
-    parameters, period = scenario.sensor.transducer(), scenario.controller.sampling_time
     block = ForceTorqueSensor(parameters, period)
     sensor = builder.AddNamedSystem("force_torque_sensor", BlockSystem(block, period))
     reaction = mount.reaction
@@ -156,9 +155,13 @@ def _add_transducer(builder: DiagramBuilder, mount: SensorMount, scenario: Scena
     return sensor
 
 
-def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> OutputPort:
+def _fail(
+    builder: DiagramBuilder,
+    reading: OutputPort,
+    failure: SensorFailureParameters,
+    period: float,
+) -> OutputPort:
     """Return what is left of the sensor's reading if it is to fail on the way."""
-    failure, period = scenario.simulation.force_sensor_failure, scenario.controller.sampling_time
     if failure.time < 0.0:
         return reading
     size = reading.size()
@@ -177,9 +180,8 @@ def _fail(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> O
     return broken.GetOutputPort("delivered")
 
 
-def _delay(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> OutputPort:
+def _delay(builder: DiagramBuilder, reading: OutputPort, delay: float, period: float) -> OutputPort:
     """Return a sensor's reading when the controller has it."""
-    delay, period = scenario.sensor.delay, scenario.controller.sampling_time
     ticks = round(delay / period)
     whole = abs(ticks * period - delay) < _ROUNDING * period
     require(whole, "sensor.delay", delay, f"a multiple of the sampling time {period:g} s")
@@ -192,15 +194,17 @@ def _delay(builder: DiagramBuilder, reading: OutputPort, scenario: Scenario) -> 
     return late.GetOutputPort("held")
 
 
-def sensor_warnings(scenario: Scenario) -> list[str]:
-    """Return what may make the taring of a scenario's sensor too late."""
-    if not scenario.compliance.needs_sensor:
-        return []
-    warnings, sensor, dwell = [], scenario.sensor, scenario.reference.dwell
-    if dwell < sensor.taring_time:
-        warnings.append(
+def taring_warnings(taring_time: float, dwell: float) -> list[str]:
+    """Return what is said where a reference does not wait until the sensor is tared.
+
+    Args:
+        taring_time: How long the tool must rest for that [s].
+        dwell: How long the reference waits at first [s].
+    """
+    if dwell < taring_time:
+        return [
             f"the reference sets off after reference.dwell = {dwell:g} s, before the sensor can "
-            f"be tared (sensor.taring_time = {sensor.taring_time:g} s); what yields waits for "
+            f"be tared (sensor.taring_time = {taring_time:g} s); what yields waits for "
             "that, and then catches up"
-        )
-    return warnings
+        ]
+    return []

@@ -134,6 +134,19 @@ class Scenario:
             require(law in RELATIVE_DEGREE, "targets", law, ", ".join(RELATIVE_DEGREE))
 
     @property
+    def switched_regions(self) -> list[str]:
+        """Names of the regions that a person can switch on and off one by one."""
+        if self.controller.manifold != "space" or self.fixtures is None:
+            return []
+        return self.fixtures.names
+
+    @property
+    def encoder_period(self) -> float:
+        """Sampling time of the encoders, which servos may read more often than the law [s]."""
+        period = self.controller.sampling_time
+        return self.servo.period or period if self.controller.law == "velocity_servo" else period
+
+    @property
     def needs_sensor(self) -> bool:
         """Whether something acts on measured forces."""
         measured = self.controller.external_torque.source == "measured"

@@ -6,7 +6,6 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.plate import CarrierParameters, PlateParameters
 from diagrams.tasks.path_following import PathTask
@@ -93,28 +92,23 @@ class Mounting:
             )
 
 
-def make_mounting(scenario: Scenario, task: Task) -> Mounting | None:
-    """Return where a scenario's plates come from and go, if it has any.
+def make_mounting(plate: PlateParameters, task: Task, *, has_hand: bool, period: float) -> Mounting:
+    """Return where plates come from and go.
 
     Args:
-        scenario: The scenario.
-        task: Its task.
+        plate: The plates.
+        task: What the tool is to do.
+        has_hand: Whether there is an operator's hand.
+        period: Sampling time [s].
 
     Raises:
         InputError: If the plates do not suit the task.
     """
-    plate = scenario.plate
-    if plate is None:
-        return None
-    period = scenario.controller.sampling_time
     require_whole_fraction("plate.contact.time_step", plate.contact.time_step, period)
-    for key in ("notch", "workpiece"):
-        given = getattr(scenario, key) is not None
-        require(not given, key, "given", "null where there is a plate")
     if not isinstance(task, PathTask) or len(task.place.coordinates) != _ORIENTED:
         raise InputError("plate = given: allowed: null unless a path with orientation is followed")
     operated = plate.operator is not None
-    require(not operated or scenario.hand is not None, "hand", "null", "given for plate.operator")
+    require(not operated or has_hand, "hand", "null", "given for plate.operator")
     returns = plate.operator is not None and plate.operator.task == "return"
     allowed = "frame where plate.operator.task is return, and only there"
     require(

@@ -7,7 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.scenario import Scenario
+from diagrams.robots.part import RobotPart
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting, tool_transform
 from diagrams.surroundings.plate_plant import add_plate_plant
@@ -30,10 +30,11 @@ def add_hand(
     builder: DiagramBuilder,
     robot: RobotModel,
     task: Task,
-    scenario: Scenario,
+    parameters: HandParameters,
+    period: float,
     joint_state: OutputPort,
-) -> list[OutputPort]:
-    """Add the scenario's hand, which sees where the tool really is.
+) -> OutputPort:
+    """Add a hand on the tool, which sees where that really is.
 
     Its wrench is held together with all other forces, one sampling time more of delay.
 
@@ -41,27 +42,27 @@ def add_hand(
         builder: Builder of the diagram.
         robot: The robot.
         task: What it is to do, for targets in coordinates of its manifold.
-        scenario: The scenario.
+        parameters: The hand.
+        period: Sampling time [s].
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
-        The wrench on the tool point, world axes, shape (6,) [N, Nm]; none without hand.
+        The wrench on the tool point, world axes, shape (6,) [N, Nm].
 
     Raises:
         InputError: If a target is off the path, or the reaction delay no multiple of the
             sampling time.
     """
-    if scenario.hand is None:
-        return []
-    hand = connect_hand(builder, robot, task, scenario, joint_state, OperatorHand)
-    return [hand.GetOutputPort("wrench")]
+    hand = connect_hand(builder, robot, task, parameters, period, joint_state, OperatorHand)
+    return hand.GetOutputPort("wrench")
 
 
 def connect_hand(
     builder: DiagramBuilder,
     robot: RobotModel,
     task: Task,
-    scenario: Scenario,
+    parameters: HandParameters,
+    period: float,
     joint_state: OutputPort,
     make: Callable[[HandParameters, float, Place], OperatorHand],
 ) -> BlockSystem:
@@ -71,7 +72,8 @@ def connect_hand(
         builder: Builder of the diagram.
         robot: The robot.
         task: See :func:`add_hand`.
-        scenario: The scenario, with a hand.
+        parameters: The hand.
+        period: Sampling time [s].
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
         make: Makes it of its properties, the sampling time [s] and what tells where coordinates
             of the manifold are.
@@ -79,8 +81,6 @@ def connect_hand(
     Raises:
         InputError: See :func:`add_hand`.
     """
-    parameters, period = scenario.hand, scenario.controller.sampling_time
-    assert parameters is not None
     if parameters.frame == "manifold":
         for i, place in enumerate(parameters.places()[1]):
             task.check_place(place, f"hand.waypoints[{i}].position")
@@ -98,9 +98,10 @@ def connect_hand(
 def add_mounting(
     builder: DiagramBuilder,
     mounting: Mounting,
-    robot: RobotModel,
+    part: RobotPart,
     task: Task,
-    scenario: Scenario,
+    hand: HandParameters | None,
+    period: float,
     start: StartPoint,
     joint_state: OutputPort,
 ) -> tuple[list[OutputPort], dict[str, OutputPort]]:
@@ -109,9 +110,10 @@ def add_mounting(
     Args:
         builder: Builder of the diagram.
         mounting: Where the plates come from and go.
-        robot: The robot, as it is.
+        part: The robot.
         task: What it is to do.
-        scenario: The scenario.
+        hand: Of an operator who mounts them, if one does.
+        period: Sampling time [s].
         start: Where its tool starts.
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
 
@@ -123,8 +125,8 @@ def add_mounting(
     Raises:
         InputError: If the operator's hand does not suit the task.
     """
-    plate, period = mounting.parameters, scenario.controller.sampling_time
-    places, gravity = mounting.plates(start), np.array(scenario.robot.gravity)
+    plate, robot = mounting.parameters, part.robot
+    places, gravity = mounting.plates(start), part.gravity
     world = add_plate_plant(builder, plate, mounting.X_WM, mounting.X_WF, places, gravity)
     motion = builder.AddNamedSystem("tool_motion", BlockSystem(ToolMotion(robot), period))
     builder.Connect(joint_state, motion.GetInputPort("joint_state"))
@@ -154,7 +156,8 @@ def add_mounting(
     if plate.operator is None:
         builder.Connect(_scheduled_vacuum(builder, plate), gripper.GetInputPort("vacuum"))
         return wrenches, signals
-    operator = _add_operator(builder, mounting, robot, task, scenario, joint_state)
+    assert hand is not None  # where an operator mounts, a hand is given
+    operator = _add_operator(builder, mounting, robot, task, hand, period, joint_state)
     builder.Connect(gripper.GetOutputPort("held"), operator.GetInputPort("held"))
     builder.Connect(operator.GetOutputPort("vacuum"), gripper.GetInputPort("vacuum"))
     signals["hand_wrench"] = operator.GetOutputPort("wrench")
@@ -177,7 +180,8 @@ def _add_operator(
     mounting: Mounting,
     robot: RobotModel,
     task: Task,
-    scenario: Scenario,
+    parameters: HandParameters,
+    period: float,
     joint_state: OutputPort,
 ) -> BlockSystem:
     operator, pin_length = mounting.parameters.operator, mounting.parameters.pins.length
@@ -187,21 +191,23 @@ def _add_operator(
         assert operator is not None
         return MountingHand(hand, operator, goal, pin_length, period, place)
 
-    return connect_hand(builder, robot, task, scenario, joint_state, make)
+    return connect_hand(builder, robot, task, parameters, period, joint_state, make)
 
 
 def add_payload(
     builder: DiagramBuilder,
-    scenario: Scenario,
     mounting: Mounting,
+    gravity: np.ndarray,
+    period: float,
     ports: dict[str, OutputPort],
 ) -> dict[str, OutputPort]:
     """Take the plate's weight off what the force/torque sensor measures while it is held.
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario.
-        mounting: Its plates.
+        mounting: The plates.
+        gravity: [m/s^2], world axes, shape (3,).
+        period: Sampling time [s].
         ports: ``wrench_measured``, ``tared``, ``sensor_fault``, ``tool_pose`` as measured, and
             ``held``.
 
@@ -210,10 +216,8 @@ def add_payload(
     """
     plate = mounting.parameters
     center = np.array([0.0, 0.0, plate.size[2] / 2.0])
-    load = PayloadCompensation(plate.believed_mass, center, np.array(scenario.robot.gravity))
-    system = builder.AddNamedSystem(
-        "payload_compensation", BlockSystem(load, scenario.controller.sampling_time)
-    )
+    load = PayloadCompensation(plate.believed_mass, center, gravity)
+    system = builder.AddNamedSystem("payload_compensation", BlockSystem(load, period))
     inputs = {
         "wrench": "wrench_measured", "tool_pose": "tool_pose", "held": "held", "tared": "tared",
         "sensor_fault": "sensor_fault",

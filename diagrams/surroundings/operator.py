@@ -7,12 +7,12 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.simulation import OperatorParameters
 from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, REQUESTS
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.physics.live_hand import ASKED, LiveHand
+from pfsc_drake.physics.live_hand import ASKED, LiveHand, LiveHandParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls
@@ -92,10 +92,12 @@ class Operator:
     Attributes:
         panel: What looks at them.
         regions: Names of what can be switched on and off.
+        hand: Of the person.
     """
 
     panel: OperatorPanel
     regions: Sequence[str]
+    hand: LiveHandParameters
 
     @property
     def columns(self) -> list[str]:
@@ -131,21 +133,6 @@ class Operator:
         return ports
 
 
-def region_names(scenario: Scenario) -> list[str]:
-    """Return the names of what a person can switch on and off one by one.
-
-    The law of a tool that is led within regions finds the switches as ``regions_on``, shape
-    (len(names),), among the ports that it is built with: 1 is on. The page gets a switch for each,
-    and recorded takes a column ``region_NAME``.
-
-    Args:
-        scenario: The scenario.
-    """
-    if scenario.controller.manifold != "space" or scenario.fixtures is None:
-        return []
-    return scenario.fixtures.names
-
-
 def idle_controls(regions: Sequence[str]) -> np.ndarray:
     """Return the controls of a person who does nothing.
 
@@ -155,66 +142,65 @@ def idle_controls(regions: Sequence[str]) -> np.ndarray:
     return np.concatenate([np.zeros(ASKED), np.full(REQUESTS, AS_GIVEN), np.ones(len(regions))])
 
 
-def add_operator(builder: DiagramBuilder, scenario: Scenario, folder: FilePath) -> Operator | None:
+def add_operator(
+    builder: DiagramBuilder,
+    parameters: OperatorParameters,
+    regions: list[str],
+    period: float,
+    folder: FilePath,
+) -> Operator:
     """Add the panel at which a person stands, and what was recorded of it, if anything.
+
+    The law of a tool that is led within regions finds their switches as ``regions_on``, shape
+    (len(regions),), among the ports that it is built with: 1 is on. The page gets a switch for
+    each, and recorded takes a column ``region_NAME``.
 
     Args:
         builder: Builder of the diagram.
-        scenario: The scenario.
+        parameters: The person.
+        regions: Names of what can be switched on and off one by one.
+        period: Sampling time [s].
         folder: Where relative file names start.
-
-    Returns:
-        None without the block ``operator``.
 
     Raises:
         InputError: If the recorded controls cannot be read.
     """
-    if scenario.operator is None:
-        return None
-    period, regions = scenario.controller.sampling_time, region_names(scenario)
     idle = idle_controls(regions)
     parts = {"pull": idle[PULL], "request": idle[REQUEST]}
     if regions:
         parts["regions"] = idle[REGIONS]
     panel = builder.AddNamedSystem("operator_panel", OperatorPanel(parts, period))
-    if scenario.operator.inputs:
+    if parameters.inputs:
         try:
-            recorded = read_controls(str(folder / scenario.operator.inputs), regions)
+            recorded = read_controls(str(folder / parameters.inputs), regions)
         except InputError as error:
             raise InputError(f"operator.inputs: {error}") from None
         player = builder.AddNamedSystem("recorded_controls", RecordedControls(*recorded, period))
         builder.Connect(player.get_output_port(), panel.GetInputPort("controls"))
-    return Operator(panel, regions)
+    return Operator(panel, regions, parameters.hand)
 
 
 def add_live_hand(
     builder: DiagramBuilder,
     robot: RobotModel,
-    scenario: Scenario,
-    operator: Operator | None,
+    operator: Operator,
     joint_state: OutputPort,
-) -> list[OutputPort]:
+) -> OutputPort:
     """Add the hand of the person at the panel, which is where the tool really is.
 
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        scenario: The scenario.
-        operator: Who stands at the panel, if anybody does.
+        operator: Who stands at the panel.
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
 
     Returns:
-        The wrench on the tool point, world axes, shape (6,) [N, Nm]; none without operator.
+        The wrench on the tool point, world axes, shape (6,) [N, Nm].
     """
-    if operator is None:
-        return []
-    assert scenario.operator is not None
-    period = scenario.controller.sampling_time
-    hand = builder.AddNamedSystem(
-        "live_hand", BlockSystem(LiveHand(scenario.operator.hand, period), period)
-    )
+    period = operator.panel.period
+    hand = builder.AddNamedSystem("live_hand", BlockSystem(LiveHand(operator.hand, period), period))
     view = builder.AddNamedSystem("live_hand_view", BlockSystem(ToolKinematics(robot), period))
     builder.Connect(joint_state, view.GetInputPort("joint_state"))
     builder.Connect(view.GetOutputPort("tool_pose"), hand.GetInputPort("tool_pose"))
     builder.Connect(operator.pull, hand.GetInputPort("asked"))
-    return [hand.GetOutputPort("wrench")]
+    return hand.GetOutputPort("wrench")

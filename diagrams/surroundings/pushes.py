@@ -7,7 +7,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
-from diagrams.scenario import ForcePulse, Scenario
+from diagrams.scenario import ForcePulse
 from diagrams.tasks.task import Task
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows
 from pfsc_drake.errors import InputError
@@ -27,20 +27,37 @@ class _Push:
     hand: LinkHandParameters | None = None
 
 
+@dataclass(frozen=True)
+class PushedLinks:
+    """What acts on links of a robot.
+
+    Attributes:
+        forces: Written down beforehand; those without a link act on the tool.
+        hands: Hands that take hold of links.
+        has_sensor: Whether forces on the tool are measured.
+    """
+
+    forces: list[ForcePulse]
+    hands: list[LinkHandParameters]
+    has_sensor: bool
+
+
 def add_pushes(
     builder: DiagramBuilder,
     part: RobotPart,
     task: Task,
-    scenario: Scenario,
+    pushed: PushedLinks,
+    period: float,
     ports: dict[str, OutputPort],
 ) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
-    """Add the scenario's forces on links of the robot, by scripts and by hands.
+    """Add forces on links of the robot, by scripts and by hands.
 
     Args:
         builder: Builder of the diagram.
         part: The robot.
         task: What it is to do, for the axes of its manifold.
-        scenario: The scenario.
+        pushed: What acts on them.
+        period: Sampling time [s].
         ports: ``joint_state``, the true one, ``manifold_point``.
 
     Returns:
@@ -51,10 +68,9 @@ def add_pushes(
     Raises:
         InputError: If the robot has no such link, or its links cannot be pushed.
     """
-    found = _pushes(part, scenario)
+    found = _pushes(part, pushed)
     if not found or not isinstance(part, Arm):
         return None, {}
-    period = scenario.controller.sampling_time
     system = LinkPushes(part.robot, [push.place for push in found])
     builder.AddNamedSystem("link_pushes", system)
     size = len(found)
@@ -66,9 +82,9 @@ def add_pushes(
     # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
     hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
     builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
-    for pushed in (system, forces):
-        builder.Connect(ports["joint_state"], pushed.GetInputPort("joint_state"))
-        builder.Connect(hold.GetOutputPort("held"), pushed.GetInputPort("wrenches"))
+    for bearing in (system, forces):
+        builder.Connect(ports["joint_state"], bearing.GetInputPort("joint_state"))
+        builder.Connect(hold.GetOutputPort("held"), bearing.GetInputPort("wrenches"))
     for k, push in enumerate(found):
         if push.hand is not None:
             source = builder.AddNamedSystem(
@@ -94,10 +110,10 @@ def add_pushes(
     }
 
 
-def _pushes(part: RobotPart, scenario: Scenario) -> list[_Push]:
+def _pushes(part: RobotPart, pushed: PushedLinks) -> list[_Push]:
     """Return what acts on links, pulses at one point together."""
     scripted: list[_Push] = []
-    for i, pulse in enumerate(scenario.forces):
+    for i, pulse in enumerate(pushed.forces):
         if not pulse.link:
             continue
         for push in scripted:
@@ -105,17 +121,17 @@ def _pushes(part: RobotPart, scenario: Scenario) -> list[_Push]:
                 push.pulses.append(pulse)
                 break
         else:
-            place = _place(part, scenario, f"forces[{i}]", pulse.link, pulse.point)
+            place = _place(part, pushed, f"forces[{i}]", pulse.link, pulse.point)
             scripted.append(_Push(place, [pulse]))
     hands = [
-        _Push(_place(part, scenario, f"pushes[{i}]", hand.link, hand.point), [], hand)
-        for i, hand in enumerate(scenario.pushes)
+        _Push(_place(part, pushed, f"pushes[{i}]", hand.link, hand.point), [], hand)
+        for i, hand in enumerate(pushed.hands)
     ]
     return scripted + hands
 
 
 def _place(
-    part: RobotPart, scenario: Scenario, where: str, link: str, point: np.ndarray
+    part: RobotPart, pushed: PushedLinks, where: str, link: str, point: np.ndarray
 ) -> LinkPlace:
     if not isinstance(part, Arm):
         raise InputError(
@@ -127,7 +143,7 @@ def _place(
         raise InputError(f"{where}.link = {error}") from None
     # what a sensor behind the last joint bears is told for forces on the tool point alone
     last = place.link == part.robot.dimension - 1
-    if last and scenario.needs_sensor and isinstance(part, CoupledArm):
+    if last and pushed.has_sensor and isinstance(part, CoupledArm):
         raise InputError(
             f"{where}.link = '{link}' with robot.rotor_coupling and a force sensor; allowed: links "
             "before the last, or no link, for the tool point"

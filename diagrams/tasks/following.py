@@ -156,7 +156,12 @@ def add_law(
     controller, signals, made = add_controller(
         builder,
         law,
-        believed_robot(scenario, following.robot, following.friction),
+        believed_robot(
+            following.robot,
+            scenario.encoders,
+            scenario.controller.sampling_time,
+            following.friction,
+        ),
         scenario.controller,
         scenario.faults,
         place.signals | forces,

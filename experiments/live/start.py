@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diagrams.scenario import Scenario
-from diagrams.surroundings.operator import region_names
 from experiments.live.pages import Pages
 from experiments.live.server import PageServer
 from experiments.live.session import Kept, LiveSession, Output, Teller
@@ -124,7 +123,7 @@ def with_operator(scenario: ScenarioFile) -> ScenarioFile:
         InputError: If it is wrong, or has nothing to guide.
     """
     settings = load_typed(Scenario, scenario.data, str(scenario.path))
-    if not settings.compliance.is_given and not region_names(settings):
+    if not settings.compliance.is_given and not settings.switched_regions:
         raise InputError(
             f"{scenario.path}: compliance = not given: nothing yields to a hand; allowed in a live "
             "session: a scenario with compliance, such as vf_soft_circle"

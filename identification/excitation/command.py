@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from reporting.commands import interruptible
 from rich.console import Console
 
 from identification.options import Robot, Tool
+from reporting.terminal import interruptible
 
 
 def information_command(

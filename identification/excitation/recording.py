@@ -13,12 +13,11 @@ from diagrams.drawing.replay import add_source, camera_and_target, record
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.model import read_robot
 from identification.excitation.balls import ends
-from identification.excitation.cell import Cell
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun
-from identification.excitation.scene import left_out_tool, obstacle_shape
+from identification.excitation.scene import Cell, left_out_tool, obstacle_shape
 from identification.model.subject import Subject, tool_frame_of
-from identification.output import write_text
+from identification.options import write_text
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

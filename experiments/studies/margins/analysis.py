@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context
 from diagrams.linearization import RestSlope
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
+from diagrams.station_parts import belief_source
 from experiments.studies.margins.box import (
     Box,
     Error,
@@ -128,7 +129,7 @@ def _believable(
     elastic, singles = not part.robot.is_rigid, []
     for key, error in single_errors(box, elastic):
         try:
-            part.check_belief(error.applied_to(settings), folder)
+            _check_belief(part, error.applied_to(settings), folder)
         except InputError as refusal:
             remarks.append(f"{error}: left out, {refusal}")
         else:
@@ -138,9 +139,14 @@ def _believable(
     for error in corners(box, elastic):
         with contextlib.suppress(InputError):
             if all(one in known for one in error.parts):
-                part.check_belief(error.applied_to(settings), folder)
+                _check_belief(part, error.applied_to(settings), folder)
                 together.append(error)
     return singles, together
+
+
+def _check_belief(part: RobotPart, settings: Scenario, folder: Path) -> None:
+    joint = settings.sensor.joint if settings.needs_sensor else None
+    part.check_belief(belief_source(settings, folder), joint)
 
 
 @dataclass

@@ -18,6 +18,7 @@ from diagrams.robots.arm import Arm
 from diagrams.robots.arm_model import believe_arm
 from diagrams.scenario import Scenario
 from diagrams.station import Station
+from diagrams.station_parts import belief_source
 from experiments.simulation import configure
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -109,7 +110,7 @@ class StationLoop:
         part = self.station.part
         assert isinstance(part, Arm)  # others are not parametrized
         other = copy(self)
-        other.parameters = believe_arm(part.true, settings, folder)[0].parameters
+        other.parameters = believe_arm(part.true, belief_source(settings, folder))[0].parameters
         return other
 
     def configure(self, simulator: Simulator) -> None:

@@ -35,6 +35,7 @@ class OperatorPanel(LeafSystem):
         for name, values in parts.items():
             self._add_output(name, slice(begin, begin + len(values)), memory)
             begin += len(values)
+        self.period = period
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._look)
 
     def _add_output(self, name: str, part: slice, memory: object) -> None:

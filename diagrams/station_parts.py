@@ -1,0 +1,183 @@
+"""The parts of a station that a scenario chooses: robot, drives, workpiece."""
+
+from pathlib import Path as FilePath
+
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.robots.arm import add_arm
+from diagrams.robots.belief import BeliefSource
+from diagrams.robots.delta import add_delta, free_step, is_delta
+from diagrams.robots.drives import (
+    FrictionOptions,
+    ServoOptions,
+)
+from diagrams.robots.part import RobotPart
+from diagrams.robots.workpiece import Workpiece
+from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require, require_whole_fraction
+from diagrams.surroundings.forces import Outside
+from diagrams.surroundings.mounting import Mounting, make_mounting
+from diagrams.surroundings.notch import NotchedWorkpiece
+from diagrams.surroundings.patch import PressedWorkpiece
+from diagrams.tasks.path_following import PathTask
+from diagrams.tasks.surface_following import SurfaceTask
+from diagrams.tasks.task import Task
+from pfsc_drake.errors import InputError
+from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
+
+
+def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:
+    """Return what a tool presses on or runs in, if there is anything.
+
+    Args:
+        scenario: The scenario.
+        task: What the tool is to do.
+
+    Raises:
+        InputError: If the workpiece does not suit the task or the sampling time.
+    """
+    period = scenario.controller.sampling_time
+    if scenario.workpiece is not None:
+        require(scenario.notch is None, "notch", "given", "null where there is a workpiece")
+        require_whole_fraction("workpiece.time_step", scenario.workpiece.time_step, period)
+        if not isinstance(task, SurfaceTask):
+            raise InputError("workpiece = given: must be null where the task is no surface")
+        return PressedWorkpiece(task.surface, task.place, scenario.workpiece)
+    if scenario.notch is None:
+        return None
+    require_whole_fraction("notch.time_step", scenario.notch.time_step, period)
+    if not isinstance(task, PathTask):
+        raise InputError("notch = given: must be null where the task is no path")
+    return NotchedWorkpiece(task.path, scenario.notch)
+
+
+def make_spring(scenario: Scenario, workpiece: Workpiece | None) -> SurfaceSpring | None:
+    """Return what a workpiece that is pressed on is to the tool, if there is one.
+
+    Args:
+        scenario: The scenario.
+        workpiece: What the tool touches, if anything.
+    """
+    press = scenario.compliance.press
+    if press is None or press.force == 0.0 or not isinstance(workpiece, PressedWorkpiece):
+        return None
+    period = scenario.controller.sampling_time
+    return SurfaceSpring(workpiece.touch, workpiece.stiffness(press.force), period)
+
+
+def add_robot(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    folder: FilePath,
+    workpiece: Workpiece | None,
+) -> RobotPart:
+    """Add the robot of a scenario, with what its controller believes of it.
+
+    Args:
+        builder: Builder of the diagram.
+        scenario: The scenario.
+        folder: Where its relative file names start.
+        workpiece: What the tool may touch, if anything.
+
+    Raises:
+        InputError: If the robot cannot be read, or cannot do what the scenario asks of it.
+    """
+    source, controller = belief_source(scenario, folder), scenario.controller
+    if not is_delta(scenario.robot.model):
+        return add_arm(builder, source, workpiece)
+    _check_delta(scenario)
+    step = free_step(controller.sampling_time, scenario.simulation.max_step)
+    return add_delta(builder, source, step, workpiece)
+
+
+def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
+    """Return where a scenario's controller has from what it believes of the robot.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+    """
+    return BeliefSource(scenario.robot, scenario.controller.model, scenario.model_error, folder)
+
+
+def friction_options(scenario: Scenario, folder: FilePath) -> FrictionOptions:
+    """Return what brakes the drives of a scenario's plant.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+    """
+    return FrictionOptions(
+        scenario.friction,
+        scenario.drive_friction,
+        scenario.faults.brakes,
+        scenario.simulation,
+        scenario.controller.sampling_time,
+        folder,
+    )
+
+
+def servo_options(scenario: Scenario) -> ServoOptions | None:
+    """Return the velocity servos of a scenario's joints; None where its law commands torques.
+
+    Args:
+        scenario: The scenario.
+    """
+    if scenario.controller.law != "velocity_servo":
+        return None
+    return ServoOptions(scenario.servo, scenario.controller, scenario.faults, scenario.encoders)
+
+
+def _check_delta(scenario: Scenario) -> None:
+    """Refuse what is said of robots that turn their tool or bend."""
+    law, start, surface = scenario.controller.law, scenario.start, scenario.surface
+    drives = "the drives of a DELTA robot are stiff and take forces"
+    require(law == "rigid", "controller.law", law, f"rigid, {drives}")
+    one = "none; one pose of the slides belongs to each position"
+    require(not start.posture_deg, "start.posture_deg", start.posture_deg, one)
+    turned = "none; a DELTA robot only translates"
+    require(not any(start.rotation_deg), "start.rotation_deg", start.rotation_deg, turned)
+    keyframes = scenario.path.orientation.keyframes
+    require(not keyframes, "path.orientation.keyframes", len(keyframes), turned)
+    if surface is not None:
+        kind = surface.orientation.kind
+        require(kind == "none", "surface.orientation.kind", kind, turned)
+
+
+def choose_mounting(scenario: Scenario, task: Task) -> Mounting | None:
+    """Return where a scenario's plates come from and go, if it has any.
+
+    Args:
+        scenario: The scenario.
+        task: What the tool is to do.
+
+    Raises:
+        InputError: If the plates do not suit the task, or something else is touched.
+    """
+    if scenario.plate is None:
+        return None
+    for key in ("notch", "workpiece"):
+        given = getattr(scenario, key) is not None
+        require(not given, key, "given", "null where there is a plate")
+    return make_mounting(
+        scenario.plate,
+        task,
+        has_hand=scenario.hand is not None,
+        period=scenario.controller.sampling_time,
+    )
+
+
+def outside(scenario: Scenario) -> Outside:
+    """Return what acts on a scenario's robot from outside.
+
+    Args:
+        scenario: The scenario.
+    """
+    return Outside(
+        scenario.forces,
+        scenario.hold_back,
+        scenario.pushes,
+        scenario.hand,
+        scenario.needs_sensor,
+        scenario.controller.sampling_time,
+    )
