@@ -71,8 +71,8 @@ def test_a_person_who_is_not_there_does_nothing(settings):
 
 def test_regions_get_switches(tmp_path, settings, monkeypatch):
     """The hook for guidance with regions."""
-    monkeypatch.setattr(surroundings, "region_names", lambda _: ["wall", "floor"])
     regions = ["wall", "floor"]
+    monkeypatch.setattr(type(settings), "switched_regions", regions)
     write(tmp_path, settings, (50, {"region_wall": 0.0}), regions=regions)
     operator = build_station(settings, SCENARIOS).operator
     assert operator.columns[-2:] == ["region_wall", "region_floor"]

@@ -173,10 +173,10 @@ def test_servos_are_left_to_overcome_friction_and_that_is_said(load_scenario):
 
 def test_a_difference_quotient_is_the_velocity_half_an_interval_ago(load_scenario, load_arm):
     settings, robot = load_scenario("pfc_elastic_3r"), load_arm("comau_racer_1_4_elastic_3r").chain
-    assert believed_robot(settings, robot).velocity_delay == 0.0
-    settings.encoders.difference_quotient = True
-    delay = believed_robot(settings, robot).velocity_delay
     T, t = settings.controller.sampling_time, 0.7
+    assert believed_robot(robot, settings.encoders, T).velocity_delay == 0.0
+    settings.encoders.difference_quotient = True
+    delay = believed_robot(robot, settings.encoders, T).velocity_delay
     # exactly so of a motion with constant acceleration
     q = [3.0 * time**2 - time for time in (t, t - T)]
     assert (q[0] - q[1]) / T == pytest.approx(6.0 * (t - delay) - 1.0, rel=1e-9)
