@@ -28,6 +28,7 @@ from diagrams.station import Station
 from diagrams.station_parts import (
     add_robot,
     choose_mounting,
+    following_options,
     friction_options,
     make_spring,
     make_workpiece,
@@ -41,10 +42,10 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.law_warnings import MODES, law_warnings, stiff_regions
 from diagrams.tasks.make import make_task
-from diagrams.tasks.sensed_load import sensed_load_warnings
 from diagrams.tasks.task import StartPoint, Task
+from diagrams.warnings.law_warnings import MODES, law_warnings, stiff_regions
+from diagrams.warnings.sensed_load import sensed_load_warnings
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
@@ -108,8 +109,13 @@ def build_station(
     friction = believed_friction(part, scenario.controller.friction.believed, rubbing)
     link_state = part.coordinates.link_rows @ initial_state
     start_posture = link_state[: part.robot.dimension]
-    following = Following(scenario, believed, task, law, start_posture, on_motors, friction)
-    keep_drive_limits(scenario, task, law, CourseStart(rest().q_J, start.place), friction)
+    following = Following(
+        following_options(scenario), believed, task, law, start_posture, on_motors, friction
+    )
+    begun = CourseStart(rest().q_J, start.place)
+    keep_drive_limits(
+        scenario.reference, scenario.controller, scenario.duration, task, law, begun, friction
+    )
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation

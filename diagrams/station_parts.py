@@ -19,9 +19,11 @@ from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.mounting import Mounting, make_mounting
 from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.surroundings.patch import PressedWorkpiece
+from diagrams.tasks.following import FollowingOptions
 from diagrams.tasks.path_following import PathTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import Task
+from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
 
@@ -180,4 +182,22 @@ def outside(scenario: Scenario) -> Outside:
         scenario.hand,
         scenario.needs_sensor,
         scenario.controller.sampling_time,
+    )
+
+
+def following_options(scenario: Scenario) -> FollowingOptions:
+    """Return what a scenario chooses of its controller.
+
+    Args:
+        scenario: The scenario.
+    """
+    operator = scenario.operator
+    return FollowingOptions(
+        scenario.controller,
+        scenario.faults,
+        scenario.compliance,
+        scenario.encoders,
+        scenario.reference.swings,
+        scenario.start.transition,
+        TuningParameters() if operator is None else operator.tuning,
     )

@@ -233,7 +233,7 @@ class SensorParameters:
         inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
         unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
             said before a run alone, see
-            :func:`~diagrams.tasks.sensed_load.sensed_load_warnings`, and for margins.
+            :func:`~diagrams.warnings.sensed_load.sensed_load_warnings`, and for margins.
         taring_time: Length of the quiet stretch whose mean becomes the bias [s].
         taring_spread: Largest difference of means over 10 ms within it, shape (6,).
         taring_bias: Largest bias that is believed, shape (6,).

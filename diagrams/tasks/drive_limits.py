@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import ReferenceParameters
 from diagrams.tasks.drive_plan import DrivePlan
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
@@ -24,6 +24,7 @@ from pfsc_drake.control.planning.drive_demand import (
     with_pace,
 )
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.robot.robot_model import largest_speeds
 
@@ -46,7 +47,9 @@ _SLOW = 0.99
 
 
 def keep_drive_limits(
-    scenario: Scenario,
+    reference: ReferenceParameters,
+    controller: ControllerParameters,
+    duration: float,
     task: Task,
     law: FollowingLaw,
     start: CourseStart,
@@ -57,7 +60,9 @@ def keep_drive_limits(
     Where a hand leads, or the motion is longer than any run, nobody plans it.
 
     Args:
-        scenario: The scenario; ``reference.limits`` says whether the reference may be slowed.
+        reference: The reference, and whether it may be slowed.
+        controller: What is chosen of the controller.
+        duration: Of the run [s]; 0 for that of the reference.
         task: What the tool is to do.
         law: The law that does it.
         start: Where the robot starts, near the first place of the reference.
@@ -68,7 +73,7 @@ def keep_drive_limits(
     led = isinstance(task, SpaceTask) or law.stabilization.is_free[along].any()
     if task.drive_plan is not None or led or task.motion.domain[1] > _LONGEST:
         return
-    task.drive_plan = _Planner(scenario, task, law, start, friction).plan()
+    task.drive_plan = _Planner(reference, controller, duration, task, law, start, friction).plan()
     task.motion = task.drive_plan.motion
 
 
@@ -77,15 +82,17 @@ class _Planner:
 
     def __init__(
         self,
-        scenario: Scenario,
+        reference: ReferenceParameters,
+        controller: ControllerParameters,
+        duration: float,
         task: Task,
         law: FollowingLaw,
         start: CourseStart,
         friction: tuple[np.ndarray, np.ndarray] | None,
     ) -> None:
-        self._scenario, self._task, self._law, self._start = scenario, task, law, start
-        self.robot, controller = law.robot, scenario.controller
-        reserve = scenario.reference.reserve
+        self._reference, self._period = reference, controller.sampling_time
+        self._run_duration, self._task, self._law, self._start = duration, task, law, start
+        self.robot, reserve = law.robot, reference.reserve
         f_c, f_v = friction or (np.zeros(self.robot.dimension),) * 2
         damping = controller.boundary_layer_damping
         self.demand = DriveDemand(
@@ -120,7 +127,7 @@ class _Planner:
         asked = DrivePlan(times, demand, demand, self.limits, ones, motion, [])
         if fits:
             return asked
-        if self._scenario.reference.limits == "warn":
+        if self._reference.limits == "warn":
             return self.warned(asked, course)
         return self.slowed(asked, course, step)
 
@@ -155,7 +162,7 @@ class _Planner:
 
     def _step(self, longest: float) -> float:
         """Return how far samples may be apart [s]: narrow bends need more of them."""
-        reference, glance = self._scenario.reference, longest > _CHECKED
+        reference, glance = self._reference, longest > _CHECKED
         coarser = 1.0 / (3.0 * _OF_RADIUS) if glance else 1.0
         radius = getattr(self._task.shape, "smallest_radius", np.inf)
         bend = coarser * _OF_RADIUS * radius / reference.velocity
@@ -163,7 +170,7 @@ class _Planner:
         ramp = max(ramp, 2.0 * _SLOWED if glance else _SLOWED)
         if self._law.posture is not None and not glance:
             # it moves as fast as a sampled law lets it
-            longest = min(longest, self._scenario.controller.sampling_time)
+            longest = min(longest, self._period)
         step = min(max(bend, min(_FINEST, longest)), ramp, longest)
         return max(float(step), self._task.motion.domain[1] / _MOST)
 
@@ -178,7 +185,7 @@ class _Planner:
 
     def slowed(self, asked: DrivePlan, course: np.ndarray, step: float) -> DrivePlan:
         """Return a plan that waits where the drives need it."""
-        reference, duration = self._scenario.reference, self._task.motion.domain[1]
+        reference, duration = self._reference, self._task.motion.domain[1]
         change = reference.acceleration / reference.velocity
         allowed = self.allowed(course)
         excess = self._excess(asked, allowed)
@@ -198,7 +205,7 @@ class _Planner:
             f"place{'s' if places > 1 else ''}, {duration:.4g} s become {times[-1]:.4g} s: "
             + excess
         )
-        given = self._scenario.duration
+        given = self._run_duration
         if 0.0 < given < times[-1]:
             said += f"; duration = {given:g} s ends before it does"
         return DrivePlan(times, demand, asked.demand, asked.limits, slow, motion, [said])

@@ -6,13 +6,12 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.belief import believed_robot
-from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.swing import SwingingManifold, SwingingReference
+from pfsc_drake.control.law.swing import Swing, SwingingManifold, SwingingReference
 from pfsc_drake.control.law.timed_reference import TimedReference
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import ToolKinematics, indices
@@ -22,6 +21,10 @@ from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Wanted
 from pfsc_drake.following.law import Coefficients
+from pfsc_drake.following.options.compliance import ComplianceParameters
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
@@ -31,11 +34,34 @@ _GUIDANCE = {"guidance": "record", "mode": "mode"}
 
 
 @dataclass(frozen=True)
+class FollowingOptions:
+    """What is chosen of a controller and of how its reference begins and moves.
+
+    Attributes:
+        controller: The controller.
+        faults: What is a fault, and how it ends.
+        compliance: How the tool yields to forces.
+        encoders: What measures the joints.
+        swings: How the manifold moves, if it does.
+        transition: How long the reference takes from where the tool starts [s].
+        tuning: How the impedance follows what a person sets.
+    """
+
+    controller: ControllerParameters
+    faults: FaultParameters
+    compliance: ComplianceParameters
+    encoders: EncoderOptions
+    swings: list[Swing]
+    transition: float
+    tuning: TuningParameters
+
+
+@dataclass(frozen=True)
 class Following:
     """What a robot is to do, and by which law.
 
     Attributes:
-        scenario: The scenario.
+        options: What is chosen of the controller.
         robot: The robot as it is believed to be.
         task: What it is to do.
         law: The law.
@@ -44,7 +70,7 @@ class Following:
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
     """
 
-    scenario: Scenario
+    options: FollowingOptions
     robot: RobotModel
     task: Task
     law: FollowingLaw
@@ -83,14 +109,14 @@ def add_place(
         InputError: If compliance and law do not go together.
     """
     task, linearization = following.task, following.law.linearization
-    period = following.scenario.controller.sampling_time
+    period = following.options.controller.sampling_time
     kinematics = builder.AddNamedSystem(
         "tool_kinematics",
         BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     if not isinstance(task, SpaceTask):
-        order = reference_order(following.scenario.compliance, linearization)
+        order = reference_order(following.options.compliance, linearization)
         timed = TimedReference(task.motion, order, linearization.num_outputs, period)
         generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
@@ -108,11 +134,11 @@ def _swung(
     builder: DiagramBuilder, following: Following, desired: OutputPort, order: int
 ) -> OutputPort:
     """Return the reference on a manifold that moves, if it does."""
-    swings, linearization = following.scenario.reference.swings, following.law.linearization
+    swings, linearization = following.options.swings, following.law.linearization
     if not swings:
         return desired
     manifold, m = linearization.manifold, linearization.num_outputs
-    period = following.scenario.controller.sampling_time
+    period = following.options.controller.sampling_time
     allowed = "none with controller.manifold = trajectory, whose coordinates are those of space"
     require(not manifold.follows_time, "reference.swings", f"{len(swings)} given", allowed)
     across = indices(manifold.coordinates, Kind.TRANSVERSAL)
@@ -151,21 +177,17 @@ def add_law(
     Raises:
         InputError: If compliance, external torques or friction do not suit the law.
     """
-    scenario, law = following.scenario, following.law
-    yields = scenario.compliance.is_given and scenario.compliance.source == "observed"
+    options, law = following.options, following.law
+    compliance, period = options.compliance, options.controller.sampling_time
+    yields = compliance.is_given and compliance.source == "observed"
     controller, signals, made = add_controller(
         builder,
         law,
-        believed_robot(
-            following.robot,
-            scenario.encoders,
-            scenario.controller.sampling_time,
-            following.friction,
-        ),
-        scenario.controller,
-        scenario.faults,
+        believed_robot(following.robot, options.encoders, period, following.friction),
+        options.controller,
+        options.faults,
         place.signals | forces,
-        scenario.compliance.observed if yields else None,
+        compliance.observed if yields else None,
     )
     made |= {"law": controller.GetOutputPort("law")}
     desired = place.desired_reference
@@ -173,7 +195,7 @@ def add_law(
         guidance = _add_guidance(builder, following, signals)
         desired = guidance.GetOutputPort("reference")
         made |= {name: guidance.GetOutputPort(port) for name, port in _GUIDANCE.items()}
-    task, operator, transition = following.task, scenario.operator, scenario.start.transition
+    task, transition = following.task, options.transition
     allowed = "0 with controller.manifold = trajectory, whose reference is a point that moves"
     steady = transition == 0.0 or not law.linearization.manifold.follows_time
     require(steady, "start.transition", transition, allowed)
@@ -183,11 +205,11 @@ def add_law(
         task.lap,
         task.length,
         task.motion.domain[1],
-        TuningParameters() if operator is None else operator.tuning,
+        options.tuning,
     )
     told = signals | {"desired_reference": desired}
     made |= add_reference(
-        builder, controller, law.linearization, following.robot, scenario.compliance, wanted, told
+        builder, controller, law.linearization, following.robot, compliance, wanted, told
     )
     return controller, made
 
@@ -196,9 +218,8 @@ def _add_guidance(
     builder: DiagramBuilder, following: Following, signals: dict[str, OutputPort]
 ) -> BlockSystem:
     """Add what leads a tool that has no reference of its own."""
-    task, scenario = following.task, following.scenario
+    task, compliance, robot = following.task, following.options.compliance, following.robot
     assert isinstance(task, SpaceTask)  # see add_place
-    compliance, robot = scenario.compliance, following.robot
     order = reference_order(compliance, following.law.linearization)
     return add_fixture_guidance(
         builder, task.guided, compliance, robot, order, signals, following.start

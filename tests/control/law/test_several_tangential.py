@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.tasks.law_warnings import _transversal_gains
+from diagrams.warnings.law_warnings import _transversal_gains
 from pfsc_drake.control.law.linearization import (
     RELATIVE_DEGREE,
     ActuationOptions,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.tasks.untold_forces import largest_yield
+from diagrams.warnings.untold_forces import largest_yield
 from pfsc_drake.control.law.linearization import decoupling_function
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
 from pfsc_drake.control.law.stabilization import (

@@ -10,7 +10,7 @@ from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.scenario.simulation import OperatorParameters
 from diagrams.surroundings.operator import controls_text, idle_controls
-from diagrams.tasks.law_warnings import stiff_regions
+from diagrams.warnings.law_warnings import stiff_regions
 from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagrams.scenario import Scenario
-from diagrams.tasks.law_warnings import least_of, slope_at_rest
+from diagrams.warnings.law_warnings import least_of, slope_at_rest
 from pfsc_drake.control.compliance.taring import TARING_BLOCK
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_share,

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
 from diagrams.tasks.space_guidance import lead_of
-from diagrams.tasks.untold_forces import untold_forces, untold_friction
+from diagrams.warnings.untold_forces import untold_forces, untold_friction
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,

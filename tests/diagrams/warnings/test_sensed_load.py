@@ -5,7 +5,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from diagrams.tasks.sensed_load import sensed_load_warnings
+from diagrams.warnings.sensed_load import sensed_load_warnings
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.yaml.typed import load_file

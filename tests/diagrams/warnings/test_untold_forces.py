@@ -7,7 +7,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from diagrams.scenario.model_error import ModelErrorParameters
-from diagrams.tasks.untold_forces import largest_force
+from diagrams.warnings.untold_forces import largest_force
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.yaml.typed import load_file
 
