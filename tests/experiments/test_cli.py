@@ -203,7 +203,7 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
 
 def test_list(monkeypatch, scenario, capsys):
     entries = [CatalogEntry("my_run", "3.8.3", "Test [brackets]")]
-    monkeypatch.setattr("experiments.cli.list_scenarios", lambda: entries)
+    monkeypatch.setattr("experiments.run_commands.list_scenarios", lambda: entries)
     assert main(["list"]) == 0
     assert capsys.readouterr().out.splitlines()[1].split() == [
         "my_run",

@@ -1,0 +1,276 @@
+"""Commands that run scenarios: ``list``, ``run``, ``live``, ``compare``, ``sweep``."""
+
+import dataclasses
+import json
+import logging
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.outcomes import (
+    judge_live,
+    judge_run,
+    judge_sweep,
+    print_live,
+    print_run,
+    print_sweep,
+)
+from experiments.scenario_file import expand_home, list_scenarios
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.schema_check import is_number
+from reporting.progress import ProgressDisplay
+from reporting.registry import as_data, as_text
+from reporting.terminal import interruptible, show_page
+
+if TYPE_CHECKING:
+    pass
+
+_LONGEST_AFTER_FAULT = 100.0  # s
+_WIDEST_TABLE = 160  # columns, of postures
+# studies that run by their names, as a scenario does
+IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
+
+# what several commands take
+ScenarioName = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+]
+Duration = Annotated[
+    str | None,
+    typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
+]
+
+
+def list_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list instead.")] = False,
+    signals: Annotated[
+        bool, typer.Option("--signals", help="Signals, metrics and figures of runs instead.")
+    ] = False,
+) -> None:
+    """List the shipped scenarios."""
+    if signals:
+        typer.echo(json.dumps(as_data(), indent=2) if as_json else as_text(), nl=as_json)
+        return
+    entries = list_scenarios()
+    if as_json:
+        typer.echo(json.dumps([dataclasses.asdict(entry) for entry in entries], indent=2))
+        return
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    table.add_column("Scenario", style="cyan", no_wrap=True)
+    table.add_column("Section", no_wrap=True)
+    table.add_column("Description")
+    for entry in entries:
+        table.add_row(entry.name, escape(entry.section), escape(entry.description))
+    Console().print(table)
+
+
+def run_command(
+    scenario: ScenarioName,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the results: a new one or that of an earlier run, whose results are "
+            "replaced; a user's own files never are. Default: out/SCENARIO"
+        ),
+    ] = None,
+    overrides: Overrides = None,
+    duration: Duration = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
+    ] = True,
+    after_fault: Annotated[
+        str,
+        typer.Option(
+            metavar="SECONDS", help="Go on for that long after a fault, to see how it ends."
+        ),
+    ] = "0",
+    margins: Annotated[
+        bool, typer.Option("--margins", help="Tell what the loop bears at the start.")
+    ] = False,
+) -> None:
+    """Run a scenario and write log, metrics, figures, recording and report."""
+    from experiments.run import run_scenario
+    from experiments.scenario_file import read_scenario
+
+    if scenario in (IDENTIFICATION, TEACH_IN):
+        from experiments.study_commands import study_command
+
+        study_command(scenario, out or Path("out") / scenario)
+    seconds = None if duration is None else read_duration(duration)
+    further = _read_after_fault(after_fault)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / loaded.name
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        with ProgressDisplay(console, loaded.name, seconds) as progress:
+            outcome = run_scenario(
+                loaded,
+                out=folder,
+                duration=seconds,
+                figures=figures,
+                recording=recording,
+                progress=progress,
+                after_fault=further,
+                margins=margins,
+            )
+        print_run(console, outcome)
+        raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
+
+
+def live_command(
+    scenario: ScenarioName,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder in which every take gets one of its own, take_1, take_2, ... "
+            "Default: out/SCENARIO_live"
+        ),
+    ] = None,
+    overrides: Overrides = None,
+    port: Annotated[
+        int, typer.Option(help="Of the page, on this machine alone; 0 for any that is free.")
+    ] = 0,
+    duration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SECONDS", help="Simulated time in s after which it ends. Default: 600"
+        ),
+    ] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
+    ] = True,
+) -> None:
+    """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
+    from experiments.live.start import run_live
+    from experiments.scenario_file import read_scenario
+
+    seconds = None if duration is None else read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_live"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+
+        def tell(line: str) -> None:
+            text = f"{loaded.name}: {line}"
+            console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        outcome = run_live(
+            loaded,
+            out=folder,
+            port=port,
+            duration=seconds,
+            figures=figures,
+            recording=recording,
+            tell=tell,
+        )
+        print_live(console, outcome)
+        raise typer.Exit(judge_live(outcome))
+
+
+def compare_command(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs.")],
+    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/comparison"),
+) -> None:
+    """Put several runs on one page."""
+    from experiments.compare import write_comparison
+
+    with interruptible():
+        report = write_comparison([expand_home(run) for run in runs], expand_home(out))
+        raise typer.Exit(show_page("comparison", report))
+
+
+def sweep_command(
+    scenario: ScenarioName,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY.PATH=VALUES",
+            help="What varies: a,b,c or linspace(low,high,n), in all combinations; or at random "
+            "low:high, loguniform(low,high), normal(mean,sd), choice(a,b), each with *n for a "
+            "list of n. Repeatable.",
+        ),
+    ] = None,
+    samples: Annotated[int | None, typer.Option(help="Number of random draws.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the random draws.")] = 0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Dask scheduler, e.g. tcp://10.0.0.1:8786, whose workers run in a clone of this "
+            "revision. Default: all cores of this machine",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes on this machine. Default: one per core")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the results; the same command goes on with what is missing there. "
+            "Default: out/SCENARIO_sweep"
+        ),
+    ] = None,
+    overrides: Overrides = None,
+    duration: Duration = None,
+    metric: Annotated[
+        str | None, typer.Option(help="What to draw. Default: max_path_deviation")
+    ] = None,
+) -> None:
+    """Run a scenario many times, on all cores: grids, ranges, distributions over its keys."""
+    from experiments.sweep.sweep import define_sweep, run_sweep
+
+    seconds = None if duration is None else read_duration(duration)
+    with interruptible():
+        sweep = define_sweep(
+            scenario,
+            vary or [],
+            overrides=overrides or [],
+            duration=seconds,
+            samples=samples,
+            seed=seed,
+        )
+        name = sweep.scenario.name
+        folder = expand_home(out) if out is not None else Path("out") / f"{name}_sweep"
+        console = Console()
+        outcome = run_sweep(
+            sweep, folder, console, scheduler=scheduler, workers=workers, metric=metric
+        )
+        print_sweep(console, outcome)
+        raise typer.Exit(judge_sweep(outcome, folder))
+
+
+def read_duration(text: str) -> float:
+    """Return the value of ``--duration`` [s].
+
+    Args:
+        text: As it was written.
+
+    Raises:
+        InputError: If it is no positive number.
+    """
+    seconds = float(text) if is_number(text) else math.nan
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
+    return seconds
+
+
+def _read_after_fault(text: str) -> float:
+    """The value of ``--after-fault`` in s."""
+    seconds = float(text) if is_number(text) else math.nan
+    if not 0.0 <= seconds <= _LONGEST_AFTER_FAULT:
+        raise InputError(
+            f"--after-fault {shortened(text)}: allowed: 0 to {_LONGEST_AFTER_FAULT:g} seconds"
+        )
+    return seconds

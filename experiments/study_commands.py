@@ -1,0 +1,233 @@
+"""Commands that ask more of a scenario than a run: studies, margins, C, inverse kinematics."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from experiments.outcomes import (
+    judge_commands,
+    judge_replay,
+    print_export,
+)
+from experiments.scenario_file import expand_home
+from pfsc_drake.errors import InputError, shortened
+from reporting.progress import ProgressDisplay
+from reporting.terminal import FAULT, interruptible, show_page
+
+if TYPE_CHECKING:
+    from reporting.page import Report
+
+from experiments.run_commands import (
+    IDENTIFICATION,
+    TEACH_IN,
+    Overrides,
+    ScenarioName,
+    read_duration,
+)
+
+_WIDEST_TABLE = 160  # columns, of postures
+
+
+def study_command(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
+            "all laws on robots that are not their models; tracking: path following against "
+            "trajectory tracking; fixture_rules: printed rules of forbidden regions against the "
+            "program at an acute edge; identify_comau: from robots to their models and back; "
+            "teach_in: a path taught by hand, and followed."
+        ),
+    ] = "stiffness",
+    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("out/study"),
+) -> None:
+    """Many runs on one page, on all cores: one minute (stiffness) to ten."""
+    from experiments.studies.fixture_rules import write_fixture_rules
+    from experiments.studies.identify import write_identification
+    from experiments.studies.robustness import write_robustness
+    from experiments.studies.stiffness import write_study
+    from experiments.studies.tracking import write_tracking
+    from experiments.teaching.teach import write_teach_in
+
+    studies: dict[str, Callable[[Path, Callable[[str], None]], Report]] = {
+        "stiffness": write_study,
+        "robustness": write_robustness,
+        "tracking": write_tracking,
+        "fixture_rules": write_fixture_rules,
+        IDENTIFICATION: write_identification,
+        TEACH_IN: write_teach_in,
+    }
+    if name not in studies:
+        raise InputError(f"study {shortened(name)}: allowed: {', '.join(studies)}")
+    with interruptible():
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        report = studies[name](
+            expand_home(out), lambda line: console.print(line, highlight=False, markup=False)
+        )
+        raise typer.Exit(show_page("study", report))
+
+
+def teach_command(
+    run: Annotated[Path, typer.Argument(help="Folder of a run in which a hand led the tool.")],
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/taught"),
+    spacing: Annotated[float, typer.Option(help="Of the waypoints [m].")] = 0.01,
+    angle: Annotated[
+        float, typer.Option(help="Turn after which a waypoint is taken before that [deg].")
+    ] = 3.0,
+    tolerance: Annotated[
+        float, typer.Option(help="How far the path may be from a waypoint [m].")
+    ] = 2e-3,
+    tolerance_deg: Annotated[float, typer.Option(help="The same of the orientation [deg].")] = 1.0,
+    closed: Annotated[bool, typer.Option("--closed", help="Go round and round.")] = False,
+    velocity: Annotated[float, typer.Option(help="Along the path [m/s].")] = 0.1,
+    follow: Annotated[
+        bool, typer.Option("--follow/--no-follow", help="Run along the path.")
+    ] = True,
+) -> None:
+    """Turn a run in which a hand led the tool into a path, and follow it."""
+    from experiments.teaching.taught import TeachingOptions
+    from experiments.teaching.teach import teach
+
+    with interruptible():
+        options = TeachingOptions(spacing, angle, closed, tolerance, tolerance_deg, velocity)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console = Console()
+        outcome = teach(
+            expand_home(run),
+            expand_home(out),
+            options,
+            follow=follow,
+            progress=lambda line: console.print(line, highlight=False, markup=False),
+        )
+        status = show_page("page", outcome.report)
+        raise typer.Exit(FAULT if outcome.fault is not None and status == 0 else status)
+
+
+def margins_command(
+    scenario: ScenarioName,
+    overrides: Overrides = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the page. Default: out/SCENARIO_margins")
+    ] = None,
+    mass: Annotated[
+        float, typer.Option(help="Relative error of masses and inertias to be borne.")
+    ] = 0.05,
+    stiffness: Annotated[
+        float, typer.Option(help="Relative error of joint stiffnesses to be borne.")
+    ] = 0.05,
+    rotor: Annotated[
+        float, typer.Option(help="Relative error of rotor inertias to be borne.")
+    ] = 0.0,
+    tool: Annotated[float, typer.Option(help="Error of the tool's mass to be borne [kg].")] = 0.1,
+) -> None:
+    """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
+    from experiments.scenario_file import read_scenario
+    from experiments.studies.margins.box import Box
+    from experiments.studies.margins.page import case_table, place_table, summary, write_margins
+
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console, box = Console(), Box(mass, stiffness, rotor, tool)
+        with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
+            outcome = write_margins(loaded, folder, box, progress)
+        for table in (place_table(outcome.analysis), case_table(outcome.analysis)):
+            console.print(table)
+            console.print()
+        console.print(summary(outcome.analysis), highlight=False)
+        raise typer.Exit(show_page("margins", outcome.report))
+
+
+def export_command(
+    scenario: ScenarioName,
+    out: Annotated[Path, typer.Option(help="Folder for the files.")],
+    overrides: Overrides = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Compile it, let it repeat the run and compare; needs gcc for that."
+        ),
+    ] = False,
+    duration: Annotated[
+        str, typer.Option(metavar="SECONDS", help="Simulated time of the run beside it in s.")
+    ] = "1",
+) -> None:
+    """Write a scenario's controller as C99."""
+    from experiments.export import export_scenario
+    from experiments.replay import check_export, missing_tool
+    from experiments.scenario_file import read_scenario
+
+    seconds = read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out)
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        console, lacking = Console(), missing_tool()
+        with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
+            export = export_scenario(loaded, folder, seconds, progress)
+            replay = check_export(folder, progress) if check and lacking is None else None
+        print_export(console, export, folder)
+        if check and replay is None:
+            console.print(f"not compiled: there is no {lacking} here", highlight=False)
+        raise typer.Exit(0 if replay is None else judge_replay(console, replay, folder))
+
+
+def replay_command(
+    folder: Annotated[Path, typer.Argument(help="Of an exported controller.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="log.h5 of a run, or a CSV of a robot: t, q_1, .., v_1, .., perhaps q_M_1, .., "
+            "v_M_1, .., and name_1, .. of every further input."
+        ),
+    ],
+) -> None:
+    """Tell what an exported controller would have commanded, before power is on; needs gcc."""
+    from experiments.replay import replay_log
+
+    with interruptible():
+        console, place = Console(), expand_home(folder)
+        with ProgressDisplay(console, place.name, None, paced=False) as progress:
+            commands = replay_log(place, expand_home(log), progress)
+        raise typer.Exit(judge_commands(console, commands))
+
+
+def inverse_kinematics_command(
+    model: Annotated[
+        str, typer.Argument(help="Name of a shipped arm, or path of a parameters.yaml.")
+    ],
+    position: Annotated[
+        tuple[float, float, float],
+        typer.Option(metavar="X Y Z", help="Tool point in the base frame [m]."),
+    ],
+    zyx_deg: Annotated[
+        tuple[float, float, float],
+        typer.Option(
+            metavar="A B C",
+            help="Angles of the flange about z, then the new y, then the new x [deg].",
+        ),
+    ],
+) -> None:
+    """Print all postures of an arm with a spherical wrist that reach a pose, in closed form."""
+    from experiments.inverse_kinematics import find_postures, posture_table
+
+    with interruptible():
+        postures = find_postures(model, np.array(position), np.array(zyx_deg))
+        table, console = posture_table(postures), Console()
+        # angles that a narrow terminal cuts off are worth nothing
+        console.width = max(console.width, _WIDEST_TABLE)
+        console.print(table)
+        within = sum(posture.branch.is_within_limits for posture in postures)
+        console.print(f"{within} of {len(postures)} within the limits, angles in deg")
+        if any(p.branch.is_singular for p in postures):
+            console.print(
+                "theta_1 of an open shoulder and theta_4 of a straight wrist are free: 0 stands "
+                "for all"
+            )
