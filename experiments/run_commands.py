@@ -12,6 +12,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.command_options import (
+    IDENTIFICATION,
+    TEACH_IN,
+    Duration,
+    Overrides,
+    ScenarioName,
+    read_duration,
+)
 from experiments.outcomes import (
     judge_live,
     judge_run,
@@ -21,6 +29,7 @@ from experiments.outcomes import (
     print_sweep,
 )
 from experiments.scenario_file import expand_home, list_scenarios
+from experiments.study_commands import study_command
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
 from reporting.progress import ProgressDisplay
@@ -32,21 +41,6 @@ if TYPE_CHECKING:
 
 _LONGEST_AFTER_FAULT = 100.0  # s
 _WIDEST_TABLE = 160  # columns, of postures
-# studies that run by their names, as a scenario does
-IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
-
-# what several commands take
-ScenarioName = Annotated[
-    str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
-]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
-]
-Duration = Annotated[
-    str | None,
-    typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
-]
 
 
 def list_command(
@@ -102,8 +96,6 @@ def run_command(
     from experiments.scenario_file import read_scenario
 
     if scenario in (IDENTIFICATION, TEACH_IN):
-        from experiments.study_commands import study_command
-
         study_command(scenario, out or Path("out") / scenario)
     seconds = None if duration is None else read_duration(duration)
     further = _read_after_fault(after_fault)
@@ -249,21 +241,6 @@ def sweep_command(
         )
         print_sweep(console, outcome)
         raise typer.Exit(judge_sweep(outcome, folder))
-
-
-def read_duration(text: str) -> float:
-    """Return the value of ``--duration`` [s].
-
-    Args:
-        text: As it was written.
-
-    Raises:
-        InputError: If it is no positive number.
-    """
-    seconds = float(text) if is_number(text) else math.nan
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
-    return seconds
 
 
 def _read_after_fault(text: str) -> float:

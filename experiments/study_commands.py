@@ -22,7 +22,7 @@ from reporting.terminal import FAULT, interruptible, show_page
 if TYPE_CHECKING:
     from reporting.page import Report
 
-from experiments.run_commands import (
+from experiments.command_options import (
     IDENTIFICATION,
     TEACH_IN,
     Overrides,

@@ -1,0 +1,42 @@
+"""Arguments and options that several commands take, and how their text is read."""
+
+import math
+from typing import Annotated
+
+import typer
+
+from pfsc_drake.errors import InputError, shortened
+from pfsc_drake.yaml.schema_check import is_number
+
+# studies that run by their names, as a scenario does
+IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
+
+# what several commands take
+ScenarioName = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario, or path of a YAML file.")
+]
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a key; repeatable."),
+]
+
+Duration = Annotated[
+    str | None,
+    typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
+]
+
+
+def read_duration(text: str) -> float:
+    """Return the value of ``--duration`` [s].
+
+    Args:
+        text: As it was written.
+
+    Raises:
+        InputError: If it is no positive number.
+    """
+    seconds = float(text) if is_number(text) else math.nan
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
+    return seconds
