@@ -6,11 +6,12 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.robots.arm import add_arm
 from diagrams.robots.belief import BeliefSource
-from diagrams.robots.delta import add_delta, free_step, is_delta
+from diagrams.robots.delta import add_delta, free_step
 from diagrams.robots.drives import (
     FrictionOptions,
     ServoOptions,
 )
+from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario

@@ -3,7 +3,6 @@
 import math
 from abc import abstractmethod
 from dataclasses import asdict, dataclass
-from pathlib import Path as FilePath
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -13,6 +12,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import MatrixGain
 
 from diagrams.robots.belief import Belief, BeliefSource, naming_model_error
+from diagrams.robots.model import is_delta, load_delta_robot
 from diagrams.robots.part import Drives, Ports, RobotPart, SensorMount
 from diagrams.robots.plant_wiring import (
     add_external_wrench,
@@ -31,7 +31,6 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require
 from diagrams.scenario.robot import ANALYTIC, MULTIBODY
-from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot, believed_delta
 from pfsc_drake.robot.delta.multibody import (
     DeltaModel,
@@ -39,14 +38,13 @@ from pfsc_drake.robot.delta.multibody import (
     set_delta_positions,
     slide_state_rows,
 )
-from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
+from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
 from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
-from pfsc_drake.yaml.reading import read_yaml
 
 TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
 _ROUNDING = 1e-9
@@ -243,33 +241,6 @@ class ConstrainedDelta(DeltaPart):
 def _require_joint(joint: str) -> None:
     """Refuse another joint for the sensor than that between end-effector and load."""
     require(joint in ("", SENSOR_JOINT), "sensor.joint", joint, f"{SENSOR_JOINT} on a DELTA robot")
-
-
-def is_delta(model: str) -> bool:
-    """Return whether a robot model is a DELTA robot: a shipped one, or a file of parameters."""
-    return model in SHIPPED_ROBOTS or FilePath(model).suffix in (".yaml", ".yml")
-
-
-def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
-    """Return a DELTA robot.
-
-    Args:
-        model: Name of a shipped one, or file of parameters.
-        folder: Where relative file names start.
-
-    Raises:
-        InputError: If its parameters cannot be read, or are Drake's model directives.
-    """
-    if model in SHIPPED_ROBOTS:
-        return DeltaRobot(load_delta_parameters(model))
-    file = folder / model
-    if "directives" in read_yaml(file):
-        raise InputError(
-            f"{file}: Drake's model directives are not read; allowed: the URDF, SDF or MJCF file "
-            "of one arm (robot.base, base_pose and fixed_joints say what the directives say), or "
-            "the parameters of a DELTA robot (*.yaml)"
-        )
-    return DeltaRobot(load_delta_parameters(file))
 
 
 def add_delta(

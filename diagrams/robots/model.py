@@ -1,16 +1,25 @@
-"""The robot in a diagram."""
+"""Reading the robot of a diagram: an arm's plant, or a DELTA robot."""
 
 from collections.abc import Callable
 from pathlib import Path as FilePath
 
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, FrameIndex, JointIndex
+from pydrake.multibody.tree import (
+    Frame,
+    FrameIndex,
+    JointIndex,
+)
 
-from diagrams.scenario import RobotParameters
+from diagrams.scenario import (
+    RobotParameters,
+)
 from pfsc_drake.errors import InputError
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
+from pfsc_drake.robot.delta.parameters import SHIPPED_ROBOTS, load_delta_parameters
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.models.joint_edits import frame_named
 from pfsc_drake.robot.models.reading import ModelOptions, read_model
+from pfsc_drake.yaml.reading import read_yaml
 
 # of a model that are worth naming; the last are those at the tool
 _MOST_NAMES = 12
@@ -94,3 +103,30 @@ def tool_frame(plant: MultibodyPlant, parameters: RobotParameters) -> Frame:
             f"'{parameters.tool_frame}'; allowed: {', '.join(names[-_MOST_NAMES:])}"
         )
     return frame
+
+
+def is_delta(model: str) -> bool:
+    """Return whether a robot model is a DELTA robot: a shipped one, or a file of parameters."""
+    return model in SHIPPED_ROBOTS or FilePath(model).suffix in (".yaml", ".yml")
+
+
+def load_delta_robot(model: str, folder: FilePath) -> DeltaRobot:
+    """Return a DELTA robot.
+
+    Args:
+        model: Name of a shipped one, or file of parameters.
+        folder: Where relative file names start.
+
+    Raises:
+        InputError: If its parameters cannot be read, or are Drake's model directives.
+    """
+    if model in SHIPPED_ROBOTS:
+        return DeltaRobot(load_delta_parameters(model))
+    file = folder / model
+    if "directives" in read_yaml(file):
+        raise InputError(
+            f"{file}: Drake's model directives are not read; allowed: the URDF, SDF or MJCF file "
+            "of one arm (robot.base, base_pose and fixed_joints say what the directives say), or "
+            "the parameters of a DELTA robot (*.yaml)"
+        )
+    return DeltaRobot(load_delta_parameters(file))

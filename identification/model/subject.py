@@ -14,8 +14,7 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame
 
-from diagrams.robots.delta import is_delta, load_delta_robot
-from diagrams.robots.model import locate_model, read_robot, tool_frame
+from diagrams.robots.model import is_delta, load_delta_robot, locate_model, read_robot, tool_frame
 from diagrams.scenario import RobotParameters as RobotBlock
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot

@@ -1,38 +1,14 @@
 """A network as few functions: stages of outputs, what is remembered, how it begins."""
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
+from pfsc_drake.blocks.stage import Needs, Stage, call_named, ends_of, names_of, ordered, slices_of
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
-
-Needs = frozenset[Source]
-
-
-@dataclass(frozen=True)
-class Stage:
-    """All wires that depend on the same inputs.
-
-    Attributes:
-        function: Of ``sources``, then the results of earlier ``stages``; one vector out.
-        inputs: Names of the inputs among its arguments.
-        states: Names of the states that it depends on.
-        stages: Numbers of the earlier stages among its arguments.
-        needs: What its results depend on at last: inputs and tick.
-        needs_at_start: The same before the start, when states are what the inputs say.
-        parts: Where in the result wires are.
-    """
-
-    function: ca.Function
-    inputs: tuple[str, ...]
-    states: frozenset[str]
-    stages: tuple[int, ...]
-    needs: Needs
-    needs_at_start: Needs
-    parts: Mapping[str, slice]
 
 
 class Program:
@@ -66,13 +42,13 @@ class Program:
         self._with_update: dict[int, Stage] = {}
         shown = set(network.shown.values())
         sizes = dict(sorted(network.states.items(), key=lambda item: item[0] in shown))
-        self.states = _slices(sizes)
+        self.states = slices_of(sizes)
         self.size = sum(sizes.values())
         self._maker = {name: node for node in network.nodes for name in node.results}
         self._starter = {name: node for node in network.initials for name in node.results}
         self._x, self._t = ca.MX.sym("x", self.size), ca.MX.sym("t")
         self._u = {name: ca.MX.sym(name, port.size) for name, port in network.inputs.items()}
-        values = ca.vertsplit(self._x, _ends(sizes)) if self.size else []
+        values = ca.vertsplit(self._x, ends_of(sizes)) if self.size else []
         self._states = dict(zip(self.states, values, strict=True))
         self._needs: dict[tuple[str, bool], Needs] = {}
         order = ordered(network.nodes)
@@ -83,7 +59,7 @@ class Program:
         ]
         self._make_update()
         self.update_stage = self._place_of_update()
-        self._make_initial()
+        self.initial, self.initial_inputs = _initial_function(self)
 
     @classmethod
     @once_per_content()
@@ -129,7 +105,7 @@ class Program:
         given = {"x": self._x, "t": self._t} | self._u
         for k, stage in enumerate(self.stages):
             named = given | {f"stage_{j}": results[j] for j in stage.stages}
-            results.append(_call(self.stages[k].function, named))
+            results.append(call_named(self.stages[k].function, named))
         named = given | {f"stage_{j}": results[j] for j in self.update_stages}
         outputs = {}
         for port in self.network.outputs:
@@ -138,7 +114,7 @@ class Program:
         return ca.Function(
             "step",
             list(given.values()),
-            [_call(self.update, named), *outputs.values()],
+            [call_named(self.update, named), *outputs.values()],
             list(given),
             ["x_next", *outputs],
             # an input and an output may be called the same
@@ -162,8 +138,8 @@ class Program:
         stages = tuple(sorted({*stage.stages, *self.update_stages} - {k}))
         named = {"x": self._x, "t": self._t} | inputs
         named |= {f"stage_{j}": self._made[j] for j in stages}
-        result = _call(stage.function, named)
-        later = _call(self.update, named | {f"stage_{k}": result})
+        result = call_named(stage.function, named)
+        later = call_named(self.update, named | {f"stage_{k}": result})
         function = ca.Function(
             f"stage_{k}_and_update",
             list(named.values()),
@@ -249,7 +225,7 @@ class Program:
             earlier = sorted(
                 {stage_of[s.name] for s in sources if s.kind == "wire" and s.name not in inside}
             )
-            inputs = _names(sources, "input")
+            inputs = names_of(sources, "input")
             k = len(stages)
             function = ca.Function(
                 f"stage_{k}",
@@ -263,7 +239,7 @@ class Program:
                 frozenset().union(*(self._needs_of(node, at_start=begin) for node in nodes))
                 for begin in (False, True)
             )
-            parts = _slices({name: self.network.wires[name] for name in inside})
+            parts = slices_of({name: self.network.wires[name] for name in inside})
             states = frozenset(s.name for s in sources if s.kind == "state")
             stages.append(Stage(function, inputs, states, tuple(earlier), needs, at_start, parts))
             vectors.append(ca.MX.sym(f"stage_{k}", function.numel_out(0)))
@@ -313,8 +289,8 @@ class Program:
         sources = [source for node in nodes for source in node.sources]
         wires = {s.name for s in sources if s.kind == "wire"}
         changed = {name for node in nodes for name in node.results}
-        self.update_inputs = _names(sources, "input")
-        self.update_states = frozenset(_names(sources, "state")) | (set(self.states) - changed)
+        self.update_inputs = names_of(sources, "input")
+        self.update_states = frozenset(names_of(sources, "state")) | (set(self.states) - changed)
         self.update_stages = tuple(sorted({self._stage_of[name] for name in wires}))
         made = {
             name: self._made[k][self.stages[k].parts[name]]
@@ -334,109 +310,59 @@ class Program:
             ["x_next"],
         )
 
-    def _make_initial(self) -> None:
-        preset = ca.MX.sym("preset", len(self.states))
-        flags = dict(zip(self.states, ca.vertsplit(preset), strict=True)) if self.states else {}
-        begun: dict[str, ca.MX] = {}
-        wires: dict[str, ca.MX] = {}
-        on_the_way: set[str] = set()
-        used: set[str] = set()
 
-        def evaluated(node: Node) -> list[ca.MX]:
-            arguments = []
-            for source in node.sources:
-                if source.kind == "state":
-                    arguments.append(start_of(source.name))
-                elif source.kind == "wire":
-                    arguments.append(wire_of(source.name))
-                else:
-                    used.update({source.name} if source.kind == "input" else ())
-                    arguments.append(self._value(source, {}))
-            return list(node.function.call(arguments))
+def _initial_function(program: Program) -> tuple[ca.Function, tuple[str, ...]]:
+    """Return what is remembered at the start, and the inputs that it takes."""
+    preset = ca.MX.sym("preset", len(program.states))
+    flags = dict(zip(program.states, ca.vertsplit(preset), strict=True)) if program.states else {}
+    begun: dict[str, ca.MX] = {}
+    wires: dict[str, ca.MX] = {}
+    on_the_way: set[str] = set()
+    used: set[str] = set()
 
-        def wire_of(name: str) -> ca.MX:
-            if name not in wires:
-                if name in on_the_way:
-                    raise InputError(
-                        f"{name}: depends on itself at the start, through {', '.join(on_the_way)}"
-                    )
-                on_the_way.add(name)
-                node = self._maker[name]
-                wires.update(zip(node.results, evaluated(node), strict=True))
-                on_the_way.discard(name)
-            return wires[name]
-
-        def start_of(name: str) -> ca.MX:
-            if name not in begun:
-                node = self._starter.get(name)
-                size = self.network.states[name]
-                if node is None:
-                    found = {name: ca.MX(ca.DM.zeros(size))}
-                else:
-                    found = dict(zip(node.results, evaluated(node), strict=True))
-                for key, value in found.items():
-                    begun[key] = ca.if_else(flags[key], self._states[key], value)
-            return begun[name]
-
-        start = [start_of(name) for name in self.states]
-        self.initial_inputs = tuple(name for name in self._u if name in used)
-        self.initial = ca.Function(
-            "initial",
-            [self._x, preset, self._t, *(self._u[name] for name in self.initial_inputs)],
-            [ca.vertcat(*start)],
-            ["x", "preset", "t", *self.initial_inputs],
-            ["x_start"],
-        )
-
-
-def ordered(nodes: Collection[Node]) -> list[Node]:
-    """Return nodes such that each comes after those that it takes wires of.
-
-    Args:
-        nodes: All that evaluate wires.
-
-    Raises:
-        InputError: If there is a loop.
-    """
-    maker = {name: node for node in nodes for name in node.results}
-    order: dict[int, Node] = {}
-    way: list[Node] = []
-
-    def visit(node: Node) -> None:
-        if id(node) in order:
-            return
-        if any(node is other for other in way):
-            names = [other.results[0] for other in way]
-            raise InputError(f"algebraic loop of outputs: {' -> '.join([*names, names[0]])}")
-        way.append(node)
+    def evaluated(node: Node) -> list[ca.MX]:
+        arguments = []
         for source in node.sources:
-            if source.kind == "wire":
-                visit(maker[source.name])
-        way.pop()
-        order[id(node)] = node
+            if source.kind == "state":
+                arguments.append(start_of(source.name))
+            elif source.kind == "wire":
+                arguments.append(wire_of(source.name))
+            else:
+                used.update({source.name} if source.kind == "input" else ())
+                arguments.append(program._value(source, {}))
+        return list(node.function.call(arguments))
 
-    for node in nodes:
-        visit(node)
-    return list(order.values())
+    def wire_of(name: str) -> ca.MX:
+        if name not in wires:
+            if name in on_the_way:
+                raise InputError(
+                    f"{name}: depends on itself at the start, through {', '.join(on_the_way)}"
+                )
+            on_the_way.add(name)
+            node = program._maker[name]
+            wires.update(zip(node.results, evaluated(node), strict=True))
+            on_the_way.discard(name)
+        return wires[name]
 
+    def start_of(name: str) -> ca.MX:
+        if name not in begun:
+            node = program._starter.get(name)
+            size = program.network.states[name]
+            if node is None:
+                found = {name: ca.MX(ca.DM.zeros(size))}
+            else:
+                found = dict(zip(node.results, evaluated(node), strict=True))
+            for key, value in found.items():
+                begun[key] = ca.if_else(flags[key], program._states[key], value)
+        return begun[name]
 
-def _call(function: ca.Function, named: Mapping[str, ca.MX]) -> ca.MX:
-    """Return the only result of a function of named arguments."""
-    return function.call([named[name] for name in function.name_in()])[0]
-
-
-def _names(sources: Iterable[Source], kind: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(source.name for source in sources if source.kind == kind))
-
-
-def _ends(sizes: Mapping[str, int]) -> list[int]:
-    """Return where each of consecutive vectors begins, and the last ends."""
-    ends = [0]
-    for size in sizes.values():
-        ends.append(ends[-1] + size)
-    return ends
-
-
-def _slices(sizes: Mapping[str, int]) -> dict[str, slice]:
-    ends = _ends(sizes)
-    return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}
+    start = [start_of(name) for name in program.states]
+    inputs = tuple(name for name in program._u if name in used)
+    function = ca.Function(
+        "initial",
+        [program._x, preset, program._t, *(program._u[name] for name in inputs)],
+        [ca.vertcat(*start)],
+        ["x", "preset", "t", *inputs],
+        ["x_start"],
+    )
+    return function, inputs

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.network import TICK, Network, Node, Source
-from pfsc_drake.blocks.program import ordered
+from pfsc_drake.blocks.stage import ordered
 
 # relative to an argument, or absolute if that is larger
 _DIFFERENCE = 1e-6

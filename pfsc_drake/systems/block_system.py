@@ -1,10 +1,8 @@
 """A block, or a network of them, as a Drake system."""
 
-import functools
 import math
 from collections.abc import Iterable
 
-import casadi as ca
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import (
@@ -19,9 +17,10 @@ from pydrake.systems.framework import (
 )
 
 from pfsc_drake.blocks.block import Block
+from pfsc_drake.blocks.bound_program import BoundProgram, stages_of
 from pfsc_drake.blocks.network import TICK, Network, Source
-from pfsc_drake.blocks.program import Needs, Program, Stage
-from pfsc_drake.compiled.bound_function import BoundFunction
+from pfsc_drake.blocks.program import Program
+from pfsc_drake.blocks.stage import Needs, Stage
 
 _ROUNDING = 1e-6  # of a period, by which a time may miss a tick
 _STARTED = 0
@@ -62,7 +61,7 @@ class BlockSystem(LeafSystem):
         self.period = period
         whole = self.network = block if isinstance(block, Network) else Network.of(block)
         declared = Program.of(whole)
-        self._programs: dict[frozenset[str], _Functions] = {}
+        self._programs: dict[frozenset[str], BoundProgram] = {}
         self._declared = declared
         # [started, which are set, states], of these in groups of their own what is shown
         first = 1 + len(declared.states)
@@ -91,7 +90,7 @@ class BlockSystem(LeafSystem):
         self._optional = [name for name, port in whole.inputs.items() if port.optional]
         self._asked: set[str] = set()
         self._stages: list[CacheEntry] = []
-        for k, stage in enumerate(_stages(declared, declared.update_stage)):
+        for k, stage in enumerate(stages_of(declared, declared.update_stage)):
             self._stages.append(self._declare_stage(k, stage))
         for port in whole.outputs:
             self._declare_output(port)
@@ -209,7 +208,7 @@ class BlockSystem(LeafSystem):
             port, part.stop - part.start, calc, prerequisites_of_calc={stage.ticket()}
         )
 
-    def _program(self, context: Context) -> "_Functions":
+    def _program(self, context: Context) -> "BoundProgram":
         """Return the functions for what is connected."""
         left = _NOTHING
         if self._optional:
@@ -219,7 +218,7 @@ class BlockSystem(LeafSystem):
             if left:
                 assert self.block is not None  # a network leaves no input open
                 program = Program.of(Network.of(self.block, left), self._declared)
-            self._programs[left] = _Functions(program, self._declared.update_stage)
+            self._programs[left] = BoundProgram(program, self._declared.update_stage)
         return self._programs[left]
 
     def _is_connected(self, context: Context, name: str) -> bool:
@@ -236,7 +235,7 @@ class BlockSystem(LeafSystem):
     def _given(
         self,
         context: Context,
-        functions: "_Functions",
+        functions: "BoundProgram",
         inputs: Iterable[str],
         shown: Iterable[tuple[DiscreteStateIndex, slice]],
         needs_at_start: Needs | None = None,
@@ -326,46 +325,3 @@ def is_tick(time: float, period: float) -> bool:
         period: Sampling time [s].
     """
     return abs(time / period - round(time / period)) < _ROUNDING
-
-
-def _stages(program: Program, update_stage: int | None) -> list[Stage]:
-    """Return a program's stages, one of them with the update."""
-    stages = list(program.stages)
-    if update_stage is not None:
-        stages[update_stage] = program.with_update(update_stage)
-    return stages
-
-
-class _Functions:
-    """The functions of a program, bound to one set of arrays."""
-
-    def __init__(self, program: Program, update_stage: int | None) -> None:
-        self.program = program
-        self.x, self.t = np.zeros(program.size), np.zeros(1)
-        self.preset = np.zeros(len(program.states))
-        self.u = {name: np.zeros(port.size) for name, port in program.network.inputs.items()}
-        self.made = [np.zeros(stage.function.numel_out(0)) for stage in program.stages]
-        arrays = {"x": self.x, "t": self.t, "preset": self.preset} | self.u
-        arrays |= {f"stage_{k}": values for k, values in enumerate(self.made)}
-        self._arrays = arrays
-        self._stages = _stages(program, update_stage)
-        self._bound_stages: dict[int, BoundFunction] = {}
-
-    def stage(self, k: int) -> tuple[Stage, BoundFunction]:
-        """Return a stage; what nobody evaluates is never compiled."""
-        if k not in self._bound_stages:
-            self._bound_stages[k] = self._bound(self._stages[k].function)
-        return self._stages[k], self._bound_stages[k]
-
-    @functools.cached_property
-    def initial(self) -> BoundFunction:
-        """What is remembered at the start."""
-        return self._bound(self.program.initial)
-
-    @functools.cached_property
-    def update(self) -> BoundFunction:
-        """What is remembered at the next tick, where no stage evaluates it."""
-        return self._bound(self.program.update)
-
-    def _bound(self, function: ca.Function) -> BoundFunction:
-        return BoundFunction(function, **{name: self._arrays[name] for name in function.name_in()})

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 
-from diagrams.robots.delta import is_delta
+from diagrams.robots.model import is_delta
 from diagrams.scenario import (
     HoldBackParameters,
     JointFrictionParameters,
