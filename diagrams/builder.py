@@ -31,6 +31,7 @@ from diagrams.station_parts import (
     following_options,
     friction_options,
     make_spring,
+    make_task,
     make_workpiece,
     outside,
     servo_options,
@@ -42,7 +43,7 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.make import make_task
+from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import StartPoint, Task
 from diagrams.warnings.law_warnings import MODES, law_warnings, stiff_regions
 from diagrams.warnings.sensed_load import sensed_load_warnings
@@ -173,7 +174,7 @@ def build_station(
             + planned
             + part.start_warnings(scenario.start, start_posture, start.target)
             + law_warnings(scenario, believed, law, link_state, rest())
-            + stiff_regions(scenario)
+            + _region_warnings(scenario, task)
             + _sensor_warnings(scenario, part, law, rest)
         )
 
@@ -210,6 +211,12 @@ def _sensor_warnings(
         late = taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
     load = part.believed_load(scenario.sensor.joint)
     return late + sensed_load_warnings(scenario, part.belief.robot, load, law, rest())
+
+
+def _region_warnings(scenario: Scenario, task: Task) -> list[str]:
+    if scenario.fixtures is None or not isinstance(task, SpaceTask):
+        return []
+    return stiff_regions(scenario.fixtures.regions, task.guided)
 
 
 def _start(

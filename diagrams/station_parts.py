@@ -1,4 +1,4 @@
-"""The parts of a station that a scenario chooses: robot, drives, workpiece."""
+"""The parts of a station that a scenario chooses: task, robot, drives, workpiece."""
 
 from pathlib import Path as FilePath
 
@@ -16,17 +16,69 @@ from diagrams.robots.part import RobotPart
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
+from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.mounting import Mounting, make_mounting
 from diagrams.surroundings.notch import NotchedWorkpiece
 from diagrams.surroundings.patch import PressedWorkpiece
 from diagrams.tasks.following import FollowingOptions
-from diagrams.tasks.path_following import PathTask
+from diagrams.tasks.path_following import PathTask, TrajectoryTask
+from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.surface_following import SurfaceTask
 from diagrams.tasks.task import Task
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
+from pfsc_drake.control.fixtures.lead import Lead
+from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.fixtures import free_motion, make_lead
+from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
+
+
+def make_task(scenario: Scenario, folder: FilePath, progress: Progress | None = None) -> Task:
+    """Return what a scenario's tool is to do.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+        progress: Told the fraction done and what is done, where that takes its time.
+
+    Raises:
+        InputError: If the path or the motion along it cannot be made, or regions are given that
+            nothing keeps the tool out of.
+    """
+    controller, start, reference = scenario.controller, scenario.start, scenario.reference
+    if controller.manifold == "space":
+        motion = free_motion(scenario.compliance, controller.sampling_time)
+        degree, lead = RELATIVE_DEGREE[controller.law], choose_lead(scenario)
+        regions = scenario.fixtures or FixtureParameters()
+        return SpaceTask(regions, degree, motion, lead, start, scenario.duration, folder, progress)
+    given = [] if scenario.fixtures is None else scenario.fixtures.regions
+    allowed = (
+        f"none with controller.manifold = {controller.manifold}; only a tool led through space is "
+        "kept out of regions"
+    )
+    require(not given, "fixtures.regions", f"{len(given)} given", allowed)
+    if controller.manifold == "surface":
+        return SurfaceTask(scenario.surface, controller, reference, start, folder, progress)
+    kind = {"path": PathTask, "trajectory": TrajectoryTask}[controller.manifold]
+    return kind(scenario.path, scenario.surface, controller, reference, start, folder, progress)
+
+
+def choose_lead(scenario: Scenario) -> Lead:
+    """Return what is between the velocity that is asked for and a tool led through space.
+
+    Args:
+        scenario: The scenario.
+    """
+    parameters = scenario.fixtures or FixtureParameters()
+    return make_lead(
+        RELATIVE_DEGREE[scenario.controller.law],
+        parameters,
+        scenario.controller.sampling_time,
+        lag=parameters.lag_behind(scenario.servo.bandwidth),
+        delay=scenario.servo.bus_delay,
+    )
 
 
 def make_workpiece(scenario: Scenario, task: Task) -> Workpiece | None:

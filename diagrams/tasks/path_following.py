@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import (
+    ControllerParameters,
+    PathParameters,
+    ReferenceParameters,
+    StartParameters,
+    SurfaceParameters,
+)
 from diagrams.scenario.checks import require
 from diagrams.tasks.drawing import PathDrawing
 from diagrams.tasks.euler_angles import euler_warnings
@@ -43,8 +49,12 @@ class PathTask(Task):
     """Path following: the tool converges to a path at whatever pace.
 
     Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
+        parameters: The path.
+        surface: The surface that it lies on, if its shape is one on a surface.
+        controller: The controller; its law decides how smooth the path must be.
+        reference: The motion along the path.
+        start: Where the tool starts beside the path.
+        folder: Where relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
@@ -56,18 +66,26 @@ class PathTask(Task):
 
     def __init__(
         self,
-        scenario: Scenario,
+        parameters: PathParameters,
+        surface: SurfaceParameters | None,
+        controller: ControllerParameters,
+        reference: ReferenceParameters,
+        start: StartParameters,
         folder: FilePath,
         progress: Progress | None = None,
     ) -> None:
-        reference = scenario.reference
-        self._scenario, law = scenario, scenario.controller.law
-        surface = surface_of_path(scenario)
+        self._start_parameters, self._points, law = start, reference.points, controller.law
+        self._max_alpha = controller.max_alpha
+        surface = surface_of_path(parameters, surface)
+        self._is_on_surface, self._orientation_task = (
+            surface is not None,
+            parameters.orientation.task,
+        )
         if surface is None:
-            self.path = make_path(scenario.path, law, folder, progress)
-            said: Any = scenario.path.orientation
+            self.path = make_path(parameters, law, folder, progress)
+            said: Any = parameters.orientation
         else:
-            self.path = make_path_on_surface(scenario.path, surface, law, folder, progress)
+            self.path = make_path_on_surface(parameters, surface, law, folder, progress)
             said = surface.orientation
         self.shape = shape_report(self.path)
         self.warnings = path_warnings(self.path, self.shape)
@@ -100,10 +118,10 @@ class PathTask(Task):
 
     def require_joints(self, num_joints: int) -> None:
         """See :class:`Task`."""
-        if surface_of_path(self._scenario) is None:
-            require_orientation(self.path, self._scenario.path.orientation.task, num_joints)
-        else:
+        if self._is_on_surface:
             require_joints(self.manifold, num_joints)
+        else:
+            require_orientation(self.path, self._orientation_task, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """See :class:`Task`."""
@@ -155,8 +173,7 @@ class PathTask(Task):
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""
-        start, eta = self._scenario.start, self._scenario.reference.points[0]
-        max_alpha = self._scenario.controller.max_alpha
+        start, eta, max_alpha = self._start_parameters, self._points[0], self._max_alpha
         theta = self.path.arc_length.parameter(eta)
         layout = self.place.layout
         evaluator = self.path.evaluator(layout.order)
@@ -186,8 +203,7 @@ class PathTask(Task):
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """See :class:`Task`."""
-        points = self._scenario.reference.points
-        begin, end = min(points), max(points)
+        begin, end = min(self._points), max(self._points)
         if self.path.closed:  # every round is the same
             end = min(end, begin + self.path.length)
         places = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))

@@ -4,7 +4,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from diagrams.scenario import OnSurface, PathParameters, Scenario, SurfaceParameters
+from diagrams.scenario import OnSurface, PathParameters, SurfaceParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.tasks.surface import given_quaternion, make_surface, normal_offset
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
@@ -20,28 +20,31 @@ from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 
-def surface_of_path(scenario: Scenario) -> SurfaceParameters | None:
-    """Return the surface that a scenario's path lies on, or None if it lies on none.
+def surface_of_path(
+    path: PathParameters, surface: SurfaceParameters | None
+) -> SurfaceParameters | None:
+    """Return the surface that a path lies on, or None if it lies on none.
 
     Args:
-        scenario: The scenario.
+        path: The path.
+        surface: The surface, if there is one.
 
     Raises:
         InputError: If the path is on a surface and there is none, or both say the orientation.
     """
-    if not isinstance(scenario.path.shape, OnSurface):
+    if not isinstance(path.shape, OnSurface):
         return None
-    if scenario.surface is None:
+    if surface is None:
         raise InputError(
             "path.shape = !OnSurface: there is no surface; write surface: {shape: !Plane {..}}"
         )
-    said = scenario.path.orientation
+    said = path.orientation
     if said.keyframes or said.task != "full" or said.jacobian != "geometric":
         raise InputError(
             "path.orientation: given, and a path on a surface takes surface.orientation: "
             "{kind: none|given|normal, task: full|tool_axis|yaw}; leave out path.orientation"
         )
-    return scenario.surface
+    return surface
 
 
 def make_path_on_surface(

@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.drawing import SpaceDrawing
@@ -15,10 +15,9 @@ from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.fixtures import free_motion, make_lead
 from pfsc_drake.following.followed import Guided
 from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
@@ -31,8 +30,13 @@ class SpaceTask(Task):
     """A tool that moves where a hand leads it, and not into forbidden regions.
 
     Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
+        parameters: The regions, and the orientation that the tool keeps.
+        relative_degree: Of the law.
+        motion: How the tool moves where no region is near.
+        lead: What is between the velocity that is asked for and the tool.
+        start: Where the tool starts.
+        duration: Simulated time [s].
+        folder: Where relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
 
     Attributes:
@@ -48,23 +52,24 @@ class SpaceTask(Task):
     shape = None
 
     def __init__(
-        self, scenario: Scenario, folder: FilePath, progress: Progress | None = None
+        self,
+        parameters: FixtureParameters,
+        relative_degree: int,
+        motion: Admittance,
+        lead: Lead,
+        start: StartParameters,
+        duration: float,
+        folder: FilePath,
+        progress: Progress | None = None,
     ) -> None:
-        self._scenario = scenario
-        parameters = scenario.fixtures or FixtureParameters()
-        motion = free_motion(scenario.compliance, scenario.controller.sampling_time)
         said = parameters.orientation
-        self.place = SpaceManifold(
-            RELATIVE_DEGREE[scenario.controller.law],
-            given_quaternion(said),
-            **followed_angles(said),
-        )
+        self.place = SpaceManifold(relative_degree, given_quaternion(said), **followed_angles(said))
         self.manifold = self.place
-        given, allowed = scenario.start.position, "the tool point where it starts [m], 3 numbers"
+        given, allowed = start.position, "the tool point where it starts [m], 3 numbers"
         require(bool(given), "start.position", given, allowed)
-        self._start, lead = np.array(given, dtype=float), lead_of(scenario)
-        require(scenario.duration > 0.0, "duration", scenario.duration, "a positive number [s]")
-        self.motion = PiecewisePolynomialCurve([0.0, scenario.duration], self._start[None, None])
+        self._start, self._rotation_deg = np.array(given, dtype=float), start.rotation_deg
+        require(duration > 0.0, "duration", duration, "a positive number [s]")
+        self.motion = PiecewisePolynomialCurve([0.0, duration], self._start[None, None])
         self.fixtures, self.warnings = make_fixtures(parameters, self._start, folder, progress)
         speeds = [fixture.largest_speed(self._start) for fixture in self.fixtures]
         self.guided = Guided(self.place, self.fixtures, speeds, motion, lead, parameters)
@@ -106,7 +111,7 @@ class SpaceTask(Task):
         """See :class:`Task`."""
         y_t, R_e = self._start + shift, None
         if self.place.is_oriented:
-            deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
+            deviation = zyx_to_matrix(np.deg2rad(self._rotation_deg))
             quaternion = self.place.point(y_t)[self.place.layout.quaternion]
             R_e = quaternion_to_matrix(quaternion) @ deviation
         tool = self.place.tool
@@ -138,19 +143,3 @@ class SpaceTask(Task):
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
         """See :class:`Task`; all of space is there."""
-
-
-def lead_of(scenario: Scenario) -> Lead:
-    """Return what is between the velocity that is asked for and the tool.
-
-    Args:
-        scenario: The scenario.
-    """
-    parameters = scenario.fixtures or FixtureParameters()
-    return make_lead(
-        RELATIVE_DEGREE[scenario.controller.law],
-        parameters,
-        scenario.controller.sampling_time,
-        lag=parameters.lag_behind(scenario.servo.bandwidth),
-        delay=scenario.servo.bus_delay,
-    )

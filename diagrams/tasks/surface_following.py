@@ -7,7 +7,12 @@ from pathlib import Path as FilePath
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import (
+    ControllerParameters,
+    ReferenceParameters,
+    StartParameters,
+    SurfaceParameters,
+)
 from diagrams.scenario.checks import require, require_numbers
 from diagrams.tasks.drawing import SurfaceDrawing
 from diagrams.tasks.euler_angles import euler_warnings
@@ -40,8 +45,11 @@ class SurfaceTask(Task):
     """Surface following (chapter 4).
 
     Args:
-        scenario: The scenario.
-        folder: Where its relative file names start.
+        parameters: The surface; it must be given.
+        controller: The controller; its law decides how smooth the surface must be.
+        reference: The motion over the surface.
+        start: Where the tool starts.
+        folder: Where relative file names start.
         progress: Told the fraction done and what is done, where that takes its time.
 
     Raises:
@@ -53,12 +61,14 @@ class SurfaceTask(Task):
 
     def __init__(
         self,
-        scenario: Scenario,
+        parameters: SurfaceParameters | None,
+        controller: ControllerParameters,
+        reference: ReferenceParameters,
+        start: StartParameters,
         folder: FilePath,
         progress: Progress | None = None,
     ) -> None:
-        self._scenario, law = scenario, scenario.controller.law
-        parameters = scenario.surface
+        self._start_parameters, self._max_alpha, law = start, controller.max_alpha, controller.law
         if parameters is None:
             raise InputError(
                 "controller.manifold = surface: there is none; write surface: {shape: !Plane {..}}"
@@ -69,6 +79,7 @@ class SurfaceTask(Task):
             raise InputError(f"surface.shape: {error}") from None
         self.surface, self.fit = made.surface, made.fit
         self.relative_degree = RELATIVE_DEGREE[law]
+        self._is_normal = parameters.orientation.kind == "normal"
         self.place = make_surface_manifold(self.relative_degree, parameters)
         self.manifold = self.place
         self._evaluator = SurfaceEvaluator(
@@ -76,7 +87,7 @@ class SurfaceTask(Task):
         )
         self.shape: SurfaceReport = surface_report(self.surface)
         self.warnings: list[str] = []
-        self.motion = _motion(scenario)
+        self.motion = _motion(reference)
         self._start = self._find_start()
         self.warnings += self._euler_warnings()
 
@@ -110,7 +121,7 @@ class SurfaceTask(Task):
 
     def _find_start(self) -> np.ndarray:
         """Return the tool point at the start [m], shape (3,)."""
-        start = self._scenario.start
+        start = self._start_parameters
         if start.position:
             return np.array(start.position, dtype=float)
         theta = [sum(ends) / 2.0 for ends in self.surface.domain]
@@ -138,7 +149,7 @@ class SurfaceTask(Task):
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""
-        y_t, max_alpha = self._start + shift, self._scenario.controller.max_alpha
+        y_t, max_alpha = self._start + shift, self._max_alpha
         try:
             foot = self._evaluator.project_globally(y_t)
         except InputError as error:
@@ -159,7 +170,7 @@ class SurfaceTask(Task):
         target = ToolTarget(y_t)
         if self.place.is_oriented:
             point = self.evaluate(y_t, place)
-            deviation = zyx_to_matrix(np.deg2rad(self._scenario.start.rotation_deg))
+            deviation = zyx_to_matrix(np.deg2rad(self._start_parameters.rotation_deg))
             R_d = self.place.orientation(point[None])[0]
             tool = self.place.tool
             target = ToolTarget(y_t, R_d @ deviation, tool.tool_axis, tool.yaw_axis)
@@ -167,8 +178,8 @@ class SurfaceTask(Task):
 
     def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:
         """See :class:`Task`."""
-        parameters, R_e = self._scenario.surface, start.target.R_e
-        if parameters is None or parameters.orientation.kind != "normal" or R_e is None:
+        R_e = start.target.R_e
+        if not self._is_normal or R_e is None:
             return None
         axes = self.place.axes(self.point(start)).full()
         # the tangent stays, which leaves the frame right-handed
@@ -216,9 +227,8 @@ class SurfaceTask(Task):
             require(inside, key, coordinates.tolist(), allowed)
 
 
-def _motion(scenario: Scenario) -> PiecewisePolynomialCurve:
+def _motion(reference: ReferenceParameters) -> PiecewisePolynomialCurve:
     """Return the tangential references over time, of dimension 2."""
-    reference = scenario.reference
     limits = (reference.velocity, reference.acceleration, reference.dwell)
     if reference.places:
         return straight_lines(reference.places, *limits)

@@ -1,29 +1,29 @@
 """What is said beforehand of a law, its robot and its guidance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import casadi as ca
 import numpy as np
 
 from diagrams.scenario import ControllerParameters, Scenario
-from diagrams.tasks.space_guidance import lead_of
+from diagrams.scenario.fixtures import RegionParameters
 from diagrams.warnings.untold_forces import untold_forces, untold_friction
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
     bearable_mass_error,
 )
+from pfsc_drake.control.fixtures.lead import ServoLead
 from pfsc_drake.control.fixtures.parameters import bearable_stiffness
 from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.following_law import FollowingLaw
-from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.soft_joints import bending, composite_law_error, soft_joints
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
-from pfsc_drake.following.fixtures import free_motion
+from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.law import sampled_robot
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
@@ -267,23 +267,23 @@ def _most(profile: Profile) -> float:
 MODES = tuple(mode.name.lower() for mode in Mode)
 
 
-def stiff_regions(scenario: Scenario) -> list[str]:
+def stiff_regions(regions: Sequence[RegionParameters], guided: Guided) -> list[str]:
     """Return which soft regions may ring behind servos, one sentence each.
 
     Args:
-        scenario: The scenario.
+        regions: What the regions are.
+        guided: All that the tool is led through.
     """
-    fixtures, servos = scenario.fixtures, RELATIVE_DEGREE[scenario.controller.law] == 1
-    if fixtures is None or not servos or scenario.controller.manifold != "space":
+    motion, lead = guided.motion, guided.lead
+    if not isinstance(lead, ServoLead):
         return []
-    motion = free_motion(scenario.compliance, scenario.controller.sampling_time)
-    lag = lead_of(scenario).lag
+    lag = lead.lag
     most = bearable_stiffness(motion, lag)
     return [
         f"fixtures.regions[{number}].stiffness = {region.stiffness:g} N/m: compliance.tangential "
         f"with {motion.damping:g} N s/m bears {most:.2g} N/m where servos and bus, "
         f"{1e3 * lag:.2g} ms, are later than believed by a fifth or a tick; a stiffer region may "
         "ring: make it softer or hard, or the damping larger"
-        for number, region in enumerate(fixtures.regions)
+        for number, region in enumerate(regions)
         if region.stiffness is not None and region.stiffness > most
     ]

@@ -17,7 +17,7 @@ from diagrams.scenario import (
     ReferenceParameters,
     StartParameters,
 )
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.geometry import matrix_to_zyx, zyx_to_matrix

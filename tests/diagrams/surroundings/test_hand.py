@@ -13,7 +13,7 @@ from diagrams.scenario import (
     Line,
     Scenario,
 )
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile

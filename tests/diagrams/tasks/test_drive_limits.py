@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices

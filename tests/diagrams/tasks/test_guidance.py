@@ -9,6 +9,7 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.scenario.simulation import OperatorParameters
+from diagrams.station_parts import make_task
 from diagrams.surroundings.operator import controls_text, idle_controls
 from diagrams.warnings.law_warnings import stiff_regions
 from experiments.scenario_file import find_scenario
@@ -32,15 +33,19 @@ def test_names_of_modes_and_regions(wedge):
 
 def test_a_soft_region_that_is_stiffer_than_the_damping_bears(wedge):
     """What 90 N s/m bear behind 1/300 s and 2 ms; hard ones and those of other laws may be any."""
-    settings = copy.deepcopy(wedge[0])
-    assert stiff_regions(settings) == []
+    settings, folder = copy.deepcopy(wedge[0]), wedge[1]
+
+    def warnings() -> list[str]:
+        return stiff_regions(settings.fixtures.regions, make_task(settings, folder).guided)
+
+    assert warnings() == []
     settings.fixtures.regions[1].stiffness = 3e3
-    assert stiff_regions(settings) == []
+    assert warnings() == []
     settings.fixtures.regions[1].stiffness = 1e6
-    (said,) = stiff_regions(settings)
+    (said,) = warnings()
     assert "fixtures.regions[1].stiffness = 1e+06 N/m" in said and "bears 1.6e+05 N/m" in said
     settings.controller.law = "rigid"
-    assert stiff_regions(settings) == []
+    assert warnings() == []
 
 
 def test_a_person_switches_a_region_off(wedge, tmp_path):

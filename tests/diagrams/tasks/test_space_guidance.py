@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import RegionParameters, Shift, Swinging
 from diagrams.scenario.surface_shapes import Plane
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import near_expression, scheduled_regions
 from pfsc_drake.yaml.typed import load_file

@@ -13,7 +13,7 @@ from diagrams.robots.belief import Belief
 from diagrams.robots.start_posture import posture_warnings
 from diagrams.scenario import Circle, Line
 from diagrams.scenario.wording import posture_text
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.model_error import ModelError

@@ -11,7 +11,7 @@ from diagrams.scenario.motion import ReferenceParameters, SecondReference, Start
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.scenario.surface_files import Extruded
 from diagrams.scenario.surface_shapes import Cylinder, Paraboloid, Plane
-from diagrams.tasks.make import make_task
+from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 
