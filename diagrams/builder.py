@@ -1,6 +1,5 @@
 """One builder of stations: a robot, a task and surroundings, each chosen independently."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path as FilePath
@@ -20,7 +19,7 @@ from diagrams.robots.drives import (
     believed_friction,
 )
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log, taring_warnings
+from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.signal_log import add_log
@@ -36,6 +35,7 @@ from diagrams.station_parts import (
     outside,
     servo_options,
 )
+from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_look import mounting_look
@@ -43,11 +43,8 @@ from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits
 from diagrams.tasks.following import Following, add_law, add_place
-from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import StartPoint, Task
-from diagrams.warnings.law_warnings import MODES, law_warnings, stiff_regions
-from diagrams.warnings.sensed_load import sensed_load_warnings
-from pfsc_drake.control.law.following_law import FollowingLaw
+from diagrams.warnings.law_warnings import MODES
 from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
@@ -173,9 +170,7 @@ def build_station(
             + scenario.model_error.warnings
             + planned
             + part.start_warnings(scenario.start, start_posture, start.target)
-            + law_warnings(scenario, believed, law, link_state, rest())
-            + _region_warnings(scenario, task)
-            + _sensor_warnings(scenario, part, law, rest)
+            + controller_warnings(scenario, task, part, law, link_state, rest())
         )
 
     diagram = builder.Build()
@@ -199,24 +194,6 @@ def build_station(
         MODES if "mode" in signals else (),
         mounting,
     )
-
-
-def _sensor_warnings(
-    scenario: Scenario, part: RobotPart, law: FollowingLaw, rest: Callable[[], RestPosture]
-) -> list[str]:
-    if not scenario.needs_sensor:
-        return []
-    late = []
-    if scenario.compliance.needs_sensor:
-        late = taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
-    load = part.believed_load(scenario.sensor.joint)
-    return late + sensed_load_warnings(scenario, part.belief.robot, load, law, rest())
-
-
-def _region_warnings(scenario: Scenario, task: Task) -> list[str]:
-    if scenario.fixtures is None or not isinstance(task, SpaceTask):
-        return []
-    return stiff_regions(scenario.fixtures.regions, task.guided)
 
 
 def _start(

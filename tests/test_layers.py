@@ -103,6 +103,18 @@ def test_the_law_knows_no_particular_manifold():
     assert wrong == []
 
 
+def test_only_what_builds_a_station_knows_a_scenario():
+    """Robots, tasks, surroundings and warnings are given their own parameters."""
+    builders = {"diagrams.builder", "diagrams.station_parts", "diagrams.station_warnings"}
+    scenario = {"diagrams.scenario.Scenario", "diagrams.scenario.schema.Scenario"}
+    knowing = {
+        module
+        for module, imported in imports().items()
+        if is_inside(module, "diagrams") and imported & scenario
+    }
+    assert {module for module in knowing if not is_inside(module, "diagrams.scenario")} == builders
+
+
 def test_no_two_files_import_each_other():
     """Not even by a detour."""
     files = {

@@ -1,14 +1,12 @@
 """What is said beforehand of a law, its robot and its guidance."""
 
 from collections.abc import Callable, Sequence
-from functools import cache
 
 import casadi as ca
 import numpy as np
 
-from diagrams.scenario import ControllerParameters, Scenario
+from diagrams.scenario import ComplianceParameters, ControllerParameters
 from diagrams.scenario.fixtures import RegionParameters
-from diagrams.warnings.untold_forces import untold_forces, untold_friction
 from pfsc_drake.control.compliance.impedance_parameters import Profile, SlowEnds
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_inertia_error,
@@ -24,7 +22,6 @@ from pfsc_drake.control.law.soft_joints import bending, composite_law_error, sof
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.following.followed import Guided
-from pfsc_drake.following.law import sampled_robot
 from pfsc_drake.following.posture import warn_unused
 from pfsc_drake.robot.robot_model import RobotModel, joint_resonances
 
@@ -42,38 +39,28 @@ _LARGEST_SOFTNESS = 1e-3
 
 
 def law_warnings(
-    scenario: Scenario,
+    parameters: ControllerParameters,
     robot: RobotModel,
     law: FollowingLaw,
     link_state: np.ndarray,
-    rest: RestPosture,
+    sampled: Callable[[], SampledRobot],
 ) -> list[str]:
-    """Return what a scenario's sampled law will not do well, one sentence each.
+    """Return what a sampled law will not do well, one sentence each.
 
     Args:
-        scenario: The scenario.
+        parameters: The controller.
         robot: The robot.
         law: Its law.
         link_state: ``[q_J, v_J]`` at the start, shape (2N,).
-        rest: The start, and the manifold's point there.
+        sampled: Returns the law, if it commands torques, on its robot at rest.
     """
-    parameters = scenario.controller
-    sampled = cache(lambda: sampled_robot(parameters, robot, law.linearization, rest, law.posture))
     causes = [
         *_fast_resonance(parameters, robot, link_state),
         *_fast_damping(parameters, robot),
-        *_soft_joints(scenario, robot, law, link_state),
+        *_soft_joints(parameters, robot, law, link_state),
     ]
-    return [
-        # where the law does not suit the robot, gains are not to blame
-        *(causes or _fragile_gains(parameters, law, sampled)),
-        *_fast_servo(scenario, robot, link_state),
-        *untold_forces(scenario, robot, law, rest, sampled),
-        *untold_friction(scenario, law),
-        *_observed_forces(scenario, robot, law, rest),
-        *_friction_behind_servos(parameters),
-        *warn_unused(parameters, law),
-    ]
+    # where the law does not suit the robot, gains are not to blame
+    return causes or _fragile_gains(parameters, law, sampled)
 
 
 def _fast_resonance(
@@ -134,10 +121,10 @@ def _fast_damping(parameters: ControllerParameters, robot: RobotModel) -> list[s
 
 
 def _soft_joints(
-    scenario: Scenario, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
+    parameters: ControllerParameters, robot: RobotModel, law: FollowingLaw, link_state: np.ndarray
 ) -> list[str]:
     """Warn of joints that are too soft for a law that takes them for stiff."""
-    parameters, manifold = scenario.controller, law.linearization.manifold
+    manifold = law.linearization.manifold
     if parameters.law not in ("singular_perturbation", "rigid") or not robot.is_elastic:
         return []
     q_J = link_state[: robot.dimension]
@@ -180,15 +167,19 @@ def _transversal_gains(law: FollowingLaw) -> np.ndarray:
     return gains
 
 
-def _fast_servo(scenario: Scenario, robot: RobotModel, link_state: np.ndarray) -> list[str]:
-    """Warn of servos that are faster than the joints behind them.
+def servo_warnings(bandwidth: float, robot: RobotModel, link_state: np.ndarray) -> list[str]:
+    """Return what is said of servos that are faster than the joints behind them.
 
     They hold the motors against the links' oscillation, which nothing damps then.
+
+    Args:
+        bandwidth: Of the servos [rad/s].
+        robot: The robot.
+        link_state: ``[q_J, v_J]`` at the start, shape (2N,).
     """
-    if scenario.controller.law != "velocity_servo" or not robot.is_elastic:
+    if not robot.is_elastic:
         return []
     resonance = joint_resonances(robot, link_state[: robot.dimension])[0]
-    bandwidth = scenario.servo.bandwidth
     if bandwidth <= resonance:
         return []
     return [
@@ -196,6 +187,16 @@ def _fast_servo(scenario: Scenario, robot: RobotModel, link_state: np.ndarray) -
         f"{resonance:.0f} rad/s; servos that fast do not damp it, and the loop may oscillate: "
         "lower servo.bandwidth and the gains"
     ]
+
+
+def unused_parameters(parameters: ControllerParameters, law: FollowingLaw) -> list[str]:
+    """Return which parameters of a controller its law does not use, one sentence each.
+
+    Args:
+        parameters: The controller.
+        law: Its law.
+    """
+    return [*_friction_behind_servos(parameters), *warn_unused(parameters, law)]
 
 
 def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
@@ -207,11 +208,18 @@ def _friction_behind_servos(parameters: ControllerParameters) -> list[str]:
     ]
 
 
-def _observed_forces(
-    scenario: Scenario, robot: RobotModel, law: FollowingLaw, rest: RestPosture
+def observed_force_warnings(
+    compliance: ComplianceParameters, robot: RobotModel, law: FollowingLaw, rest: RestPosture
 ) -> list[str]:
-    """Warn of a compliance that takes what wrong masses do not need for forces."""
-    compliance, linearization = scenario.compliance, law.linearization
+    """Return what is said of a compliance that takes what wrong masses do not need for forces.
+
+    Args:
+        compliance: How the tool yields.
+        robot: The robot, as it is believed.
+        law: The law behind the compliance.
+        rest: The start, and the manifold's point there.
+    """
+    linearization = law.linearization
     if compliance.source != "observed" or not compliance.is_given:
         return []
     rate, impedance = compliance.observed.rate, compliance.impedance()

@@ -1,8 +1,16 @@
 """What a load below the force sensor will do to the sensor, and to a compliance that answers."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import (
+    ComplianceParameters,
+    ControllerParameters,
+    EncoderOptions,
+    SensorParameters,
+    ServoParameters,
+)
 from diagrams.warnings.law_warnings import least_of, slope_at_rest
 from pfsc_drake.control.compliance.taring import TARING_BLOCK
 from pfsc_drake.control.compliance.tuned_impedance import (
@@ -25,8 +33,27 @@ _ROUNDING = 1e-6
 _LOST_TICKS = 1.5
 
 
+@dataclass(frozen=True)
+class SensorLoop:
+    """What a force sensor feels, and what answers to it.
+
+    Attributes:
+        sensor: The sensor.
+        compliance: How the tool yields to what it measures.
+        encoders: From which the tool's inertial load is computed.
+        controller: The controller.
+        servo: Velocity servos behind it, for a law that commands velocities.
+    """
+
+    sensor: SensorParameters
+    compliance: ComplianceParameters
+    encoders: EncoderOptions
+    controller: ControllerParameters
+    servo: ServoParameters
+
+
 def sensed_load_warnings(
-    scenario: Scenario,
+    loop: SensorLoop,
     robot: RobotModel,
     load: ToolLoad,
     law: FollowingLaw,
@@ -35,30 +62,30 @@ def sensed_load_warnings(
     """Return what a load below the sensor will do, one sentence each.
 
     Args:
-        scenario: The scenario.
+        loop: The sensor, and what answers to it.
         robot: The robot, as it is believed.
         load: What is believed to hang below the sensor.
         law: The law behind the compliance.
         rest: The start, and the manifold's point there.
     """
-    if not scenario.compliance.needs_sensor:
+    if not loop.compliance.needs_sensor:
         return []
     return [
-        *_heavy_load(scenario, robot, load, law, rest),
-        *_noisy_inertia(scenario, robot, load, rest),
+        *_heavy_load(loop, robot, load, law, rest),
+        *_noisy_inertia(loop, robot, load, rest),
     ]
 
 
 def _heavy_load(
-    scenario: Scenario,
+    loop: SensorLoop,
     robot: RobotModel,
     load: ToolLoad,
     law: FollowingLaw,
     rest: RestPosture,
 ) -> list[str]:
     """Warn of an inertia that is felt and not taken off, too much for the virtual masses."""
-    sensor, coordinates = scenario.sensor, law.linearization.manifold.coordinates
-    impedance = scenario.compliance.impedance()
+    sensor, coordinates = loop.sensor, law.linearization.manifold.coordinates
+    impedance = loop.compliance.impedance()
     kinds = [impedance.of(coordinate.kind) for coordinate in coordinates]
     # without a stiffness of its own a coordinate yields, too
     yields = [bool(kind.stiffness.at) or np.isfinite(kind.stiffness.value) for kind in kinds]
@@ -69,7 +96,7 @@ def _heavy_load(
         felt -= load_inertia(robot, load, rest.q_J)
         mass = sensor.unknown_mass
     share, worst = carried_share(felt, slope_at_rest(law, rest), masses)
-    bearable = bearable_share(*_lag(scenario))
+    bearable = bearable_share(*_lag(loop))
     if share <= (_ROBUST + _ROUNDING) * bearable:
         return []
     unit = "kg m^2" if coordinates[worst].kind is Kind.ROTATIONAL else "kg"
@@ -88,25 +115,25 @@ def _heavy_load(
     ]
 
 
-def _lag(scenario: Scenario) -> tuple[float, float]:
+def _lag(loop: SensorLoop) -> tuple[float, float]:
     """Return the delay in a loop over the sensor [s], and the bandwidth of its servos [rad/s]."""
-    period, sensor = scenario.controller.sampling_time, scenario.sensor
+    period, sensor = loop.controller.sampling_time, loop.sensor
     delay = _LOST_TICKS * period + sensor.delay + 1.0 / (2.0 * np.pi * sensor.bandwidth)
-    if scenario.controller.law != "velocity_servo":
+    if loop.controller.law != "velocity_servo":
         return delay, np.inf
-    return delay + scenario.servo.bus_delay, scenario.servo.bandwidth
+    return delay + loop.servo.bus_delay, loop.servo.bandwidth
 
 
 def _noisy_inertia(
-    scenario: Scenario, robot: RobotModel, load: ToolLoad, rest: RestPosture
+    loop: SensorLoop, robot: RobotModel, load: ToolLoad, rest: RestPosture
 ) -> list[str]:
     """Warn of encoders too coarse for what the tool's inertia is computed from."""
-    sensor, encoders = scenario.sensor, scenario.encoders
+    sensor, encoders = loop.sensor, loop.encoders
     if not encoders.difference_quotient or sensor.inertia == "none":
         return []
     # one increment within a block changes its mean acceleration by so much
     link, _ = encoder_resolution(robot, encoders)
-    change = link / (scenario.controller.sampling_time * TARING_BLOCK)
+    change = link / (loop.controller.sampling_time * TARING_BLOCK)
     levers = np.sqrt(load.mass * np.diag(load_inertia(robot, load, rest.q_J)))
     noise, allowed = float(np.linalg.norm(levers * change)), float(sensor.taring_spread[:3].min())
     if noise <= allowed:

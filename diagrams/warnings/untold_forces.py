@@ -1,11 +1,13 @@
 """Forces that a law is not told of, and how far they will move the tool."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from diagrams.scenario import Scenario
+from diagrams.scenario import ComplianceParameters, ControllerParameters, ForcePulse
+from diagrams.scenario.fixtures import FixtureParameters
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import Linearization, decoupling_function
 from pfsc_drake.control.law.loop_at_rest import LoopAtRest, RestPosture
@@ -13,6 +15,8 @@ from pfsc_drake.control.law.robust_gains import RobotError, SampledRobot
 from pfsc_drake.control.law.stabilization import LoopGains
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
+from pfsc_drake.physics.hand_model import HandParameters
+from pfsc_drake.physics.live_hand import LiveHandParameters
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 # s, for which a force is followed, and at how many instants it is looked at
@@ -66,8 +70,25 @@ _DEFLECTIONS = "it takes them for deflections of the joints and may leave the pa
 _LARGEST_WAY = 1e-3
 
 
+@dataclass(frozen=True)
+class ExpectedForces:
+    """Forces from outside that are known beforehand.
+
+    Attributes:
+        tool: The largest on the tool, without what only slows it down [N].
+        on_links: Whether some act on links.
+        holds_back: Whether one slows the tool down.
+    """
+
+    tool: float
+    on_links: bool
+    holds_back: bool
+
+
 def untold_forces(
-    scenario: Scenario,
+    forces: ExpectedForces,
+    bearable: float,
+    parameters: ControllerParameters,
     robot: RobotModel,
     law: FollowingLaw,
     rest: RestPosture,
@@ -78,32 +99,32 @@ def untold_forces(
     Servos of velocities bear them, and an observer of disturbances takes them for friction.
 
     Args:
-        scenario: The scenario.
+        forces: What acts from outside.
+        bearable: How far the tool may give way without a word [m], see :func:`bearable_way`.
+        parameters: The controller.
         robot: The robot, as it is believed.
         law: Its law.
         rest: The start, and the manifold's point there.
         sampled: Returns the law, if it commands torques, on its robot at rest.
     """
-    parameters, force = scenario.controller, largest_force(scenario)
-    on_links = bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces)
-    source, exact = parameters.external_torque.source, _is_exact(parameters.law, robot)
-    if exact and on_links and source in ("none", "measured"):
+    force, source = forces.tool, parameters.external_torque.source
+    exact = _is_exact(parameters.law, robot)
+    if exact and forces.on_links and source in ("none", "measured"):
         # the sensor in the flange does not see what acts on links
         return [_sentence("links", parameters.law, _DEFLECTIONS, _tell("'observed'"))]
     friction = parameters.friction
     observed = friction.source == "observer" and friction.observer == "disturbance"
     if source != "none" or (observed and not exact) or law.linearization.relative_degree == 1:
         return []
-    bearable = _bearable(scenario)
     if bearable == np.inf and not exact:
         return []
     way = force * _yield(sampled(), robot, law, rest) if force else 0.0
-    if not way > bearable and not (exact and (force or scenario.hold_back.force)):
+    if not way > bearable and not (exact and (force or forces.holds_back)):
         return []
     effect = _DEFLECTIONS if exact else "it gives way to them like a spring"
     if way > 0.0:
         effect += f", {force:g} N that come at once by up to {1e3 * way:.2g} mm"
-    if scenario.controller.manifold == "space" and way > bearable:
+    if parameters.manifold == "space" and way > bearable:
         effect += f", also into hard regions (fixtures.bound = {1e3 * bearable:g} mm)"
     advice = _tell("'measured', 'observed'")
     if law.stabilization.is_free.any():  # a hand leads what it is not told of
@@ -119,40 +140,44 @@ def _tell(sources: str) -> str:
     return f"choose controller.external_torque.source {sources} or 'known'"
 
 
-def untold_friction(scenario: Scenario, law: FollowingLaw) -> list[str]:
-    """Return what friction will do to a tool among hard regions, if the law does not know of it.
+def untold_friction(
+    bearable: float, parameters: ControllerParameters, law: FollowingLaw
+) -> list[str]:
+    """Return what joints' friction does to a tool among hard regions that is not compensated.
 
     Args:
-        scenario: The scenario.
+        bearable: See :func:`untold_forces`.
+        parameters: The controller.
         law: Its law.
     """
-    compensated = scenario.controller.friction.source != "none" or not scenario.friction.is_given
-    led = scenario.controller.manifold == "space" and np.isfinite(_bearable(scenario))
+    compensated = parameters.friction.source != "none"
+    led = parameters.manifold == "space" and np.isfinite(bearable)
     if compensated or not led or law.linearization.relative_degree == 1:
         return []
     return [
-        f"the law '{scenario.controller.law}' does not compensate friction, and by what it gives "
+        f"the law '{parameters.law}' does not compensate friction, and by what it gives "
         "way to that the tool enters hard regions: choose controller.friction.source 'observer' "
         "or 'model'"
     ]
 
 
-def largest_force(scenario: Scenario) -> float:
-    """Return the largest force that may act on a scenario's tool from outside [N].
-
-    Without what only slows it down.
+def largest_force(
+    forces: Sequence[ForcePulse], hands: Iterable[HandParameters | LiveHandParameters]
+) -> float:
+    """Return the largest force that may act on a tool from outside [N].
 
     Args:
-        scenario: The scenario.
+        forces: Pulses; those on links do not count.
+        hands: On the tool.
     """
-    pulses = [pulse for pulse in scenario.forces if not pulse.link]
+    pulses = [pulse for pulse in forces if not pulse.link]
     together = [
         sum(np.linalg.norm(other.force) for other in pulses if other.begin <= t < other.end)
         for t in (pulse.begin for pulse in pulses)
     ]
     force = float(max(together, default=0.0))
-    for person in (scenario.hand, scenario.operator and scenario.operator.hand):
-        force += person.force_limit if person else 0.0
+    for hand in hands:
+        force += hand.force_limit
     return force
 
 
@@ -169,10 +194,18 @@ def _yield(sampled: SampledRobot, robot: RobotModel, law: FollowingLaw, rest: Re
     return largest_yield(robot, law.linearization, law.gains, loop, rest, period)
 
 
-def _bearable(scenario: Scenario) -> float:
-    """Return how far a tool may give way without a word [m]."""
-    fixtures, across = scenario.fixtures, scenario.compliance.transversal.stiffness
-    if scenario.controller.manifold == "space":
+def bearable_way(
+    manifold: str, fixtures: FixtureParameters | None, compliance: ComplianceParameters
+) -> float:
+    """Return how far a tool may give way without a word [m], infinite where it is to yield.
+
+    Args:
+        manifold: Which kind of manifold it follows.
+        fixtures: Regions that it may not enter, if there are any.
+        compliance: How it yields to forces.
+    """
+    across = compliance.transversal.stiffness
+    if manifold == "space":
         hard = fixtures and any(region.stiffness is None for region in fixtures.regions)
         return fixtures.bound if fixtures and hard else np.inf
     yields = bool(across.at) or np.isfinite(across.value)

@@ -5,6 +5,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
+from diagrams.station_warnings import sensor_loop
 from diagrams.warnings.sensed_load import sensed_load_warnings
 from experiments.scenario_file import find_scenario
 from pfsc_drake.control.law.loop_at_rest import RestPosture
@@ -23,7 +24,9 @@ def fixture_warnings():
     q_J = (station.part.coordinates.link_rows @ station.initial_state)[:n]
     rest = RestPosture(q_J, task.point(task.start(np.zeros(3))))
     load = station.part.believed_load(settings.sensor.joint)
-    return lambda changed: sensed_load_warnings(changed, robot, load, station.law, rest)
+    return lambda changed: sensed_load_warnings(
+        sensor_loop(changed), robot, load, station.law, rest
+    )
 
 
 @pytest.fixture(name="polish")

@@ -7,7 +7,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from diagrams.scenario.model_error import ModelErrorParameters
-from diagrams.warnings.untold_forces import largest_force
+from diagrams.station_warnings import expected_forces
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.yaml.typed import load_file
 
@@ -64,6 +64,6 @@ def test_pulses_that_overlap_add_up_and_those_on_links_do_not_count():
             ForcePulse(0.5, 2.0, [0.0, 99.0, 0.0], link="link_2"),
         ]
     )
-    assert largest_force(scenario) == pytest.approx(12.0)
+    assert expected_forces(scenario).tool == pytest.approx(12.0)
     scenario.hand = HandParameters(force_limit=20.0)
-    assert largest_force(scenario) == pytest.approx(32.0)
+    assert expected_forces(scenario).tool == pytest.approx(32.0)

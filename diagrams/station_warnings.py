@@ -1,0 +1,99 @@
+"""What is said beforehand of the controller that a scenario chooses."""
+
+from functools import cache
+
+import numpy as np
+
+from diagrams.robots.part import RobotPart
+from diagrams.robots.sensors import taring_warnings
+from diagrams.scenario import Scenario
+from diagrams.tasks.space_guidance import SpaceTask
+from diagrams.tasks.task import Task
+from diagrams.warnings.law_warnings import (
+    law_warnings,
+    observed_force_warnings,
+    servo_warnings,
+    stiff_regions,
+    unused_parameters,
+)
+from diagrams.warnings.sensed_load import SensorLoop, sensed_load_warnings
+from diagrams.warnings.untold_forces import (
+    ExpectedForces,
+    bearable_way,
+    largest_force,
+    untold_forces,
+    untold_friction,
+)
+from pfsc_drake.control.law.following_law import FollowingLaw
+from pfsc_drake.control.law.loop_at_rest import RestPosture
+from pfsc_drake.following.law import sampled_robot
+
+
+def controller_warnings(
+    scenario: Scenario,
+    task: Task,
+    part: RobotPart,
+    law: FollowingLaw,
+    link_state: np.ndarray,
+    rest: RestPosture,
+) -> list[str]:
+    """Return what a scenario's controller will not do well, one sentence each.
+
+    Args:
+        scenario: The scenario.
+        task: What the tool is to do.
+        part: The robot.
+        law: The law.
+        link_state: ``[q_J, v_J]`` at the start, shape (2N,).
+        rest: The start, and the manifold's point there.
+    """
+    parameters, robot = scenario.controller, part.belief.robot
+    sampled = cache(lambda: sampled_robot(parameters, robot, law.linearization, rest, law.posture))
+    bearable = bearable_way(parameters.manifold, scenario.fixtures, scenario.compliance)
+    said = law_warnings(parameters, robot, law, link_state, sampled)
+    if parameters.law == "velocity_servo":
+        said += servo_warnings(scenario.servo.bandwidth, robot, link_state)
+    said += untold_forces(
+        expected_forces(scenario), bearable, parameters, robot, law, rest, sampled
+    )
+    if scenario.friction.is_given:
+        said += untold_friction(bearable, parameters, law)
+    said += observed_force_warnings(scenario.compliance, robot, law, rest)
+    said += unused_parameters(parameters, law)
+    if scenario.fixtures is not None and isinstance(task, SpaceTask):
+        said += stiff_regions(scenario.fixtures.regions, task.guided)
+    if scenario.needs_sensor:
+        if scenario.compliance.needs_sensor:
+            said += taring_warnings(scenario.sensor.taring_time, scenario.reference.dwell)
+        load = part.believed_load(scenario.sensor.joint)
+        said += sensed_load_warnings(sensor_loop(scenario), robot, load, law, rest)
+    return said
+
+
+def expected_forces(scenario: Scenario) -> ExpectedForces:
+    """Return the forces from outside that a scenario tells beforehand.
+
+    Args:
+        scenario: The scenario.
+    """
+    hands = [scenario.hand, scenario.operator and scenario.operator.hand]
+    return ExpectedForces(
+        largest_force(scenario.forces, [hand for hand in hands if hand]),
+        bool(scenario.pushes) or any(pulse.link for pulse in scenario.forces),
+        scenario.hold_back.force != 0.0,
+    )
+
+
+def sensor_loop(scenario: Scenario) -> SensorLoop:
+    """Return a scenario's force sensor and what answers to it.
+
+    Args:
+        scenario: The scenario.
+    """
+    return SensorLoop(
+        scenario.sensor,
+        scenario.compliance,
+        scenario.encoders,
+        scenario.controller,
+        scenario.servo,
+    )
