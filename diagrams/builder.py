@@ -9,6 +9,7 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams.drawing.delta_replay import build_delta_replay
+from diagrams.drawing.mounting_look import mounting_look
 from diagrams.drawing.replay import RecordedMotion, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm
@@ -38,7 +39,6 @@ from diagrams.station_parts import (
 from diagrams.station_warnings import controller_warnings
 from diagrams.surroundings.forces import add_surroundings
 from diagrams.surroundings.mounting import Mounting
-from diagrams.surroundings.mounting_look import mounting_look
 from diagrams.surroundings.mounting_parts import add_payload
 from diagrams.surroundings.operator import add_operator
 from diagrams.tasks.drive_limits import keep_drive_limits

@@ -19,8 +19,7 @@ from diagrams.scenario.checks import require, require_whole_fraction
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.surroundings.forces import Outside
 from diagrams.surroundings.mounting import Mounting, make_mounting
-from diagrams.surroundings.notch import NotchedWorkpiece
-from diagrams.surroundings.patch import PressedWorkpiece
+from diagrams.surroundings.workpieces import NotchedWorkpiece, PressedWorkpiece
 from diagrams.tasks.following import FollowingOptions
 from diagrams.tasks.path_following import PathTask, TrajectoryTask
 from diagrams.tasks.space_guidance import SpaceTask

@@ -14,9 +14,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from diagrams.drawing.mounting_look import MountingLook, add_mounting_drawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
-from diagrams.surroundings.mounting_look import MountingLook, add_mounting_drawing
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer

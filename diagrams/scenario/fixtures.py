@@ -15,8 +15,7 @@ from diagrams.scenario.checks import (
     require_place,
     require_positive,
 )
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import (
     Cone,
     Cylinder,

@@ -7,9 +7,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from diagrams.scenario import ReferenceParameters
-from diagrams.tasks.drive_plan import DrivePlan
 from diagrams.tasks.space_guidance import SpaceTask
-from diagrams.tasks.task import Task
+from diagrams.tasks.task import DrivePlan, Task
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.manifolds.coordinate import Kind

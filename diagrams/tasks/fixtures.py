@@ -18,7 +18,7 @@ from diagrams.scenario.fixtures import (
     Visiting,
     encloses,
 )
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Sphere, Torus
 from diagrams.tasks.surface import profile_from_file, surface_from_shape
 from pfsc_drake.control.fixtures.parameters import Fixture

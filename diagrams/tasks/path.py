@@ -16,7 +16,7 @@ from diagrams.scenario import (
     PathParameters,
     Waypoints,
 )
-from diagrams.tasks.path_warnings import far_waypoints, turning_back
+from diagrams.tasks.manifold_warnings import far_waypoints, turning_back
 from diagrams.tasks.surface import make_surface
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.errors import InputError

@@ -16,10 +16,9 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require
 from diagrams.tasks.drawing import PathDrawing
-from diagrams.tasks.euler_angles import euler_warnings
+from diagrams.tasks.manifold_warnings import closing_gap, euler_warnings, path_warnings
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
-from diagrams.tasks.path_warnings import closing_gap, path_warnings
 from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE

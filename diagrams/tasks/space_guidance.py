@@ -10,8 +10,8 @@ from diagrams.scenario import StartParameters
 from diagrams.scenario.checks import require
 from diagrams.scenario.fixtures import FixtureParameters
 from diagrams.tasks.drawing import SpaceDrawing
-from diagrams.tasks.euler_angles import euler_warnings
 from diagrams.tasks.fixtures import make_fixtures
+from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
 from diagrams.tasks.task import PlaceFinder, StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead

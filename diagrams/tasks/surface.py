@@ -8,12 +8,14 @@ import numpy as np
 
 from diagrams.scenario import OrientationParameters, SurfaceParameters
 from diagrams.scenario.surface import (
+    Extruded,
     FileShape,
+    Fitted,
     NumberShape,
+    Revolved,
     SurfaceOrientationParameters,
     SurfaceShape,
 )
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.manifolds.manifold import Manifold

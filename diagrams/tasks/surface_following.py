@@ -15,7 +15,7 @@ from diagrams.scenario import (
 )
 from diagrams.scenario.checks import require, require_numbers
 from diagrams.tasks.drawing import SurfaceDrawing
-from diagrams.tasks.euler_angles import euler_warnings
+from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import (
     given_quaternion,
     make_surface,

@@ -1,4 +1,4 @@
-"""What a robot's tool is to do, whichever robot it is."""
+"""What a robot's tool is to do, whichever robot it is, and what that asks of the drives."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -8,7 +8,6 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.tasks.drawing import ManifoldDrawing
-from diagrams.tasks.drive_plan import DrivePlan
 from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
 from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
@@ -42,6 +41,39 @@ class PlaceFinder:
 
     projector: BlockSystem
     manifold_point: OutputPort
+
+
+@dataclass(frozen=True)
+class DrivePlan:
+    """What a reference asks of the drives, as it is believed.
+
+    Attributes:
+        times: Of the samples, in the time of the reference that is followed [s], (samples,).
+        demand: Torques [Nm or N] and joint speeds [rad/s or m/s] that it asks for, (samples, 2N).
+        asked: The same of the reference that was asked for, at the same places.
+        limits: What is believed of the drives, (2N,).
+        pace: Speed in units of the one that was asked for, (samples,).
+        motion: The reference that is followed: the one asked for where that fits.
+        said: What there is to say, one sentence each.
+    """
+
+    times: np.ndarray
+    demand: np.ndarray
+    asked: np.ndarray
+    limits: np.ndarray
+    pace: np.ndarray
+    motion: PiecewisePolynomialCurve
+    said: list[str]
+
+    @property
+    def waiting_time(self) -> float:
+        """How much longer the motion takes than was asked for [s]."""
+        return float(np.sum(np.diff(self.times) * (1.0 - (self.pace[1:] + self.pace[:-1]) / 2.0)))
+
+    @property
+    def is_slowed(self) -> bool:
+        """Whether the reference is not the one that was asked for."""
+        return bool(np.any(self.pace < 1.0))
 
 
 class Task(ABC):

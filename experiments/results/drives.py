@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from diagrams.scenario.wording import coordinate_text
 from diagrams.station import Station
-from diagrams.tasks.drive_plan import DrivePlan
+from diagrams.tasks.task import DrivePlan
 from experiments.results.run_log import FloatArray, RunLog
 from pfsc_drake.control.estimation.momentum import drive_momentum
 from pfsc_drake.control.law.fault import Fault

@@ -9,7 +9,7 @@ from diagrams.builder import build_station, build_station_replay, draw_station
 from diagrams.drawing.replay import RecordedMotion
 from diagrams.scenario import Keyframe, Line
 from diagrams.scenario.workpiece import BallParameters, NotchParameters
-from diagrams.surroundings.notch import NotchedWorkpiece, notch_surface
+from diagrams.surroundings.workpieces import NotchedWorkpiece, notch_surface
 from experiments.scenario_file import SCENARIO_DIRECTORY
 
 PERIOD = 0.04

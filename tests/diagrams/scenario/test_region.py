@@ -11,7 +11,7 @@ from diagrams.scenario.fixtures import (
     Visiting,
     encloses,
 )
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import TAG_KEY

@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from diagrams.surroundings.notch import notch_surface, place_in_notch
+from diagrams.surroundings.workpieces import notch_surface, place_in_notch
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.typed import load_typed

@@ -10,7 +10,7 @@ from diagrams.scenario.motion import StartParameters
 from diagrams.scenario.surface import SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Plane
 from diagrams.station_parts import make_task
-from diagrams.tasks.euler_angles import euler_warnings
+from diagrams.tasks.manifold_warnings import euler_warnings
 from experiments.scenario_file import find_scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix

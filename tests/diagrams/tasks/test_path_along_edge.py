@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario import Intersection, PathParameters
-from diagrams.scenario.surface_files import Extruded
+from diagrams.scenario.surface import Extruded
 from diagrams.scenario.surface_shapes import Plane, Sphere, Torus
 from diagrams.tasks.path import make_path
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario.fixtures import Box, RegionParameters, Shift, Swinging, Turn, Visiting
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface import Extruded, Fitted, Revolved
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 from diagrams.tasks.fixtures import make_region
 from diagrams.tasks.surface import make_surface

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagrams.scenario import SurfaceParameters
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.scenario.surface_files import Extruded, Fitted, Revolved
+from diagrams.scenario.surface import Extruded, Fitted, Revolved, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Cone, Cylinder, Paraboloid, Plane, Sphere, Torus
 from diagrams.tasks.surface import given_quaternion, make_surface, make_surface_manifold
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE

@@ -8,8 +8,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.scenario import SurfaceParameters
 from diagrams.scenario.motion import ReferenceParameters, SecondReference, StartParameters
-from diagrams.scenario.surface import SurfaceOrientationParameters
-from diagrams.scenario.surface_files import Extruded
+from diagrams.scenario.surface import Extruded, SurfaceOrientationParameters
 from diagrams.scenario.surface_shapes import Cylinder, Paraboloid, Plane
 from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.tasks.path_warnings import closing_gap, path_warnings, turning_back
+from diagrams.tasks.manifold_warnings import closing_gap, path_warnings, turning_back
 from pfsc_drake.geometry import (
     OrientationCurve,
     Path,
