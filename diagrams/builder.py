@@ -8,9 +8,8 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from diagrams.drawing.delta_replay import build_delta_replay
 from diagrams.drawing.mounting_look import mounting_look
-from diagrams.drawing.replay import RecordedMotion, build_replay
+from diagrams.drawing.replay import RecordedMotion, build_delta_replay, build_replay
 from diagrams.drawing.robot_geometry import RobotDrawing, draw_robot
 from diagrams.robots.arm import Arm
 from diagrams.robots.delta import DeltaPart

@@ -8,8 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, InputPort
 
-from diagrams.drawing.delta_replay import arrange_scene
-from diagrams.drawing.replay import body_origins, camera_and_target
+from diagrams.drawing.replay import arrange_scene, body_origins, camera_and_target
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.delta import DeltaPart
 from diagrams.station import Station

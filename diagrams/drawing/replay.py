@@ -1,4 +1,4 @@
-"""A logged run in Meshcat: robot, path, moving frame and trail of the tool."""
+"""A logged run in Meshcat: robot, path, moving frame and trail of the tool; a DELTA robot hangs."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,8 +18,13 @@ from diagrams.drawing.mounting_look import MountingLook, add_mounting_drawing
 from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
+from pfsc_drake.robot.delta.delta_robot import DeltaRobot
 from pfsc_drake.systems.drawing.force_arrows import ForceArrows
-from pfsc_drake.systems.drawing.robot_visualizer import RobotVisualizer
+from pfsc_drake.systems.drawing.robot_visualizer import (
+    DeltaVisualizer,
+    RobotVisualizer,
+    turn_scene_over,
+)
 from pfsc_drake.systems.drawing.surface_visualizer import signed_color
 from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
 
@@ -27,6 +32,8 @@ from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
 _VIEW = np.array([0.53, -0.79, 0.31])
 _DISTANCE = 0.95
 _TOOL, _ELBOW = Rgba(0.9, 0.25, 0.1, 1.0), Rgba(0.45, 0.2, 0.75, 1.0)
+# m, between the path's lowest point and the grid
+_CLEARANCE = 0.15
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,47 @@ def build_replay(
     )
     builder.Connect(positions, body.GetInputPort("positions"))
     return builder.Build()
+
+
+def build_delta_replay(
+    robot: DeltaRobot,
+    manifold: ManifoldDrawing,
+    motion: RecordedMotion,
+    meshcat: Meshcat,
+    period: float,
+    workpiece: WorkpieceLook | None = None,
+) -> Diagram:
+    """Return a diagram that draws a recorded motion while its time advances.
+
+    Args:
+        robot: The robot.
+        manifold: How the manifold is drawn, axes of the inertial frame (z_0 down).
+        motion: What to draw; its positions are those of the slides.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+        workpiece: What its tool touches, if anything.
+    """
+    arrange_scene(np.concatenate(manifold.outline())[:, 2], meshcat)
+    if workpiece is not None:
+        look_down_at(meshcat, np.array([0.0, 0.0, _CLEARANCE]))
+    builder = DiagramBuilder()
+    slides = add_motion(builder, manifold, motion, workpiece, meshcat, period)
+    body = builder.AddNamedSystem("delta_visualizer", DeltaVisualizer(robot, meshcat, period))
+    builder.Connect(slides, body.GetInputPort("slide_positions"))
+    return builder.Build()
+
+
+def arrange_scene(depth: np.ndarray, meshcat: Meshcat) -> None:
+    """Hang the robot above the grid, and look at it from the side, level with the rods.
+
+    Args:
+        depth: Where something is to be seen, z_0 down [m], shape (K,).
+        meshcat: Where to draw.
+    """
+    height = float(depth.max()) + _CLEARANCE
+    turn_scene_over(meshcat, height)
+    target = np.array([0.0, 0.0, height - 0.55 * depth.max()])
+    meshcat.SetCameraPose(target + depth.max() * np.array([1.35, -1.0, 0.1]), target)
 
 
 def _add_mounting(

@@ -8,8 +8,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams, Rgba
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.drawing.delta_replay import arrange_scene
-from diagrams.drawing.replay import add_source, camera_and_target, record
+from diagrams.drawing.replay import add_source, arrange_scene, camera_and_target, record
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.model import read_robot
 from identification.excitation.balls import ends

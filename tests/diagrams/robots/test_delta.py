@@ -7,8 +7,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.drawing.delta_replay import build_delta_replay
-from diagrams.drawing.replay import RecordedMotion, record
+from diagrams.drawing.replay import RecordedMotion, build_delta_replay, record
 from diagrams.scenario import Scenario
 from experiments.scenario_file import SCENARIO_DIRECTORY, load_scenario_data
 from pfsc_drake.errors import InputError
