@@ -28,7 +28,7 @@ _NEARLY = 0.1
 
 
 @dataclass(frozen=True)
-class Instant:
+class FaultInstant:
     """What a station's log knows of one instant.
 
     Attributes:
@@ -64,14 +64,14 @@ class FaultScene:
     robot: RobotModel
     place: PlaceManifold
     on_motors: bool
-    now: Instant
-    before: Instant | None
+    now: FaultInstant
+    before: FaultInstant | None
     suspects: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def first_instant(
     log: SignalLog, blocks: BlockAccess, root: Context, signal: str, column: int
-) -> tuple[Instant, Instant | None]:
+) -> tuple[FaultInstant, FaultInstant | None]:
     """Return the first instant at which a logged fault was there, and the one before.
 
     Args:
@@ -85,13 +85,13 @@ def first_instant(
     faults = np.flatnonzero(raw[signal][:, column])
     k = int(faults[0]) if len(faults) else len(times)
     instants = [
-        Instant(float(times[i]), {name: x[i] for name, x in raw.items()})
+        FaultInstant(float(times[i]), {name: x[i] for name, x in raw.items()})
         for i in (k - 1, k)
         if 0 <= i < len(times)
     ]
     if k == len(times):
         # it is so new that it has not been logged
-        instants.append(Instant(root.get_time(), log.now(blocks, root)))
+        instants.append(FaultInstant(root.get_time(), log.now(blocks, root)))
     return instants[-1], instants[0] if len(instants) > 1 else None
 
 

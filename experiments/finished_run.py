@@ -17,7 +17,7 @@ from diagrams.scenario.wording import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.drives import (
-    JointLimits,
+    DriveLimitsOfRun,
     friction_metrics,
     plan_metrics,
     saturation_warnings,
@@ -27,7 +27,7 @@ from experiments.results.mounting import mounting_metrics
 from experiments.results.path import path_following_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.promises import (
-    Promise,
+    GuidanceRules,
     audit,
     broken_promises,
     set_promises,
@@ -208,7 +208,7 @@ def _measure(
     metrics.update(mounting_metrics(log))
     metrics.update(friction_metrics(log))
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
-    limits = JointLimits.of(station.robot)
+    limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
     metrics.update(posture_metrics(log, station.task.lap))
@@ -241,7 +241,9 @@ def _guidance_audit(log: RunLog, settings: Scenario) -> Metrics:
     motion = free_motion(settings.compliance, settings.controller.sampling_time)
     guidance = fixtures.guidance
     damping = motion.damping if settings.operator is None else None
-    return audit(log, Promise(motion.mass, damping, guidance.largest_speed, guidance.tank.capacity))
+    return audit(
+        log, GuidanceRules(motion.mass, damping, guidance.largest_speed, guidance.tank.capacity)
+    )
 
 
 def _sensor_warnings(log: RunLog) -> list[str]:

@@ -10,7 +10,7 @@ from rich.table import Table
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.robot.models.parameters import (
-    RobotParameters,
+    ArmParameters,
     VariantParameters,
     load_parameters,
 )
@@ -21,7 +21,7 @@ _TOOL_FRAME = "tool_point"  # of every model that is written from parameters
 
 
 @dataclass(frozen=True, eq=False)
-class Posture:
+class ReachingPosture:
     """A posture that reaches a pose.
 
     Attributes:
@@ -35,7 +35,7 @@ class Posture:
     turn: float
 
 
-def find_postures(model: str, position: np.ndarray, zyx_deg: np.ndarray) -> list[Posture]:
+def find_postures(model: str, position: np.ndarray, zyx_deg: np.ndarray) -> list[ReachingPosture]:
     """Return all postures of an arm that reach a pose, also those beyond its limits.
 
     Args:
@@ -53,11 +53,11 @@ def find_postures(model: str, position: np.ndarray, zyx_deg: np.ndarray) -> list
     found = []
     for branch, (y_t, R) in zip(branches, poses, strict=True):
         turn = 2.0 * np.arcsin(min(np.linalg.norm(R - R_e) / np.sqrt(8.0), 1.0))
-        found.append(Posture(branch, float(np.linalg.norm(y_t - position)), float(turn)))
+        found.append(ReachingPosture(branch, float(np.linalg.norm(y_t - position)), float(turn)))
     return found
 
 
-def posture_table(postures: list[Posture]) -> Table:
+def posture_table(postures: list[ReachingPosture]) -> Table:
     """Return a table of postures, angles in degrees.
 
     Args:
@@ -91,7 +91,7 @@ def _limits_text(branch: Branch) -> str:
     return f"theta_{worst + 1} {np.rad2deg(branch.violation[worst]):.3g} deg beyond"
 
 
-def _read(model: str) -> tuple[RobotParameters, SphericalWrist]:
+def _read(model: str) -> tuple[ArmParameters, SphericalWrist]:
     parameters = load_parameters(model)
     try:
         wrist = SphericalWrist(
@@ -108,7 +108,7 @@ def _read(model: str) -> tuple[RobotParameters, SphericalWrist]:
 
 
 def _forward_kinematics(
-    parameters: RobotParameters, postures: list[np.ndarray]
+    parameters: ArmParameters, postures: list[np.ndarray]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return tool points and orientations [m], (3,) and (3, 3), as Drake has them."""
     plant = MultibodyPlant(0.0)

@@ -7,7 +7,7 @@ from experiments.preparation import PreparedRun, prepare
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import simulate
 from experiments.studies.margins.analysis import analyse
-from experiments.studies.margins.box import Box
+from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.result import MarginAnalysis
 from reporting.folder import check_folder, open_results
 from reporting.processes import noticed_interruption
@@ -65,7 +65,7 @@ def run_scenario(
 
 def _analyse(prepared: PreparedRun, folder: Path, progress: ProgressListener) -> MarginAnalysis:
     """Tell the margins of the loop at the start."""
-    return analyse(prepared.settings, folder, Box(), _BeforeStart(progress), only_start=True)
+    return analyse(prepared.settings, folder, ErrorBox(), _BeforeStart(progress), only_start=True)
 
 
 class _BeforeStart:

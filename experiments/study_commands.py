@@ -128,14 +128,14 @@ def margins_command(
 ) -> None:
     """Tell before a robot moves what its sampled loop bears: modes, drives, delay, model errors."""
     from experiments.scenario_file import read_scenario
-    from experiments.studies.margins.box import Box
+    from experiments.studies.margins.box import ErrorBox
     from experiments.studies.margins.page import case_table, place_table, summary, write_margins
 
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_margins"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        console, box = Console(), Box(mass, stiffness, rotor, tool)
+        console, box = Console(), ErrorBox(mass, stiffness, rotor, tool)
         with ProgressDisplay(console, loaded.name, None, paced=False) as progress:
             outcome = write_margins(loaded, folder, box, progress)
         for table in (place_table(outcome.analysis), case_table(outcome.analysis)):

@@ -8,11 +8,16 @@ import numpy as np
 from identification.consistency.bounds import PhysicalBounds
 from identification.consistency.nearest import ConsistentParameters, nearest_consistent
 from identification.estimation.choice import FrictionChoice, choose_friction
-from identification.estimation.friction import FrictionModel
+from identification.estimation.friction import FrictionTerms
 from identification.estimation.information import MeasuredMotion
 from identification.estimation.least_squares import Estimate, estimate
 from identification.estimation.repetitions import Repetitions
-from identification.estimation.validation import Prediction, TruthTest, compare_with_truth, predict
+from identification.estimation.validation import (
+    PredictedTorque,
+    TruthTest,
+    compare_with_truth,
+    predict,
+)
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
@@ -33,7 +38,7 @@ class Findings:
 
     runs: Repetitions
     choice: FrictionChoice | None = None
-    prediction: Prediction | None = None
+    prediction: PredictedTorque | None = None
     truth: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
@@ -80,7 +85,7 @@ def find_parameters(
     if not motions:
         raise InputError("estimate: no record; at least one is required")
     tell = progress or (lambda fraction, phase: None)
-    choice, friction = None, FrictionModel()
+    choice, friction = None, FrictionTerms()
     if choose and validation is not None:
         tell(0.0, "choosing friction")
         choice = choose_friction(regressor, base, motions[0], validation)

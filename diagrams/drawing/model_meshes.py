@@ -25,12 +25,12 @@ from pydrake.multibody.tree import (
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.mesh_files import read_stl
-from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Surface
+from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Triangles
 
 _DRAWN = "obj, gltf, dae and stl"
 
 
-def drawn_mesh(mesh: Mesh) -> Mesh | Surface:
+def drawn_mesh(mesh: Mesh) -> Mesh | Triangles:
     """Return what to draw for a mesh of a model: itself, or the triangles of an STL file.
 
     Args:
@@ -44,7 +44,7 @@ def drawn_mesh(mesh: Mesh) -> Mesh | Surface:
     if file.suffix.lower() != ".stl":
         return mesh
     vertices, triangles = read_stl(file)
-    return Surface(vertices * mesh.scale3(), triangles)
+    return Triangles(vertices * mesh.scale3(), triangles)
 
 
 def check_mesh_file(file: FilePath) -> None:

@@ -12,7 +12,7 @@ from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.plate_plant import PAD, pin_shape
 from pfsc_drake.geometry.bore import bore_wedges
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
-from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart, ToolVisualizer
 
 _FRAME, _MAGAZINE = Rgba(0.75, 0.72, 0.66, 1.0), Rgba(0.55, 0.62, 0.55, 1.0)
@@ -33,7 +33,7 @@ class MountingLook:
     """
 
     fixed: list[ToolPart]
-    bores: Surface
+    bores: Triangles
     gripper: list[ToolPart]
     plate: list[ToolPart]
 
@@ -65,7 +65,7 @@ def mounting_look(mounting: Mounting) -> MountingLook:
     return MountingLook(fixed, _bores(mounting), _gripper(plate), _plate(plate))
 
 
-def _bores(mounting: Mounting) -> Surface:
+def _bores(mounting: Mounting) -> Triangles:
     plate, vertices, triangles = mounting.parameters, [], []
     frame, count = plate.frame, 0
     radius = plate.pins.radius + frame.clearance / 2.0
@@ -75,7 +75,7 @@ def _bores(mounting: Mounting) -> Surface:
         vertices.append(X_WG.multiply(ring.vertices.T).T)
         triangles.append(ring.triangles + count)
         count += len(ring.vertices)
-    return Surface(np.concatenate(vertices), np.concatenate(triangles))
+    return Triangles(np.concatenate(vertices), np.concatenate(triangles))
 
 
 def _gripper(plate: PlateParameters) -> list[ToolPart]:
@@ -132,7 +132,7 @@ def add_mounting_drawing(
         builder.Connect(pose, system.GetInputPort("tool_pose"))
 
 
-def ring_surface(wedges: np.ndarray) -> Surface:
+def ring_surface(wedges: np.ndarray) -> Triangles:
     """Return the faces of a ring of wedges that can be seen.
 
     Args:
@@ -143,4 +143,4 @@ def ring_surface(wedges: np.ndarray) -> Surface:
     pairs = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     triangles = np.concatenate([pairs, pairs[:, ::-1]])
     offsets = 8 * np.arange(len(wedges))[:, np.newaxis, np.newaxis]
-    return Surface(wedges.reshape(-1, 3), (offsets + triangles).reshape(-1, 3))
+    return Triangles(wedges.reshape(-1, 3), (offsets + triangles).reshape(-1, 3))

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
 
@@ -33,11 +33,11 @@ class WorkpieceLook:
     """How a workpiece is drawn, and what of the tool touches it.
 
     Attributes:
-        surface: Surface of the workpiece, axes of the world.
+        surface: Triangles of the workpiece, axes of the world.
         tool_parts: What of the tool touches it.
     """
 
-    surface: Surface
+    surface: Triangles
     tool_parts: list[ToolPart]
 
 

@@ -80,7 +80,7 @@ class Following:
 
 
 @dataclass(frozen=True)
-class PlaceOnManifold:
+class ToolOnManifold:
     """Where the tool is.
 
     Attributes:
@@ -97,7 +97,7 @@ class PlaceOnManifold:
 
 def add_place(
     builder: DiagramBuilder, following: Following, joint_state: OutputPort
-) -> PlaceOnManifold:
+) -> ToolOnManifold:
     """Add what finds the tool's place on the manifold.
 
     Args:
@@ -127,7 +127,7 @@ def add_place(
         "tool_pose": tool_pose,
         "manifold_point": place.manifold_point,
     }
-    return PlaceOnManifold(place.projector, desired, signals)
+    return ToolOnManifold(place.projector, desired, signals)
 
 
 def _swung(
@@ -157,7 +157,7 @@ def _swung(
 def add_law(
     builder: DiagramBuilder,
     following: Following,
-    place: PlaceOnManifold,
+    place: ToolOnManifold,
     forces: dict[str, OutputPort],
 ) -> tuple[FollowingController, dict[str, OutputPort]]:
     """Add the law with its reference, which yields to forces if it is to.

@@ -20,7 +20,7 @@ from diagrams.tasks.manifold_warnings import closing_gap, euler_warnings, path_w
 from diagrams.tasks.path import make_path, require_orientation
 from diagrams.tasks.path_on_surface import make_path_on_surface, surface_of_path
 from diagrams.tasks.surface import followed_angles, require_joints
-from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.control.manifolds.manifold import Projector
@@ -161,14 +161,14 @@ class PathTask(Task):
         tool_pose: OutputPort,
         reference: OutputPort | None,
         period: float,
-    ) -> PlaceFinder:
+    ) -> ManifoldProjector:
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "path_projector",
             BlockSystem(Projector(self.path.evaluator(self.relative_degree)), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""
@@ -231,7 +231,7 @@ class TrajectoryTask(PathTask):
         tool_pose: OutputPort,
         reference: OutputPort | None,
         period: float,
-    ) -> PlaceFinder:
+    ) -> ManifoldProjector:
         """See :class:`Task`; the law acts on the point that time prescribes."""
         projector = super().add_place(builder, tool_pose, reference, period).projector
         num_outputs = len(self.manifold.coordinates)
@@ -242,7 +242,7 @@ class TrajectoryTask(PathTask):
         )
         assert reference is not None  # time leads the point
         builder.Connect(reference, leader.GetInputPort("reference"))
-        return PlaceFinder(projector, leader.GetOutputPort("manifold_point"))
+        return ManifoldProjector(projector, leader.GetOutputPort("manifold_point"))
 
     def point(self, start: StartPoint) -> np.ndarray:
         """See :class:`Task`."""

@@ -13,7 +13,7 @@ from diagrams.tasks.drawing import SpaceDrawing
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
-from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance
 from pfsc_drake.control.manifolds.manifold import Projector
@@ -98,14 +98,14 @@ class SpaceTask(Task):
         tool_pose: OutputPort,
         reference: OutputPort | None,
         period: float,
-    ) -> PlaceFinder:
+    ) -> ManifoldProjector:
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "tool_place",
             BlockSystem(Projector(self.place), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def start(self, shift: np.ndarray) -> StartPoint:
         """See :class:`Task`."""

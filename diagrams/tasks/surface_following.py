@@ -22,7 +22,7 @@ from diagrams.tasks.surface import (
     make_surface_manifold,
     require_joints,
 )
-from diagrams.tasks.task import PlaceFinder, StartPoint, Task
+from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
 from pfsc_drake.control.manifolds.manifold import Projector
@@ -110,14 +110,14 @@ class SurfaceTask(Task):
         tool_pose: OutputPort,
         reference: OutputPort | None,
         period: float,
-    ) -> PlaceFinder:
+    ) -> ManifoldProjector:
         """See :class:`Task`."""
         projector = builder.AddNamedSystem(
             "surface_projector",
             BlockSystem(Projector(self._evaluator), period),
         )
         builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return PlaceFinder(projector, projector.GetOutputPort("manifold_point"))
+        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def _find_start(self) -> np.ndarray:
         """Return the tool point at the start [m], shape (3,)."""

@@ -31,7 +31,7 @@ class StartPoint:
 
 
 @dataclass(frozen=True)
-class PlaceFinder:
+class ManifoldProjector:
     """What finds the place on a manifold.
 
     Attributes:
@@ -150,7 +150,7 @@ class Task(ABC):
         tool_pose: OutputPort,
         reference: OutputPort | None,
         period: float,
-    ) -> PlaceFinder:
+    ) -> ManifoldProjector:
         """Add what finds the place on the manifold.
 
         Args:

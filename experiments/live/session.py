@@ -31,7 +31,7 @@ class Teller(Protocol):
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptTake:
     """A take that was kept.
 
     Attributes:
@@ -90,7 +90,7 @@ class LiveSession:
         assert settings.operator is not None
         self._prepared, self._name, self._output, self._tell = prepared, name, output, tell
         self._station, self._operator = station, station.operator
-        self.status, self.kept = status, list[Kept]()
+        self.status, self.kept = status, list[KeptTake]()
         self._simulation, self._pace = LiveSimulation(station, settings), pace or RealTimePace()
         self._record = ControlRecord(station.operator)
         limit = settings.operator.hand.force_limit
@@ -262,7 +262,7 @@ class LiveSession:
             figures=self._output.figures,
             recording=self._output.recording,
         )
-        self.kept.append(Kept(folder, outcome))
+        self.kept.append(KeptTake(folder, outcome))
         self.status.kept = [str(kept.folder) for kept in self.kept]
         self.status.message = message
         self._tell(f"kept in {folder}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from diagrams.scenario import Scenario
 from experiments.live.pages import Pages
 from experiments.live.server import PageServer
-from experiments.live.session import Kept, LiveSession, Output, Teller
+from experiments.live.session import KeptTake, LiveSession, Output, Teller
 from experiments.live.status import LiveStatus
 from experiments.live.take import TakeFolders
 from experiments.preparation import prepare
@@ -35,7 +35,7 @@ class LiveOutcome:
         time: Simulated time at the end [s].
     """
 
-    kept: list[Kept]
+    kept: list[KeptTake]
     fault: str | None
     interrupted: bool
     time: float

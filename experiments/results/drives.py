@@ -30,7 +30,7 @@ SATURATION_MARGIN = 1e-9  # relative; a clipped command equals the limit up to r
 
 
 @dataclass(frozen=True)
-class JointLimits:
+class DriveLimitsOfRun:
     """Limits of N joints; infinite where there are none.
 
     Attributes:
@@ -46,7 +46,7 @@ class JointLimits:
     velocity: FloatArray
 
     @classmethod
-    def of(cls, robot: RobotModel) -> "JointLimits":
+    def of(cls, robot: RobotModel) -> "DriveLimitsOfRun":
         """Return the limits of a robot.
 
         Args:

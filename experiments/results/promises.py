@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.results.drives import JointLimits, plan_metrics
+from experiments.results.drives import DriveLimitsOfRun, plan_metrics
 from experiments.results.path import shape_metrics
 from experiments.results.pushes import is_redundant
 from experiments.results.run_log import FloatArray, RunLog
@@ -58,7 +58,7 @@ def check_targets(settings: Scenario, station: Station) -> None:
         *(name for name, is_so in properties.items() if is_so),
         *shape_metrics(task.shape, task.fit),
         *plan_metrics(task.drive_plan),
-        *JointLimits.of(station.robot).metric_names(),
+        *DriveLimitsOfRun.of(station.robot).metric_names(),
     }
     for law, targets in settings.targets.items():
         other = set() if law == settings.controller.law else _OF_OTHER_LAWS
@@ -138,7 +138,7 @@ _NEAR = 2e-3  # m, a region as close as this must not be missed
 
 
 @dataclass(frozen=True)
-class Promise:
+class GuidanceRules:
     """Numbers that the rules were given.
 
     Attributes:
@@ -176,7 +176,7 @@ class _Slots:
         return self.used & (self.stiffness > 0.0)
 
 
-def audit(log: RunLog, promise: Promise) -> Metrics:
+def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     """Return by how much, at worst, a run breaks what was promised.
 
     Args:

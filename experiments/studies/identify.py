@@ -73,7 +73,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircularRun:
     """The identification of a robot, and what is driven with it.
 
     Attributes:
@@ -95,7 +95,7 @@ class Circle:
 
 
 CIRCLES = (
-    Circle(
+    CircularRun(
         "comau_racer_1_4",
         {
             "pfc_comau_6r": Drive("pfc_comau_6r", "comau_racer_1_4_elastic.sdf", friction=False),
@@ -117,7 +117,7 @@ CIRCLES = (
         },
         validation="excitation",
     ),
-    Circle(
+    CircularRun(
         "franka_emika_panda",
         {
             "pfc_panda_7r": Drive("pfc_panda_7r", "franka_emika_panda.sdf", friction=False),
@@ -136,7 +136,7 @@ CIRCLES = (
 
 
 def write_identification(
-    out: Path, progress: Callable[[str], None], circles: Sequence[Circle] = CIRCLES
+    out: Path, progress: Callable[[str], None], circles: Sequence[CircularRun] = CIRCLES
 ) -> Report:
     """Identify robots, drive with the results, and write a page for each robot.
 
@@ -160,7 +160,7 @@ def write_identification(
     return report
 
 
-def _identify(circle: Circle, out: Path, progress: Callable[[str], None]) -> Report:
+def _identify(circle: CircularRun, out: Path, progress: Callable[[str], None]) -> Report:
     subject = load_subject(circle.robot, tool=False)
     with open_results(out, "identification") as results:
         say = _stepwise(circle.robot, progress)
@@ -205,7 +205,7 @@ def _stepwise(robot: str, progress: Callable[[str], None]) -> Callable[[float, s
 
 def _other_motion(
     subject: Subject,
-    circle: Circle,
+    circle: CircularRun,
     limits: JointLimits,
     progress: Callable[[float, str], None],
 ) -> FourierTrajectory:
@@ -215,7 +215,7 @@ def _other_motion(
     return found.trajectory
 
 
-def _scenarios(circle: Circle, model: Path) -> dict[tuple[str, str], ScenarioFile]:
+def _scenarios(circle: CircularRun, model: Path) -> dict[tuple[str, str], ScenarioFile]:
     folder = model.resolve()
     found = {}
     for name, drive in circle.drives.items():
@@ -229,7 +229,7 @@ def _scenarios(circle: Circle, model: Path) -> dict[tuple[str, str], ScenarioFil
 
 
 def _said(
-    circle: Circle, progress: Callable[[str], None]
+    circle: CircularRun, progress: Callable[[str], None]
 ) -> Callable[[tuple[str, str], RunRow], None]:
     def tell(case: tuple[str, str], row: RunRow) -> None:
         value = _value(row, circle.drives[case[0]].metric)
@@ -243,7 +243,7 @@ def _value(row: RunRow, metric: str) -> float:
 
 
 def _content(
-    circle: Circle,
+    circle: CircularRun,
     subject: Subject,
     findings: Findings,
     other_t: np.ndarray,

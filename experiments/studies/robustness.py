@@ -58,7 +58,7 @@ Case = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
-class Subject:
+class StudiedLaw:
     """A scenario whose law is to bear disturbances.
 
     Attributes:
@@ -86,32 +86,34 @@ def _equal_poles(law: str, **poles: float) -> str:
 
 
 SUBJECTS = (
-    Subject(
+    StudiedLaw(
         "pfc_elastic_6r",
         (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
     ),
-    Subject(
+    StudiedLaw(
         "pfc_comau_6r_elastic",
         (_equal_poles("elastic", eta=-40, xi=-60, phi=-50), "start.transition=0"),
     ),
-    Subject(
+    StudiedLaw(
         "pfc_elastic_7r",
         (_equal_poles("elastic", eta=-55, xi=-55, phi=-55), "start.transition=0"),
         friction=("friction={}", "friction.file=franka_emika_panda"),
     ),
-    Subject("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
-    Subject("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
-    Subject("pfc_comau_6r"),
+    StudiedLaw("pfc_elastic_3r", after=(_TORQUE_OBSERVED,)),
+    StudiedLaw("pfc_viscoelastic_3r", after=(_TORQUE_OBSERVED,)),
+    StudiedLaw("pfc_comau_6r"),
     # a DELTA robot brings its own friction
-    Subject("pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")),
-    Subject("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
+    StudiedLaw(
+        "pfc_delta", elastic=False, friction=("drive_friction=false", "drive_friction=true")
+    ),
+    StudiedLaw("pfc_compliant_6r", elastic=False, metric="max_error_from_compliant_reference"),
 )
 
 
 def write_robustness(
     out: Path,
     progress: Callable[[str], None],
-    subjects: Sequence[Subject] = SUBJECTS,
+    subjects: Sequence[StudiedLaw] = SUBJECTS,
     disturbances: Mapping[str, tuple[str, ...]] = DISTURBANCES,
 ) -> Report:
     """Run all scenarios under all disturbances, on all cores, and write a page.
@@ -154,7 +156,7 @@ def write_robustness(
 
 
 def _scenarios(
-    subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]
+    subjects: Sequence[StudiedLaw], disturbances: Mapping[str, tuple[str, ...]]
 ) -> dict[Case, ScenarioFile]:
     scenarios = {}
     for subject in subjects:
@@ -178,7 +180,9 @@ def _said(row: RunRow, metric: str) -> str:
     return f"{row.metrics[metric].value * 1e3:8.3f} mm"
 
 
-def _listing(subjects: Sequence[Subject], disturbances: Mapping[str, tuple[str, ...]]) -> list[str]:
+def _listing(
+    subjects: Sequence[StudiedLaw], disturbances: Mapping[str, tuple[str, ...]]
+) -> list[str]:
     lines = [f"{name}: {' '.join(changes) or '-'}" for name, changes in disturbances.items()]
     for s in subjects:
         lines.append(f"{s.scenario}, friction: {s.friction[1]}")

@@ -46,7 +46,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedShape:
     """How a taught path was followed, from when the tool had come to it.
 
     Attributes:
@@ -108,7 +108,7 @@ def compare_fit(taught: Taught) -> Fit:
     )
 
 
-def compare_followed(taught: Taught, log: RunLog) -> Followed:
+def compare_followed(taught: Taught, log: RunLog) -> FollowedShape:
     """Compare the run along the path with the one in which it was taught.
 
     Args:
@@ -124,7 +124,7 @@ def compare_followed(taught: Taught, log: RunLog) -> Followed:
     nearest = nearest_on_line(y_t, y_taught)
     error = y_t - seen
     change = np.linalg.norm(error - nearest.at(error_taught), axis=1)
-    return Followed(
+    return FollowedShape(
         log["eta"].values[rows, 0],
         np.linalg.norm(xi, axis=1),
         np.linalg.norm(log["xi"].values[rows], axis=1),
@@ -168,7 +168,7 @@ def _angles(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def comparison_metrics(
-    taught: Taught, fit: Fit, velocity: float, followed: Followed | None
+    taught: Taught, fit: Fit, velocity: float, followed: FollowedShape | None
 ) -> Metrics:
     """Return the numbers of a page.
 

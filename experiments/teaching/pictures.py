@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from experiments.results.run_log import FloatArray
-from experiments.teaching.comparison import Fit, Followed, line_of
+from experiments.teaching.comparison import Fit, FollowedShape, line_of
 from experiments.teaching.taught import Taught
 from pfsc_drake.geometry import Path, matrix_to_zyx, quaternion_to_matrix
 from reporting.style import (
@@ -27,7 +27,7 @@ _MILLI = 1e3
 _AXES = ["x", "y", "z"]
 
 
-def draw_pictures(taught: Taught, fit: Fit, followed: Followed | None) -> list[Figure]:
+def draw_pictures(taught: Taught, fit: Fit, followed: FollowedShape | None) -> list[Figure]:
     """Return the pictures of a page.
 
     Args:
@@ -41,7 +41,7 @@ def draw_pictures(taught: Taught, fit: Fit, followed: Followed | None) -> list[F
         return [render(drawing) for drawing in drawings]
 
 
-def _draw_paths(taught: Taught, followed: Followed | None) -> Drawing:
+def _draw_paths(taught: Taught, followed: FollowedShape | None) -> Drawing:
     """The waypoints, the path and the tool's way along it, from above and from the side."""
     line, points = line_of(taught.path), taught.table.positions
     canvas = Canvas(figsize=(WIDTH, 6.2))
@@ -66,7 +66,7 @@ def _draw_paths(taught: Taught, followed: Followed | None) -> Drawing:
     return Drawing("taught", "Taught, fitted and followed", caption, canvas)
 
 
-def _draw_distances(fit: Fit, followed: Followed | None) -> Drawing:
+def _draw_distances(fit: Fit, followed: FollowedShape | None) -> Drawing:
     """What the fit takes away, and what the robot adds."""
     canvas, panels = make_panels(2 if followed is not None else 1, 2.6, common_time=False)
     panels[0].plot(fit.eta, _MILLI * fit.distances, ".-", color=COLOURS[1], linewidth=0.8)

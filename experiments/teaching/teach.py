@@ -9,7 +9,7 @@ from experiments.results.run_log import RunLog
 from experiments.run import run_scenario
 from experiments.scenario_file import read_scenario
 from experiments.teaching.comparison import (
-    Followed,
+    FollowedShape,
     compare_fit,
     compare_followed,
     comparison_metrics,
@@ -199,7 +199,7 @@ def _write_page(
     return write_report(results, pictures, page)
 
 
-def _cards(followed: Followed | None) -> list[str]:
+def _cards(followed: FollowedShape | None) -> list[str]:
     cards = ["fit_distance_max", "fit_distance_rms", "largest_jerk_through_all"]
     cards.append("largest_jerk_fitted")
     if followed is None:

@@ -22,7 +22,7 @@ def _unit_interval() -> np.ndarray:
 
 
 @dataclass
-class Box:
+class FrameBox:
     """A box along the axes of a frame.
 
     Attributes:
@@ -65,8 +65,8 @@ class LinkBounds:
     """
 
     mass: np.ndarray = field(default_factory=_unit_interval, metadata=REQUIRED)
-    center_of_mass: Box = field(default_factory=Box, metadata=REQUIRED)
-    body: Box | None = None
+    center_of_mass: FrameBox = field(default_factory=FrameBox, metadata=REQUIRED)
+    body: FrameBox | None = None
     least_extent: float = field(default=1.0, metadata=REQUIRED)
 
     def __post_init__(self) -> None:
@@ -169,8 +169,10 @@ def bounds_from_geometry(
     links = []
     for end in ends:
         lower, upper = np.minimum(end, 0.0), np.maximum(end, 0.0)
-        near, far = Box(lower - margin, upper + margin), 2.0 * margin
-        links.append(LinkBounds(mass.copy(), near, Box(lower - far, upper + far), margin / share))
+        near, far = FrameBox(lower - margin, upper + margin), 2.0 * margin
+        links.append(
+            LinkBounds(mass.copy(), near, FrameBox(lower - far, upper + far), margin / share)
+        )
     return PhysicalBounds(subject.name, links, total_mass=list(total_mass), source="geometry")
 
 

@@ -11,9 +11,9 @@ from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.parameters import DeltaParameters
 from pfsc_drake.robot.models.parameters import (
+    ArmParameters,
     BodyParameters,
     FrictionParameters,
-    RobotParameters,
     ToolParameters,
 )
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -108,7 +108,7 @@ SOURCE = "identified; physically consistent"
 _EQUAL_SLIDES = 1e-6
 
 
-def identified_robot(subject: Subject, parameters: np.ndarray) -> RobotParameters:
+def identified_robot(subject: Subject, parameters: np.ndarray) -> ArmParameters:
     """Return a serial robot's parameters with identified links, rotors and friction.
 
     Geometry, limits, tool, elasticities and variants stay. If the tool was identified as a part of

@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from identification.consistency.bounds import (
-    Box,
+    FrameBox,
     Intervals,
     LinkBounds,
     PhysicalBounds,
@@ -269,5 +269,5 @@ def _explain(outcome: str, layout: Layout, bounds: PhysicalBounds) -> NoReturn:
     )
 
 
-def _place(box: Box) -> str:
+def _place(box: FrameBox) -> str:
     return f"between {box.lower.tolist()} and {box.upper.tolist()} m"

@@ -24,8 +24,8 @@ from scipy.stats import t as student
 from identification.estimation.friction import (
     KINDS,
     KINDS_WITH_WIDTH,
-    FrictionModel,
     FrictionTerm,
+    FrictionTerms,
 )
 from identification.estimation.identifiability import factorize
 from identification.estimation.information import SLOW, FurtherColumns, MeasuredMotion, information
@@ -80,7 +80,7 @@ class FrictionChoice:
         threshold: That significances must exceed, and factors in standard deviations.
     """
 
-    model: FrictionModel
+    model: FrictionTerms
     judgements: tuple[Judgement, ...]
     threshold: float
 
@@ -130,7 +130,7 @@ def choose_friction(
         for kind in kinds
     ]
 
-    def deviations(model: FrictionModel) -> float:
+    def deviations(model: FrictionTerms) -> float:
         """Return the factor of the last term in units of its standard deviation."""
         found = estimate(regressor, base, motion, model, slow)
         return float(abs(found.base_parameters[-1]) / found.standard_deviation[-1])
@@ -150,7 +150,7 @@ class _Search:
         training: FurtherColumns,
         test: FurtherColumns,
         candidates: Sequence[FrictionTerm],
-        deviations: Callable[[FrictionModel], float],
+        deviations: Callable[[FrictionTerms], float],
     ) -> None:
         self._training, self._test, self._candidates = training, test, list(candidates)
         self._deviations = deviations
@@ -167,7 +167,7 @@ class _Search:
 
     def run(self, progress: Callable[[float, str], None]) -> FrictionChoice:
         """Return the choice."""
-        model = FrictionModel()
+        model = FrictionTerms()
         refused: set[str] = set()  # once only, so that the search ends
         while True:
             progress(len(model.terms) / len(self._candidates), "choosing friction terms")
@@ -189,23 +189,23 @@ class _Search:
         judged.sort(key=lambda judgement: judgement.term.joint)
         return FrictionChoice(model, tuple(judged), self.threshold)
 
-    def _is_sure(self, model: FrictionModel, term: FrictionTerm) -> bool:
+    def _is_sure(self, model: FrictionTerms, term: FrictionTerm) -> bool:
         """Return whether the factor of one more term differs from zero for sure."""
         return self._deviations(model.with_term(term)) > self.threshold
 
-    def _judge_added(self, model: FrictionModel, term: FrictionTerm) -> Judgement:
+    def _judge_added(self, model: FrictionTerms, term: FrictionTerm) -> Judgement:
         term = self._with_best_width(model, term)
         return self._judge(model, model.with_term(term), term)
 
-    def _judge_present(self, model: FrictionModel, term: FrictionTerm) -> Judgement:
+    def _judge_present(self, model: FrictionTerms, term: FrictionTerm) -> Judgement:
         return self._judge(self._with_best_widths(model.without(term)), model, term)
 
-    def _first_needless(self, model: FrictionModel) -> FrictionTerm | None:
+    def _first_needless(self, model: FrictionTerms) -> FrictionTerm | None:
         """Return the first term but the last one that the model does as well without."""
         judged = (self._judge_present(model, term) for term in model.terms[:-1])
         return next((judgement.term for judgement in judged if not judgement.chosen), None)
 
-    def _judge(self, less: FrictionModel, more: FrictionModel, term: FrictionTerm) -> Judgement:
+    def _judge(self, less: FrictionTerms, more: FrictionTerms, term: FrictionTerm) -> Judgement:
         gain = np.sum(self._errors(less) ** 2 - self._errors(more) ** 2, axis=1)
         sections = np.array([part.sum() for part in np.array_split(gain, _SECTIONS)])
         spread = sections.std(ddof=1) / np.sqrt(_SECTIONS)
@@ -214,13 +214,13 @@ class _Search:
         chosen = significance > self.threshold and share > _WORTH
         return Judgement(term, float(gain.sum()), share, significance, chosen)
 
-    def _with_best_widths(self, model: FrictionModel) -> FrictionModel:
+    def _with_best_widths(self, model: FrictionTerms) -> FrictionTerms:
         for term in model.terms:
             if term.has_width:
                 model = model.replaced(self._with_best_width(model.without(term), term))
         return model
 
-    def _with_best_width(self, model: FrictionModel, term: FrictionTerm) -> FrictionTerm:
+    def _with_best_width(self, model: FrictionTerms, term: FrictionTerm) -> FrictionTerm:
         """Return the term with the width that explains most of the motion estimated on."""
         if not term.has_width:
             return term
@@ -238,7 +238,7 @@ class _Search:
         )
         return replace(term, width=float(np.exp(found.x) * largest))
 
-    def _solve(self, model: FrictionModel) -> tuple[np.ndarray, float]:
+    def _solve(self, model: FrictionTerms) -> tuple[np.ndarray, float]:
         """Return parameters and the sum of squared weighted errors of the motion estimated on."""
         size, terms = len(self._right), model.terms
         products = [self._training.products(term) for term in terms]
@@ -257,7 +257,7 @@ class _Search:
         squares = self._square - 2.0 * right @ solution + solution @ normal @ solution
         return solution, float(squares)
 
-    def _errors_of(self, model: FrictionModel) -> np.ndarray:
+    def _errors_of(self, model: FrictionTerms) -> np.ndarray:
         """Return the weighted errors in the other motion, with its own f_c, f_v; shape (K, N)."""
         solution, size, data = self._solve(model)[0], len(self._right), self._test
         errors = data.torques - data.by_joint @ solution[:size]
@@ -273,7 +273,7 @@ class _Search:
 
     def _friction_square(self) -> np.ndarray:
         """Return the weighted mean square of Coulomb and viscous friction, shape (N,)."""
-        solution, _ = self._solve(FrictionModel())
+        solution, _ = self._solve(FrictionTerms())
         squares = []
         for j, columns in enumerate(self._own):
             friction = self._test.by_joint[:, j, columns] @ solution[columns]

@@ -101,7 +101,7 @@ class FrictionTerm:
 
 
 @dataclass(frozen=True)
-class FrictionModel:
+class FrictionTerms:
     """Which terms the joints of a robot have beside Coulomb and viscous friction.
 
     Attributes:
@@ -167,14 +167,14 @@ class FrictionModel:
         """Return whether there is a term of that kind and joint."""
         return term.name in self.names
 
-    def with_term(self, term: FrictionTerm) -> "FrictionModel":
+    def with_term(self, term: FrictionTerm) -> "FrictionTerms":
         """Return the model with one more term."""
-        return FrictionModel((*self.terms, term))
+        return FrictionTerms((*self.terms, term))
 
-    def replaced(self, term: FrictionTerm) -> "FrictionModel":
+    def replaced(self, term: FrictionTerm) -> "FrictionTerms":
         """Return the model with another width of a term that it has."""
-        return FrictionModel(tuple(term if t.name == term.name else t for t in self.terms))
+        return FrictionTerms(tuple(term if t.name == term.name else t for t in self.terms))
 
-    def without(self, term: FrictionTerm) -> "FrictionModel":
+    def without(self, term: FrictionTerm) -> "FrictionTerms":
         """Return the model without the term of that kind and joint."""
-        return FrictionModel(tuple(t for t in self.terms if t.name != term.name))
+        return FrictionTerms(tuple(t for t in self.terms if t.name != term.name))

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
@@ -94,7 +94,7 @@ def information(
     regressor: Regressor,
     base: BaseParameters,
     motion: MeasuredMotion,
-    friction: FrictionModel | None = None,
+    friction: FrictionTerms | None = None,
     slow: float = SLOW,
 ) -> Information:
     """Return the linear system of a motion.

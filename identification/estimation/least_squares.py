@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
-from identification.estimation.friction import FrictionModel
+from identification.estimation.friction import FrictionTerms
 from identification.estimation.identifiability import (
     Factors,
     WeakParameter,
@@ -125,7 +125,7 @@ class Estimate:
     joint_names: tuple[str, ...]
     joint_units: tuple[str, ...]
     base: BaseParameters
-    friction: FrictionModel
+    friction: FrictionTerms
     base_parameters: np.ndarray
     covariance: np.ndarray
     coloured: np.ndarray
@@ -217,7 +217,7 @@ def estimate(
     regressor: Regressor,
     base: BaseParameters,
     motion: MeasuredMotion,
-    friction: FrictionModel | None = None,
+    friction: FrictionTerms | None = None,
     slow: float = SLOW,
     white: bool = False,
 ) -> Estimate:
@@ -254,7 +254,7 @@ def estimate(
         tuple(subject.joint_names),
         tuple(subject.joint_units),
         system.base,
-        friction or FrictionModel(),
+        friction or FrictionTerms(),
         factors.solution(),
         covariance,
         coloured,

@@ -30,7 +30,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.identifiability import factorize
 from identification.estimation.information import Information
 from identification.estimation.least_squares import Estimate
@@ -211,10 +211,10 @@ def _read(file: h5py.File) -> StoredIdentification:
     return StoredIdentification(estimate, *repeated)
 
 
-def _friction(attributes: h5py.AttributeManager) -> FrictionModel:
+def _friction(attributes: h5py.AttributeManager) -> FrictionTerms:
     joints, widths = attributes["joints"], attributes["widths"]
     kinds = _words(attributes["kinds"], len(joints))
-    return FrictionModel(
+    return FrictionTerms(
         tuple(
             FrictionTerm(int(joint) - 1, kind, float(width) if np.isfinite(width) else None)
             for joint, kind, width in zip(joints, kinds, widths, strict=True)

@@ -12,7 +12,7 @@ from pfsc_drake.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PredictedTorque:
     """Torques of a model beside measured ones; K instants, N joints.
 
     Attributes:
@@ -74,7 +74,7 @@ def predict(
     motion: MeasuredMotion,
     slow: float = SLOW,
     adapt_friction: bool = False,
-) -> Prediction:
+) -> PredictedTorque:
     """Return what an estimate predicts of another motion.
 
     Args:
@@ -95,7 +95,7 @@ def predict(
     if adapt_friction:
         predicted = predicted + _further_friction(system, predicted)
     deviation = system.matrix @ np.linalg.cholesky(_regular(estimate.covariance))
-    return Prediction(
+    return PredictedTorque(
         estimate.joint_names,
         tuple("Nm" if unit == "rad" else "N" for unit in estimate.joint_units),
         system.torques,

@@ -30,7 +30,7 @@ _SINGULAR = 1e-13
 
 
 @dataclass(frozen=True)
-class Information:
+class InformationFigures:
     """Figures of the information matrix X of one period, with REPORTED_SAMPLES samples.
 
     They depend on the choice of base parameters and on their units.
@@ -48,7 +48,7 @@ class Information:
 
 def information(
     regressor: Regressor, base: BaseParameters, trajectory: FourierTrajectory
-) -> Information:
+) -> InformationFigures:
     """Return the figures of a motion.
 
     Args:
@@ -60,8 +60,10 @@ def information(
     X = base.reduce(regressor.matrix(*trajectory.motion(t))).reshape(-1, base.rank)
     values = np.linalg.svd(X, compute_uv=False)
     if not values[-1] > _SINGULAR * values[0]:
-        return Information(-np.inf, np.inf, base.rank)
-    return Information(2.0 * float(np.log(values).sum()), float(values[0] / values[-1]), base.rank)
+        return InformationFigures(-np.inf, np.inf, base.rank)
+    return InformationFigures(
+        2.0 * float(np.log(values).sum()), float(values[0] / values[-1]), base.rank
+    )
 
 
 @dataclass(frozen=True, eq=False)

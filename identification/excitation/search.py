@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.excitation.criterion import Information, information
+from identification.excitation.criterion import InformationFigures, information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import Given, JointLimits, chosen_limits
 from identification.excitation.local_search import LocalOptimum, LocalSearch
@@ -61,7 +61,7 @@ class SearchResult:
 
     trajectory: FourierTrajectory
     criterion: str
-    information: Information
+    information: InformationFigures
     verification: Verification
     values: list[float]
     seconds: float

@@ -15,7 +15,7 @@ from identification.measurement.imperfections import Imperfections, shipped_impe
 from identification.measurement.periods import AveragedMotion, average
 from identification.measurement.record import Record
 from identification.measurement.servo import Servo, friction_torques, rigid_torques
-from identification.measurement.station import Station, build_station
+from identification.measurement.station import MeasuredStation, build_station
 from identification.measurement.synchronization import check_torque_lag
 from identification.model.base import BaseParameters, base_parameters
 from identification.model.regressor import Regressor
@@ -196,7 +196,7 @@ def check_effort(subject: Subject, tau: np.ndarray) -> None:
 
 
 def _simulate(
-    station: Station, run: ExcitationRun, servo: Servo, progress: Progress | None
+    station: MeasuredStation, run: ExcitationRun, servo: Servo, progress: Progress | None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return times and logged signals."""
     simulator = Simulator(station.diagram)

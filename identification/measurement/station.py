@@ -34,7 +34,7 @@ from pfsc_drake.systems.plants.rigid_plant import RigidPlant
 
 
 @dataclass(frozen=True)
-class Station:
+class MeasuredStation:
     """A robot that runs an excitation; N joints.
 
     Attributes:
@@ -60,7 +60,7 @@ def build_station(
     rigid: np.ndarray,
     usual: tuple[np.ndarray, np.ndarray],
     random: np.random.Generator,
-) -> Station:
+) -> MeasuredStation:
     """Return the station of one run.
 
     Args:
@@ -111,7 +111,7 @@ def build_station(
     log = add_log(builder, signals, servo.period)
     diagram = builder.Build()
     diagram.set_name("identification_experiment")
-    return Station(diagram, plant, log, q[0])
+    return MeasuredStation(diagram, plant, log, q[0])
 
 
 def add_feed_forward(

@@ -18,7 +18,7 @@ from diagrams.robots.model import is_delta, load_delta_robot, locate_model, read
 from diagrams.scenario import RobotParameters as RobotBlock
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.robot.models.parameters import BodyParameters, RobotParameters, load_parameters
+from pfsc_drake.robot.models.parameters import ArmParameters, BodyParameters, load_parameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
@@ -136,7 +136,7 @@ class Subject:
     joint_units: list[str]
     coulomb: np.ndarray | None
     viscous: np.ndarray | None
-    parameters: RobotParameters | None = None
+    parameters: ArmParameters | None = None
     block: RobotBlock | None = None
     folder: Path = Path()
     tool: bool = False
@@ -264,7 +264,7 @@ def tool_frame_of(plant: MultibodyPlant, block: RobotBlock) -> Frame:
     return tool_frame(plant, block)
 
 
-def _parameter_file(model: Path) -> RobotParameters | None:
+def _parameter_file(model: Path) -> ArmParameters | None:
     """Return the parameters that a model was written from, which lie next to it."""
     file = model.with_name("parameters.yaml")
     if model.suffix.lower() != ".sdf" or not file.is_file():
@@ -274,7 +274,7 @@ def _parameter_file(model: Path) -> RobotParameters | None:
     return parameters if model.stem in written else None
 
 
-def _mounts(chain: SerialChain, parameters: RobotParameters | None) -> list[RotorMount] | None:
+def _mounts(chain: SerialChain, parameters: ArmParameters | None) -> list[RotorMount] | None:
     if parameters is None or not parameters.rotors.fixed_to_link:
         return None
     # where the base stands is the scenario's business and has no effect on rotors
@@ -282,7 +282,7 @@ def _mounts(chain: SerialChain, parameters: RobotParameters | None) -> list[Roto
     return mounts_from_parameters(replace(chain, links=upright), parameters)
 
 
-def without_tool(chain: SerialChain, parameters: RobotParameters) -> SerialChain:
+def without_tool(chain: SerialChain, parameters: ArmParameters) -> SerialChain:
     """Return a chain whose last link has lost the tool.
 
     Args:

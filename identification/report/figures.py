@@ -12,7 +12,7 @@ from identification.estimation.identifiability import BADLY
 from identification.estimation.least_squares import Estimate
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.residuals import Whiteness
-from identification.estimation.validation import Prediction
+from identification.estimation.validation import PredictedTorque
 from reporting.style import ALERT, COLOURS, REFERENCE, STYLE, WIDTH, Drawing, Figure, render
 
 _ROW = 1.35  # height of a joint's panel [inches]
@@ -42,7 +42,7 @@ def excitation_figure(
         return render(Drawing("excitation", "Excitation", caption, canvas))
 
 
-def fit_figure(t: np.ndarray, prediction: Prediction, title: str, caption: str) -> Figure:
+def fit_figure(t: np.ndarray, prediction: PredictedTorque, title: str, caption: str) -> Figure:
     """Return measured and predicted torques and what is left, as in Fig. C.2.
 
     Args:

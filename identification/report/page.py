@@ -10,7 +10,7 @@ from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.choice import FrictionChoice
 from identification.estimation.least_squares import Estimate
 from identification.estimation.residuals import whiteness
-from identification.estimation.validation import Prediction
+from identification.estimation.validation import PredictedTorque
 from identification.findings import Findings
 from identification.model.subject import Subject
 from identification.report.figures import (
@@ -265,7 +265,7 @@ def _figures(content: PageContent) -> list[Figure]:
     estimate = findings.estimate
     motion = estimate.motion
     t = np.asarray(getattr(motion, "t", np.arange(len(motion.tau))))
-    fit = Prediction(
+    fit = PredictedTorque(
         estimate.joint_names,
         tuple("Nm" if unit == "rad" else "N" for unit in estimate.joint_units),
         estimate.system.torques,

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.c_code import CCode, helpers, table_head, table_text
-from pfsc_drake.compiled.code import Table, Tables
+from pfsc_drake.compiled.code import LiteralTable, Tables
 from pfsc_drake.compiled.translation import Translation
 
 __all__ = ["c_source", "parameters"]
@@ -71,7 +71,7 @@ def c_source(functions: Mapping[str, ca.Function], prefix: str) -> dict[str, str
             ]
         )
     named = {
-        name: [str(value) for value in Table(np.frombuffer(content))]
+        name: [str(value) for value in LiteralTable(np.frombuffer(content))]
         for content, name in tables.names.items()
     }
     extern = "".join(f"extern {table_head(name, len(named[name]))};\n" for name in named)

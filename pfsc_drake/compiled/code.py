@@ -9,7 +9,7 @@ import numpy as np
 
 from pfsc_drake.compiled.operations import COMPARISONS, LOGIC, Untranslatable, literal
 
-__all__ = ["Code", "Table", "Tables", "Value", "Values", "elements"]
+__all__ = ["Code", "LiteralTable", "Tables", "Value", "Values", "elements"]
 
 Value = str | tuple[str, int]
 """A number: its name, its literal, or pointer and element where it still is in memory.
@@ -22,7 +22,7 @@ Values = Sequence[Value]
 _ZERO = literal(0.0)
 
 
-class Table(Sequence[Value]):
+class LiteralTable(Sequence[Value]):
     """Literals, perhaps very many: they are written when they are asked for.
 
     Args:
@@ -48,7 +48,7 @@ class Table(Sequence[Value]):
 
     def __getitem__(self, place: int | slice) -> Value | Values:
         if isinstance(place, slice):
-            return Table(self._numbers[place])
+            return LiteralTable(self._numbers[place])
         return literal(self._numbers[place])
 
     def __iter__(self) -> Iterator[Value]:
@@ -75,9 +75,9 @@ class Tables:
         Args:
             values: Literals.
         """
-        if not isinstance(values, Table):
+        if not isinstance(values, LiteralTable):
             bits = np.array([int(str(value), 16) for value in values], dtype=np.uint64)
-            values = Table(bits.view(np.float64))
+            values = LiteralTable(bits.view(np.float64))
         return self.names.setdefault(values.content, f"{self._prefix}{len(self.names)}")
 
 
@@ -156,7 +156,7 @@ class Code(ABC):
         """Return a pointer to numbers one behind the other; they are not to be overwritten."""
         if not values:
             return self.nowhere
-        if isinstance(values, Table) or all(_is_literal(value) for value in values):
+        if isinstance(values, LiteralTable) or all(_is_literal(value) for value in values):
             return self._tables.pointer(values)
         start = values[0]
         if isinstance(start, tuple):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import numpy as np
 
-from pfsc_drake.compiled.code import Code, Table, Value, Values, elements
+from pfsc_drake.compiled.code import Code, LiteralTable, Value, Values, elements
 from pfsc_drake.compiled.operations import Untranslatable, is_known, literal, operation_name
 
 __all__ = [
@@ -115,7 +115,7 @@ def _elementwise(code: Code, operation: int, operands: Sequence[Values]) -> Valu
 
 
 def _constant(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:
-    return Table(np.array(node.to_DM().nonzeros()))
+    return LiteralTable(np.array(node.to_DM().nonzeros()))
 
 
 def _same(code: Code, node: ca.MX, operands: Sequence[Values]) -> Values:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.compiled.assembly import Assembly
-from pfsc_drake.compiled.code import Code, Table, Tables, Value, Values, elements
+from pfsc_drake.compiled.code import Code, LiteralTable, Tables, Value, Values, elements
 from pfsc_drake.compiled.matrix_instructions import look_up, projected, translate_instruction
 from pfsc_drake.compiled.operations import Untranslatable, literal
 
@@ -137,7 +137,7 @@ class Translation:
             else:
                 operands = [
                     # what is not there is zero
-                    places[place] if place >= 0 else Table(np.zeros(node.dep(i).nnz()))
+                    places[place] if place >= 0 else LiteralTable(np.zeros(node.dep(i).nnz()))
                     for i, place in enumerate(function.instruction_input(k))
                 ]
                 if what == ca.OP_OUTPUT:

@@ -148,17 +148,17 @@ class FollowingController(Diagram):
         if commands_torque:
             connect(stop.GetOutputPort("torque"), switch.GetInputPort("stop"))
         connect(sampled.GetOutputPort("evaluation"), report.GetInputPort("evaluation"))
-        connect(switch.GetOutputPort("told"), report.GetInputPort("told"))
+        connect(switch.GetOutputPort("command"), report.GetInputPort("command"))
 
-        told = [linear, sampled, *measures, alarms]
-        names = [name for system in told for name in system.network.inputs]
+        fed = [linear, sampled, *measures, alarms]
+        names = [name for system in fed for name in system.network.inputs]
         inside = {"relation", "fault", "stopping", "suspects", "ignored"}
         for name in dict.fromkeys(name for name in names if name not in inside):
-            ports = [s.GetInputPort(name) for s in told if s.HasInputPort(name)]
+            ports = [s.GetInputPort(name) for s in fed if s.HasInputPort(name)]
             builder.ExportInput(ports[0], name)
             for port in ports[1:]:
                 builder.ConnectInput(name, port)
-        builder.ExportOutput(switch.GetOutputPort("told"), self.drive_port)
+        builder.ExportOutput(switch.GetOutputPort("command"), self.drive_port)
         for name in ("manifold_state", "virtual_input", "reference_velocity"):
             if sampled.HasOutputPort(name):
                 builder.ExportOutput(sampled.GetOutputPort(name), name)
@@ -189,7 +189,7 @@ class ControllerAccess(FaultAccess):
             blocks: Of the diagram.
             root: Context of the diagram.
         """
-        return blocks.output(root, f"{self.name}.switch.told")
+        return blocks.output(root, f"{self.name}.switch.command")
 
     def set_last_state(self, blocks: BlockAccess, root: Context, joint_state: np.ndarray) -> None:
         """Let a state be that of the last tick, before which nothing has been compared.

@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import build_station
-from diagrams.fault_description import FaultScene, Instant, describe, first_instant
+from diagrams.fault_description import FaultInstant, FaultScene, describe, first_instant
 from diagrams.scenario import (
     Circle,
     ForcePulse,
@@ -163,7 +163,7 @@ def test_what_is_known_without_a_run(six_axes):
     )
 
     def sentence(fault, **changes):
-        changed = Instant(0.5, {**now.signals, **changes})
+        changed = FaultInstant(0.5, {**now.signals, **changes})
         scene = FaultScene(station.law, station.robot, station.task.place, False, changed, now)
         return describe(fault, scene)
 
@@ -193,7 +193,7 @@ def test_a_joint_that_runs_away_next_to_a_singular_posture(six_axes, fast):
     )
     state = now.measured_state.copy()
     state[[4, 16]], state[[6 + fast, 18 + fast]] = np.deg2rad(2.0), np.deg2rad(600.0)
-    near = Instant(0.5, {**now.signals, "joint_state_measured": state})
+    near = FaultInstant(0.5, {**now.signals, "joint_state_measured": state})
     scene = FaultScene(station.law, station.robot, station.task.place, False, near, now)
     sentence, name = describe(Fault.JOINT_SPEED, scene), station.robot.names[fast]
     assert sentence.startswith(f"joint {fast + 1} '{name}' moves at 600.0 deg/s of ")

@@ -13,8 +13,8 @@ from diagrams.robots.part import RobotPart
 from diagrams.scenario import Scenario
 from diagrams.station_parts import belief_source
 from experiments.studies.margins.box import (
-    Box,
     Error,
+    ErrorBox,
     corners,
     single_errors,
     smooth,
@@ -40,7 +40,7 @@ _CORNER_INSTANTS = 2
 def analyse(
     settings: Scenario,
     folder: Path,
-    box: Box,
+    box: ErrorBox,
     progress: ProgressListener,
     *,
     only_start: bool = False,
@@ -115,7 +115,7 @@ def analyse(
 
 
 def _believable(
-    box: Box, settings: Scenario, part: RobotPart, folder: Path, remarks: list[str]
+    box: ErrorBox, settings: Scenario, part: RobotPart, folder: Path, remarks: list[str]
 ) -> tuple[list[tuple[str, Error]], list[Error]]:
     """Return the box's errors, single and together, but what no robot could be.
 

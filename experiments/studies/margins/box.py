@@ -19,7 +19,7 @@ _FACTORS = {"mass": "masses", "stiffness": "stiffnesses", "rotor_inertia": "roto
 
 
 @dataclass(frozen=True)
-class Box:
+class ErrorBox:
     """By how much the model may be off, one way or the other.
 
     Attributes:
@@ -93,7 +93,7 @@ def _short(key: str, amount: float) -> str:
     return f"{_FACTORS[key]} {100.0 * amount:+.3g} %"
 
 
-def single_errors(box: Box, elastic: bool) -> Iterator[tuple[str, Error]]:
+def single_errors(box: ErrorBox, elastic: bool) -> Iterator[tuple[str, Error]]:
     """Yield the errors of one parameter at a time, with the parameter.
 
     Args:
@@ -105,7 +105,7 @@ def single_errors(box: Box, elastic: bool) -> Iterator[tuple[str, Error]]:
             yield key, Error(((key, sign * size),))
 
 
-def corners(box: Box, elastic: bool) -> Iterator[Error]:
+def corners(box: ErrorBox, elastic: bool) -> Iterator[Error]:
     """Yield the corners of the box, where all parameters are wrong.
 
     Args:
@@ -119,7 +119,7 @@ def corners(box: Box, elastic: bool) -> Iterator[Error]:
             yield Error(tuple((key, sign * size) for (key, size), sign in pairs))
 
 
-def _sizes(box: Box, elastic: bool) -> list[tuple[str, float]]:
+def _sizes(box: ErrorBox, elastic: bool) -> list[tuple[str, float]]:
     keys = ("mass", "stiffness", "tool_mass", "rotor_inertia")
     sizes = [(key, getattr(box, key)) for key in keys if elastic or key != "stiffness"]
     return [(key, size) for key, size in sizes if size > 0.0]

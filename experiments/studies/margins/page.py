@@ -11,7 +11,7 @@ from diagrams.scenario import Scenario
 from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from experiments.studies.margins.analysis import analyse
-from experiments.studies.margins.box import Box
+from experiments.studies.margins.box import ErrorBox
 from experiments.studies.margins.picture import draw_margins
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import margins_json, metrics_of, sentences
@@ -101,7 +101,7 @@ class MarginsOutcome:
 
 
 def write_margins(
-    scenario: ScenarioFile, out: Path, box: Box, progress: ProgressListener
+    scenario: ScenarioFile, out: Path, box: ErrorBox, progress: ProgressListener
 ) -> MarginsOutcome:
     """Analyse a scenario's margins and write ``margins.json`` and the page.
 

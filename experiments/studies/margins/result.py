@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.studies.margins.box import Box, Error
+from experiments.studies.margins.box import Error, ErrorBox
 from experiments.studies.margins.walk import Instant, TouchedSurface
 from pfsc_drake.control.margins import DiscMargin, Modes
 
@@ -100,7 +100,7 @@ class MarginAnalysis:
 
     period: float
     joints: Sequence[str]
-    box: Box
+    box: ErrorBox
     nominal: Case
     singles: list[Case] = field(default_factory=list)
     corners: list[Case] = field(default_factory=list)

@@ -91,7 +91,7 @@ class FaultSwitch(Block):
         drive (input): By the law, shape (N,).
         stop (input, optional): After a fault, shape (N,); zero if not connected.
         fault (input): Nonzero from the fault on, shape (1,).
-        told (output): What they are told, shape (N,).
+        command (output): What they are told, shape (N,).
 
     Args:
         num_drives: N.
@@ -104,9 +104,9 @@ class FaultSwitch(Block):
             "stop": Port(num_drives, optional=True),
             "fault": Port(1),
         }
-        self.outputs, self.states = {"told": Port(num_drives, unit)}, {}
+        self.outputs, self.states = {"command": Port(num_drives, unit)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
         stop = ca.DM(*u.drive.shape) if u.stop is None else u.stop
-        return {"told": where(u.fault, stop, u.drive)}
+        return {"command": where(u.fault, stop, u.drive)}

@@ -92,7 +92,7 @@ class Aim(NamedTuple):
     angle: ca.SX
 
 
-class Drives(NamedTuple):
+class DriveRelation(NamedTuple):
     """Drive inputs as an affine function of the highest joint derivative ``x = q^(r)``.
 
     ``held = gain x + drift`` is extrapolated by ``lead`` ticks, ``offset`` is added.
@@ -123,7 +123,7 @@ class Drives(NamedTuple):
 
 def aim_and_drives(
     u: LawInputs, linearization: Linearization, stabilization: Stabilization
-) -> tuple[Aim, Drives]:
+) -> tuple[Aim, DriveRelation]:
     """Return what is wanted of the virtual output, and how drives act.
 
     Args:
@@ -145,7 +145,7 @@ def aim_and_drives(
     v = stabilization.virtual_input(ca.horzsplit(Y), y_p, u.integral)
     lead = where(u.known, linearization.lead, 0.0)
     aim = Aim(Y, ca.horzcat(*y_p[:r]), v, A, v - b, motion, angle)
-    return aim, Drives(gain, drift, offset + u.friction, lead, u.last_held)
+    return aim, DriveRelation(gain, drift, offset + u.friction, lead, u.last_held)
 
 
 def spare_of(posture: Posture, robot: RobotModel, aim: Aim, reference: ca.SX) -> Spare:
@@ -188,7 +188,9 @@ def coming_to_rest(stabilization: Stabilization, motion: Sequence[ca.SX]) -> Spa
     return Spare(desired)
 
 
-def left_to_outputs(drives: Drives, limits: np.ndarray, solution: DecouplingSolution) -> ca.SX:
+def left_to_outputs(
+    drives: DriveRelation, limits: np.ndarray, solution: DecouplingSolution
+) -> ca.SX:
     """Return the highest joint derivative, a posture held back as far as drives demand it.
 
     Between that with which joints come to rest as far as the outputs let them and the one that is

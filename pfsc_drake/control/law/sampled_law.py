@@ -138,7 +138,7 @@ class LawReport(Block):
     Ports:
         evaluation (input): Laid out by the law's ``layout``.
         fault (input): What stops the robot, if anything, shape (1,).
-        told (input): What the drives are told, shape (N,).
+        command (input): What the drives are told, shape (N,).
         law (output): The evaluation with both of them in their places.
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
 
@@ -148,12 +148,12 @@ class LawReport(Block):
 
     def __init__(self, layout: LawLayout) -> None:
         self._layout, drives = layout, layout.drive.stop - layout.drive.start
-        self.inputs = {"evaluation": Port(layout.size), "fault": Port(1), "told": Port(drives)}
+        self.inputs = {"evaluation": Port(layout.size), "fault": Port(1), "command": Port(drives)}
         self.outputs, self.states = {"law": Port(layout.size), "status": Port(3)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """See :class:`Block`."""
         status = self._layout.status
         between = u.evaluation[self._layout.drive.stop : status.start]
-        law = ca.vertcat(u.told, between, u.fault, u.evaluation[status.start + 1 :])
+        law = ca.vertcat(u.command, between, u.fault, u.evaluation[status.start + 1 :])
         return {"law": law, "status": law[status]}

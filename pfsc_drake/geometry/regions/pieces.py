@@ -42,7 +42,7 @@ class Pieces:
     closed: tuple[bool, bool]
 
 
-class Foot(Protocol):
+class BoundaryFoot(Protocol):
     """A place of the boundary to which the distance is a local minimum."""
 
     @property
@@ -58,7 +58,7 @@ class Foot(Protocol):
         """Whether the point is on the other side of the boundary than its normal there."""
 
 
-FootType = TypeVar("FootType", bound=Foot)
+FootType = TypeVar("FootType", bound=BoundaryFoot)
 
 
 class _Leaf(NamedTuple):

@@ -142,7 +142,10 @@ def sphere(radius: float, latitudes: Pair, turned: Turned | None = None) -> Prod
 
 
 def torus(
-    ring_radius: float, tube_radius: float, turned: Turned | None = None, part: Pair | None = None
+    ring_radius: float,
+    tube_radius: float,
+    turned: Turned | None = None,
+    part: Pair | None = None,
 ) -> ProductSurface:
     """Torus; theta_1 goes round the axis, theta_2 round the tube from its outermost line, rad.
 

@@ -237,7 +237,7 @@ class VariantParameters:
 
     Attributes:
         name: of the model and of its file.
-        elasticity: a key of :attr:`RobotParameters.elasticities`, or empty for rigid joints.
+        elasticity: a key of :attr:`ArmParameters.elasticities`, or empty for rigid joints.
         fixed_deg: DH angles at which the last joints are welded [deg]; empty if all joints move.
     """
 
@@ -251,7 +251,7 @@ class VariantParameters:
 
 
 @dataclass
-class RobotParameters:
+class ArmParameters:
     """All physical parameters of a serial robot with N revolute joints.
 
     Attributes:
@@ -300,7 +300,7 @@ class RobotParameters:
             require(variant.elasticity in sets, f"{key}.elasticity", variant.elasticity, allowed)
 
 
-def load_parameters(robot: str | Path) -> RobotParameters:
+def load_parameters(robot: str | Path) -> ArmParameters:
     """Returns the parameters of a robot.
 
     Args:
@@ -321,9 +321,9 @@ def load_parameters(robot: str | Path) -> RobotParameters:
 
 
 @functools.lru_cache(maxsize=16)
-def _parameters(path: Path, content: str) -> RobotParameters:
+def _parameters(path: Path, content: str) -> ArmParameters:
     """Returns the parameters in a file, which says ``content``; not to be changed."""
-    return load_file(RobotParameters, path)
+    return load_file(ArmParameters, path)
 
 
 def _check_entries(group: Any, axes: int, prefix: str = "") -> None:

@@ -25,8 +25,8 @@ import numpy as np
 
 from pfsc_drake.robot.models.files import models_directory
 from pfsc_drake.robot.models.parameters import (
+    ArmParameters,
     BodyParameters,
-    RobotParameters,
     VariantParameters,
     load_parameters,
 )
@@ -39,7 +39,7 @@ _INERTIA_KEYS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def write_sdf(
-    parameters: RobotParameters,
+    parameters: ArmParameters,
     variant: VariantParameters,
     appearance: Appearance | None = None,
     *,
@@ -75,7 +75,7 @@ class _Writer:
 
     def __init__(
         self,
-        parameters: RobotParameters,
+        parameters: ArmParameters,
         variant: VariantParameters,
         appearance: Appearance,
         collisions: bool,

@@ -22,7 +22,7 @@ import numpy as np
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.jets import Jet
-from pfsc_drake.robot.models.parameters import RobotParameters
+from pfsc_drake.robot.models.parameters import ArmParameters
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.newton_euler import inverse_dynamics, link_motions, mass_matrix
 
@@ -74,7 +74,7 @@ def _R_x(angle: float) -> np.ndarray:
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
-def mounts_from_parameters(chain: SerialChain, robot: RobotParameters) -> list[RotorMount]:
+def mounts_from_parameters(chain: SerialChain, robot: ArmParameters) -> list[RotorMount]:
     """Return where the rotors of a robot sit, of its first joints if the chain has fewer.
 
     Args:

@@ -24,7 +24,7 @@ _ROOT = "visualizer"
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Triangles:
     """Triangles.
 
     Attributes:
@@ -50,7 +50,7 @@ class BodyPart:
 
     body: RigidBody
     name: str
-    form: Shape | Surface
+    form: Shape | Triangles
     X_BP: RigidTransform = field(default_factory=RigidTransform)
     color: Rgba = field(default_factory=lambda: Rgba(0.9, 0.9, 0.9, 1.0))
 
@@ -96,7 +96,7 @@ class RobotVisualizer(LeafSystem):
     def _draw_parts(self, context: Context) -> EventStatus:
         for part in self._parts:
             path = f"{body_path(self._plant, part.body)}/{part.name}"
-            if isinstance(part.form, Surface):
+            if isinstance(part.form, Triangles):
                 corners, triangles = part.form.vertices.T, part.form.triangles.T
                 self._meshcat.SetTriangleMesh(path, corners, triangles, part.color)
             else:

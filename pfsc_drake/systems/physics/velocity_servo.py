@@ -98,7 +98,7 @@ class VelocityServo(Diagram):
             builder.ConnectInput("joint_state", system.GetInputPort("joint_state"))
         for name in ("velocity_reference", "silence"):
             builder.ExportInput(servo.GetInputPort(name), name)
-        builder.ExportOutput(switch.GetOutputPort("told"), "drive_torque")
+        builder.ExportOutput(switch.GetOutputPort("command"), "drive_torque")
         builder.ExportOutput(latch.GetOutputPort("fault"), "fault")
         builder.BuildInto(self)
 

@@ -22,7 +22,7 @@ def test_of_two_at_once_the_root_cause_counts():
 def test_what_drives_are_told(fault):
     drive, stop = np.array([1.0, np.nan]), np.array([-2.0, 3.0])
     switch = Stepper(FaultSwitch(2), ("stop",))
-    told = switch.step(drive=drive, stop=stop, fault=fault)["told"]
+    told = switch.step(drive=drive, stop=stop, fault=fault)["command"]
     np.testing.assert_array_equal(told, stop if fault else drive)
-    alone = Stepper(FaultSwitch(2)).step(drive=drive, fault=fault)["told"]
+    alone = Stepper(FaultSwitch(2)).step(drive=drive, fault=fault)["command"]
     np.testing.assert_array_equal(alone, np.zeros(2) if fault else drive)

@@ -111,7 +111,7 @@ def test_the_reference_velocity_is_that_of_the_last_tick(loop):
 def test_a_report_has_the_fault_and_what_the_drives_were_told(loop):
     layout = loop.law.layout
     evaluation, told = np.arange(float(layout.size)), -np.ones(3)
-    found = Stepper(LawReport(layout)).step(evaluation=evaluation, fault=7.0, told=told)
+    found = Stepper(LawReport(layout)).step(evaluation=evaluation, fault=7.0, command=told)
     expected = evaluation.copy()
     expected[layout.drive], expected[layout.status.start] = told, 7.0
     np.testing.assert_array_equal(found["law"], expected)

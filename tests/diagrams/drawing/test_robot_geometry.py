@@ -11,7 +11,7 @@ from pydrake.geometry import Box, Cylinder, Mesh
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
-from pfsc_drake.systems.drawing.robot_visualizer import Surface
+from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 
 INERTIAL = (
     '<inertial><mass value="1"/>'
@@ -116,7 +116,7 @@ def test_stl_meshes_are_drawn_in_metres(draw, address):
     look = visual(mesh(address, 'scale="0.001 0.001 0.002"'))
     drawing = draw(urdf(look, visual(PLATE)), {"meshes/part.stl": stl()})
     (part,) = looks(drawing, "link_1")
-    assert isinstance(part.form, Surface)
+    assert isinstance(part.form, Triangles)
     np.testing.assert_allclose(part.form.vertices.max(axis=0), [0.1, 0.1, 0.0], atol=1e-9)
     assert not drawing.warnings and not sticks(drawing)
 
@@ -239,6 +239,6 @@ def test_sdf_models_are_read_alike(draw):
     )
     drawing = draw(model, {"meshes/part.stl": stl()}, "arm.sdf")
     (part,) = looks(drawing, "link_1")
-    assert isinstance(part.form, Surface)
+    assert isinstance(part.form, Triangles)
     (warning,) = drawing.warnings
     assert "link_2" in warning and "none.obj: no such file" in warning

@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.robots.arm import add_arm
 from diagrams.station_parts import belief_source
 from experiments.studies.margins.analysis import _believable
-from experiments.studies.margins.box import Box
+from experiments.studies.margins.box import ErrorBox
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 
@@ -67,7 +67,7 @@ def test_a_box_of_errors_leaves_out_what_no_robot_could_be(settings):
     """Said before anything is linearized: nothing can be taken off a tool without mass."""
     part = add_arm(DiagramBuilder(), belief_source(settings, Path()))
     remarks = []
-    singles, together = _believable(Box(), settings, part, Path(), remarks)
+    singles, together = _believable(ErrorBox(), settings, part, Path(), remarks)
     assert [str(error) for _, error in singles] == [
         "masses believed 5 % too low",
         "masses believed 5 % too high",
@@ -84,4 +84,4 @@ def test_a_box_of_errors_leaves_out_what_no_robot_could_be(settings):
         part.check_belief(belief_source(settings, Path()), "")
     settings.robot.model = "comau_racer_1_4"
     whole = add_arm(DiagramBuilder(), belief_source(settings, Path()))
-    assert len(_believable(Box(), settings, whole, Path(), remarks)[1]) == 4
+    assert len(_believable(ErrorBox(), settings, whole, Path(), remarks)[1]) == 4

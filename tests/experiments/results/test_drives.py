@@ -7,7 +7,7 @@ import pytest
 
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
-from experiments.results.drives import JointLimits
+from experiments.results.drives import DriveLimitsOfRun
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import find_scenario
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -18,7 +18,7 @@ INF = np.inf
 
 
 def limits(position, velocity, revolute=(True, True)):
-    return JointLimits(
+    return DriveLimitsOfRun(
         [f"j{i}" for i in range(len(velocity))],
         np.array(revolute),
         np.array(position, dtype=float),
@@ -111,7 +111,7 @@ def test_what_is_no_number_does_not_count(log):
 def test_limits_of_a_robot(name):
     path = find_scenario(name)
     robot = build_station(load_file(Scenario, path), path.parent).robot
-    own = JointLimits.of(robot)
+    own = DriveLimitsOfRun.of(robot)
     margin = "joint_limit_margin" if name == "pfc_elastic_3r" else "slide_limit_margin"
     assert own.metric_names() == [margin, "joint_velocity_share"]
     np.testing.assert_array_equal(own.position, robot.gather("position_limits"))
@@ -124,6 +124,6 @@ def test_a_speed_limit_of_zero_is_none():
         body = (np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, np.zeros(3), np.eye(3))
         return ChainLink(name, "revolute", *body, velocity_limit=speed)
 
-    own = JointLimits.of(SerialChain((link("a", 0.0), link("b", 2.0))))
+    own = DriveLimitsOfRun.of(SerialChain((link("a", 0.0), link("b", 2.0))))
     np.testing.assert_array_equal(own.velocity, [INF, 2.0])
     assert own.metric_names() == ["joint_velocity_share"]

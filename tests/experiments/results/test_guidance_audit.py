@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.results.promises import Promise, audit
+from experiments.results.promises import GuidanceRules, audit
 from experiments.results.run_log import RunLog
 from pfsc_drake.control.fixtures.guidance import ProgramGuidance
 from pfsc_drake.control.fixtures.near_regions import ScheduledRegions
@@ -29,7 +29,7 @@ from tests.control.fixtures.point_robot import (
     random_hand,
 )
 
-PROMISE = Promise(MASS, DAMPING, 2.0, 1.0)
+PROMISE = GuidanceRules(MASS, DAMPING, 2.0, 1.0)
 FLOOR = half_space((0, 0, 0), (0, 0, 1), speed=0.02)
 REGIONS = [FLOOR, half_space((0, 0, 0.06), (0, 0, -1)), ball((0.0, 0.0, 0.03), 0.01)]
 

@@ -5,7 +5,7 @@ import json
 import h5py
 import pytest
 
-from experiments.studies.identify import Circle, Drive, write_identification
+from experiments.studies.identify import CircularRun, Drive, write_identification
 
 pytestmark = pytest.mark.slow
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 def fixture_out(tmp_path_factory):
     out = tmp_path_factory.mktemp("circle")
     drives = {"pfc_delta": Drive("pfc_delta", "parameters.yaml", friction=False)}
-    circle = Circle("festo_expt_45", drives, starts=1, runs=2, limits={"acceleration": 30.0})
+    circle = CircularRun("festo_expt_45", drives, starts=1, runs=2, limits={"acceleration": 30.0})
     told = []
     report = write_identification(out / "found", told.append, [circle])
     assert report.problem is None

@@ -11,7 +11,14 @@ from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, translated_surface
-from pfsc_drake.geometry.surfaces.shapes import Turned, cone, cylinder, paraboloid, plane, sphere
+from pfsc_drake.geometry.surfaces.shapes import (
+    Turned,
+    cone,
+    cylinder,
+    paraboloid,
+    plane,
+    sphere,
+)
 from pfsc_drake.geometry.surfaces.surface import partial_orders
 
 ORDER = 5

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from identification.consistency.bounds import bounds_from_geometry, load_bounds
 from identification.consistency.nearest import estimate_consistent, nearest_consistent
 from identification.consistency.parameter_files import inconsistencies
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.excitation.fourier import FourierTrajectory
 from identification.model.base import base_parameters
@@ -117,7 +117,7 @@ def test_delta_robot(delta):
 
 
 def test_friction_beyond_coulomb_is_free(comau_regressor, comau_base, comau_estimate, comau_bounds):
-    model = FrictionModel((FrictionTerm(1, "offset"),))
+    model = FrictionTerms((FrictionTerm(1, "offset"),))
     free = estimate(comau_regressor, comau_base, comau_estimate.motion, model, white=True)
     found = estimate_consistent(free, comau_bounds)
     assert found.names[-1].startswith("joint_2.") and found.parameters.shape == (79,)

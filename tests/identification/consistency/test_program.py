@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.solvers import CsdpSolver, MathematicalProgram
 
-from identification.consistency.bounds import Box, LinkBounds, PhysicalBounds
+from identification.consistency.bounds import FrameBox, LinkBounds, PhysicalBounds
 from identification.consistency.program import least_squares
 from identification.consistency.pseudo_inertia import pseudo_inertia
 from identification.model.parameters import LINK_PARAMETERS
@@ -15,7 +15,7 @@ NAMES = [*(f"link_1.{name}" for name in LINK_PARAMETERS), "joint_1.I_M", "joint_
 
 @pytest.fixture
 def bounds():
-    box = Box(np.array([-0.1, -0.2, 0.0]), np.array([0.1, 0.2, 0.3]))
+    box = FrameBox(np.array([-0.1, -0.2, 0.0]), np.array([0.1, 0.2, 0.3]))
     link = LinkBounds(np.array([1.0, 5.0]), box, least_extent=0.05)
     return PhysicalBounds("arm", [link], rotor_inertia=[[1e-4, 1e-2]])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from pfsc_drake.errors import InputError
 
@@ -21,7 +21,7 @@ def test_columns(kind):
     width, expected, unit = TERMS[kind]
     term = FrictionTerm(1, kind, width)
     v = np.random.default_rng(0).normal(size=(30, 3))
-    columns = FrictionModel((term,)).columns(v)
+    columns = FrictionTerms((term,)).columns(v)
     assert columns.shape == (30, 3, 1)
     np.testing.assert_allclose(columns[:, 1, 0], expected(v[:, 1]))
     assert not columns[:, [0, 2]].any()
@@ -34,7 +34,7 @@ def test_factors_are_estimated(comau, measure):
     v = comau.motion[1][:, 2]
     extra = np.zeros_like(comau.motion[1])
     extra[:, 2] = np.where(v > 0.0, 4.0, 1.0) * np.sign(v)
-    terms = FrictionModel((FrictionTerm(2, "offset"),))
+    terms = FrictionTerms((FrictionTerm(2, "offset"),))
     result = estimate(comau.regressor, comau.base, measure(extra=extra, noise=1e-4), terms)
     found = dict(zip(result.short_names, result.base_parameters, strict=True))
     f_c = comau.parameters[comau.regressor.names.index("joint_3.f_c")]
@@ -55,7 +55,7 @@ def test_bad_terms(comau, measure):
     with pytest.raises(InputError, match=r"width = 0\.0; must be positive"):
         FrictionTerm(0, "stribeck", 0.0)
     with pytest.raises(InputError, match=r"joint_1\.f_o is there 2 times"):
-        FrictionModel((FrictionTerm(0, "offset"), FrictionTerm(0, "offset")))
+        FrictionTerms((FrictionTerm(0, "offset"), FrictionTerm(0, "offset")))
     with pytest.raises(InputError, match=r"joint_9\.f_o; the robot has the joints 1 to 6"):
-        terms = FrictionModel((FrictionTerm(8, "offset"),))
+        terms = FrictionTerms((FrictionTerm(8, "offset"),))
         estimate(comau.regressor, comau.base, measure(), terms)

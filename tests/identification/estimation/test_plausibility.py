@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.plausibility import refuse_implausible
 from pfsc_drake.errors import InputError
@@ -47,7 +47,7 @@ def test_friction_of_another_form_may_have_a_negative_part(comau, measure):
     measured = measure(extra=extra)
     with pytest.raises(InputError, match=r"joint_6\.f_c = -.*--validation"):
         refuse_implausible(found(comau, measured))
-    term = FrictionModel((FrictionTerm(5, "quadratic"),))
+    term = FrictionTerms((FrictionTerm(5, "quadratic"),))
     refuse_implausible(found(comau, measured, term))
     driving = measure(extra=-2.0 * extra)
     with pytest.raises(InputError, match=r"friction of joint_6 against .* cannot be negative"):

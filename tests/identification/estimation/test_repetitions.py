@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.repetitions import Repetitions
 from pfsc_drake.errors import InputError
@@ -75,7 +75,7 @@ def test_friction_that_is_another_in_each_run(comau, measure):
 def test_what_does_not_belong_together(comau, measure, runs):
     with pytest.raises(InputError, match="no estimate"):
         Repetitions(())
-    terms = FrictionModel((FrictionTerm(0, "offset"),))
+    terms = FrictionTerms((FrictionTerm(0, "offset"),))
     other = estimate(comau.regressor, comau.base, measure(), terms)
     with pytest.raises(InputError, match="run 2 is of 53 parameters of comau"):
         Repetitions((runs.estimates[0], other))

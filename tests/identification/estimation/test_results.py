@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.results import load_estimate, save_estimate
@@ -13,7 +13,7 @@ from pfsc_drake.errors import InputError
 
 @pytest.fixture(scope="module")
 def result(comau, measure):
-    terms = FrictionModel((FrictionTerm(1, "stribeck", 0.3), FrictionTerm(2, "offset")))
+    terms = FrictionTerms((FrictionTerm(1, "stribeck", 0.3), FrictionTerm(2, "offset")))
     return estimate(comau.regressor, comau.base, measure(), terms)
 
 
@@ -65,7 +65,7 @@ def test_without_friction_terms_or_repetitions(comau, measure, tmp_path):
     result = estimate(comau.regressor, comau.base, measure())
     save_estimate(tmp_path / "plain.h5", result)
     stored = load_estimate(tmp_path / "plain.h5")
-    assert stored.estimate.friction == FrictionModel()
+    assert stored.estimate.friction == FrictionTerms()
     assert stored.repeated.shape == (0, 52)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from identification.estimation.friction import FrictionModel, FrictionTerm
+from identification.estimation.friction import FrictionTerm, FrictionTerms
 from identification.estimation.least_squares import estimate
 from identification.estimation.validation import compare_with_truth, predict
 from identification.model.base import base_parameters
@@ -50,7 +50,7 @@ def test_error_of_single_torques(comau, result):
 
 
 def test_prediction_with_friction_terms(comau, measure, other):
-    model = FrictionModel((FrictionTerm(2, "offset"), FrictionTerm(0, "slant")))
+    model = FrictionTerms((FrictionTerm(2, "offset"), FrictionTerm(0, "slant")))
     fitted = estimate(comau.regressor, comau.base, measure(noise=1e-5), model)
     np.testing.assert_allclose(fitted.base_parameters[-2:], 0.0, atol=1e-3)
     prediction = predict(fitted, comau.regressor, measure(5, motion=other, noise=1e-5))

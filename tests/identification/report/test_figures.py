@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.residuals import whiteness
-from identification.estimation.validation import Prediction
+from identification.estimation.validation import PredictedTorque
 from identification.report import figures
 
 
@@ -25,7 +25,7 @@ def test_torques_are_drawn_joint_by_joint(canvas):
     measured, predicted = random.normal(size=(2, 50, 2))
     used, ones = np.ones((50, 2), dtype=bool), np.ones(2)
     names, units = ("swing", "lift"), ("Nm", "N")
-    prediction = Prediction(names, units, measured, predicted, used, ones, ones, ones)
+    prediction = PredictedTorque(names, units, measured, predicted, used, ones, ones, ones)
     figures.fit_figure(t, prediction, "Torques of a motion that was not used", "")
     panels = canvas[0].canvas.axes
     assert canvas[0].name == "prediction"

@@ -7,7 +7,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory
-from pfsc_drake.robot.models.parameters import RobotParameters, load_parameters
+from pfsc_drake.robot.models.parameters import ArmParameters, load_parameters
 from pfsc_drake.robot.models.visuals import Appearance
 from pfsc_drake.yaml.typed import load_file
 
@@ -94,7 +94,7 @@ def test_missing_parameters_are_named(tmp_path):
 
 def test_defaults_are_valid_but_no_substitute_for_what_a_file_must_say(tmp_path):
     """Loading builds the defaults first, so they must pass the checks."""
-    assert RobotParameters().denavit_hartenberg.table().axes == 1
+    assert ArmParameters().denavit_hartenberg.table().axes == 1
     path = tmp_path / "robot.yaml"
     path.write_text("{name: mine}", encoding="utf-8")
     with pytest.raises(InputError, match="missing key 'denavit_hartenberg'"):

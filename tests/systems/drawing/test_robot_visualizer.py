@@ -14,7 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from pfsc_drake.systems.drawing.robot_visualizer import (
     BodyPart,
     RobotVisualizer,
-    Surface,
+    Triangles,
     body_path,
 )
 
@@ -60,7 +60,7 @@ def parts(plant):
     crank, slide = plant.GetBodyByName("crank"), plant.GetBodyByName("slide")
     return [
         BodyPart(crank, "bar", Box(0.5, 0.1, 0.1), X_BP, COLOR),
-        BodyPart(slide, "plate", Surface(corners, np.array([[0, 1, 2]]))),
+        BodyPart(slide, "plate", Triangles(corners, np.array([[0, 1, 2]]))),
     ]
 
 

@@ -10,7 +10,7 @@ from diagrams.scenario import Scenario
 from experiments.cli import main
 from experiments.scenario_file import read_scenario
 from experiments.studies.margins.analysis import analyse
-from experiments.studies.margins.box import Box, Error, corners, single_errors, smooth
+from experiments.studies.margins.box import Error, ErrorBox, corners, single_errors, smooth
 from experiments.studies.margins.result import MarginAnalysis
 from experiments.studies.margins.words import one_line, sentences
 from pfsc_drake.errors import InputError
@@ -34,7 +34,7 @@ def settings_of(name, *overrides):
 
 def analysis_of(name, *overrides, box=None, only_start=True):
     folder = Path(read_scenario(name, []).path).parent
-    nothing = Box(0.0, 0.0, 0.0, 0.0)
+    nothing = ErrorBox(0.0, 0.0, 0.0, 0.0)
     settings = settings_of(name, *overrides)
     return analyse(settings, folder, box or nothing, Quiet(), only_start=only_start)
 
@@ -61,7 +61,7 @@ def test_six_axes_with_four_equal_poles_do_not_bear_5_percent():
 def test_drives_of_a_light_arm_are_not_cut_off_by_the_error_that_is_tried():
     """Weak drives would be at their limits where the believed weight is another at once."""
     weak = "controller.effort_scale=0.4"
-    analysis = analysis_of("pfc_elastic_7r", weak, box=Box(0.05, 0.05, 0.0, 0.1))
+    analysis = analysis_of("pfc_elastic_7r", weak, box=ErrorBox(0.05, 0.05, 0.0, 0.1))
     assert all(case.is_stable for case in analysis.cases)
     rate = analysis.nominal.worst.rate
     for case in analysis.cases:
@@ -72,7 +72,7 @@ def test_drives_of_a_light_arm_are_not_cut_off_by_the_error_that_is_tried():
 def test_the_fast_pair_bears_the_box_and_has_margins():
     """With four equal poles the weakest drive bears 2 %."""
     fast = analysis_of(
-        "pfc_elastic_6r", *poles(-60, -60, -250, -350), box=Box(0.05, 0.05, 0.0, 0.0)
+        "pfc_elastic_6r", *poles(-60, -60, -250, -350), box=ErrorBox(0.05, 0.05, 0.0, 0.0)
     )
     assert fast.nominal.is_stable
     assert all(case.is_stable for case in fast.cases)
@@ -155,13 +155,13 @@ def test_what_has_no_slope_is_taken_off():
 
 
 def test_the_box():
-    singles = list(single_errors(Box(0.05, 0.1, 0.0, 0.2), elastic=True))
+    singles = list(single_errors(ErrorBox(0.05, 0.1, 0.0, 0.2), elastic=True))
     assert [key for key, _ in singles] == ["mass"] * 2 + ["stiffness"] * 2 + ["tool_mass"] * 2
     assert str(singles[0][1]) == "masses believed 5 % too low"
     assert str(singles[5][1]) == "tool believed 0.2 kg too heavy"
-    assert len(list(corners(Box(), elastic=True))) == 8
-    assert len(list(corners(Box(), elastic=False))) == 4
-    assert list(corners(Box(0.05, 0.0, 0.0, 0.0), elastic=True)) == []
+    assert len(list(corners(ErrorBox(), elastic=True))) == 8
+    assert len(list(corners(ErrorBox(), elastic=False))) == 4
+    assert list(corners(ErrorBox(0.05, 0.0, 0.0, 0.0), elastic=True)) == []
     settings = settings_of("pfc_elastic_3r", "model_error.mass=0.9")
     wrong = Error((("mass", 0.1), ("tool_mass", -0.1))).applied_to(settings)
     assert wrong.model_error.mass == pytest.approx([0.99])
@@ -172,7 +172,7 @@ def test_the_box():
 @pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"stiffness": 1.0}, {"tool_mass": -1.0}])
 def test_refused_boxes(wrong):
     with pytest.raises(InputError, match="--"):
-        Box(**wrong)
+        ErrorBox(**wrong)
 
 
 @pytest.mark.slow
