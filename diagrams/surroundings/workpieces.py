@@ -27,7 +27,7 @@ from pfsc_drake.geometry.surfaces.point import surface_axes
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.geometry.sweep import surface_mesh, swept_surface
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
-from pfsc_drake.systems.drawing.robot_visualizer import Surface as Triangles
+from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart
 
 _SPACING = 4e-3  # m, between cross-sections
