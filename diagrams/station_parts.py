@@ -139,9 +139,11 @@ def add_robot(
     source, controller = belief_source(scenario, folder), scenario.controller
     if not is_delta(scenario.robot.model):
         return add_arm(builder, source, workpiece)
-    _check_delta(scenario)
     step = free_step(controller.sampling_time, scenario.simulation.max_step)
-    return add_delta(builder, source, step, workpiece)
+    part = add_delta(builder, source, step, workpiece)
+    # what cannot be read is said before what it could not do
+    _check_delta(scenario)
+    return part
 
 
 def belief_source(scenario: Scenario, folder: FilePath) -> BeliefSource:
