@@ -76,10 +76,10 @@ def first_instant(
 
     Args:
         log: The log.
-        blocks: Of the diagram.
+        blocks: Blocks of the diagram.
         root: Context of the diagram, in which the fault holds.
         signal: Logged signal with the fault.
-        column: Of the signal, where the fault is.
+        column: Column of the signal, where the fault is.
     """
     times, raw = log.read(root)
     faults = np.flatnonzero(raw[signal][:, column])

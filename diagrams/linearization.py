@@ -31,8 +31,8 @@ class RestSlope:
     """Derivative of what is no block, from right after a tick to right after the next.
 
     Attributes:
-        of_inputs: Of what it gives the blocks at that tick, by its variables and by what the
-            blocks put out.
+        of_inputs: Slope of what the plant gives the blocks at that tick, by its variables and by
+            what the blocks put out.
         of_own: The same of its variables.
         given: What it gives each system of blocks at that tick, by input.
     """

@@ -27,7 +27,7 @@ class LiveFrame:
     """What there is to see of a station at an instant.
 
     Attributes:
-        positions: Of the plant that is drawn, shape (nq,).
+        positions: Positions of the plant that is drawn, shape (nq,).
         tool_pose: ``[y_t, R_e]``, shape (12,).
         manifold_point: The manifold next to the tool, shape (layout.size,).
         force: On the tool point, world axes [N], shape (3,).

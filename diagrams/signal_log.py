@@ -43,7 +43,7 @@ class SignalLog:
         """Return the signals as they are, logged or not.
 
         Args:
-            blocks: Of the diagram.
+            blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
         row = blocks.output(root, f"{_SIGNALS}.all")

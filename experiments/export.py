@@ -79,7 +79,7 @@ def record(
         station: The station, block by block.
         part: Its controller.
         how: How it is simulated.
-        duration: Of the run [s].
+        duration: Duration of the run [s].
 
     Returns:
         Of each tick, in the order of ``interface.json``, shape (ticks, inputs and outputs).

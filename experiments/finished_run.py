@@ -81,7 +81,7 @@ class FinishedRun:
 
     Attributes:
         prepared: What was simulated.
-        name: Of its scenario.
+        name: Name of its scenario.
         result: What came of it.
         analysis: What the loop bears at the start, if somebody asked.
         attributes: What else to note in the log.

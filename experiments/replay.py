@@ -36,7 +36,7 @@ class Replay:
     """What the controller in C made of a recorded run.
 
     Attributes:
-        ticks: Of the run.
+        ticks: Ticks of the run.
         differing: How many of them have an output that is not the same to the last bit.
         median, p99, worst: Times of a step, in a row [us].
         text: What was printed.
@@ -57,7 +57,7 @@ class Commands:
     Attributes:
         port: Name of what the drives are told.
         unit: Its unit.
-        times: Of the ticks [s], shape (ticks,).
+        times: Times of the ticks [s], shape (ticks,).
         told: What the drives are told, shape (ticks, N).
         fault: The first fault, 0 for none.
         fault_time: When it came [s].

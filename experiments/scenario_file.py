@@ -183,9 +183,9 @@ def apply_override(data: dict[str, Any], override: str, option: str = "--set") -
     """Sets one ``key.path=value`` in place, see :func:`load_scenario_data`.
 
     Args:
-        data: Of a scenario.
+        data: Data of a scenario.
         override: What to set.
-        option: Of the command line, for messages.
+        option: Option of the command line, for messages.
 
     Raises:
         InputError: If the override is malformed, or goes through what is no mapping or list.

@@ -34,7 +34,7 @@ def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
     Args:
         key: Key of the step.
         step: The step [s].
-        sampling_time: Of the controller [s].
+        sampling_time: Sampling time of the controller [s].
 
     Returns:
         How many times it fits.

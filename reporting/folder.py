@@ -33,7 +33,7 @@ class ResultsFolder:
         """Take over a folder.
 
         Args:
-            path: Of the folder.
+            path: Path of the folder.
             kind: Kind of results, e.g. ``run``.
             handle: Descriptor of the open folder.
             files: Names of the results that are in it already.
@@ -57,7 +57,7 @@ class ResultsFolder:
 
         Args:
             name: See :mod:`reporting.provenance`: a result's, or ``figures/NAME.png``.
-            content: Of the file; text becomes UTF-8.
+            content: Content of the file; text becomes UTF-8.
 
         Returns:
             The file; None if it could not be written anywhere.
@@ -113,7 +113,7 @@ def open_results(
     are resumed.
 
     Args:
-        path: Of the folder.
+        path: Path of the folder.
         kind: Kind of results, e.g. ``run``.
         inputs: Files that the results are made from.
         resume: Whether earlier results stay until others replace them.
@@ -151,12 +151,12 @@ def check_folder(path: Path, kind: str, inputs: Sequence[Path] = ()) -> None:
     """Refuse a folder that results must not be written into; changes nothing.
 
     Args:
-        path: Of the folder, which may be missing.
+        path: Path of the folder, which may be missing.
         kind: Kind of results.
         inputs: Files that the results are made from.
 
     Raises:
-        InputError: See :func:`open_results`.
+        InputError: If the folder is in use, or holds something else than results.
     """
     with _naming(path):
         exists = _exists(path)

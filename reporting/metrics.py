@@ -83,8 +83,8 @@ class Metrics(UserDict[str, Metric]):
             name: Its name.
             value: In ``unit``.
             unit: SI unit; by default that of the registry, as is the source then.
-            target: See :class:`Metric`.
-            source: See :class:`Metric`.
+            target: Largest value that is wanted; None without one.
+            source: Where the target comes from.
         """
         if unit is None:
             known = known_metric(name)
@@ -98,7 +98,7 @@ class Metrics(UserDict[str, Metric]):
 
         Args:
             name: Name of the metric.
-            target: See :class:`Metric`.
+            target: Largest value that is wanted; None without one.
             source: Where the target comes from; None keeps the metric's source.
 
         Raises:

@@ -120,7 +120,7 @@ class SideBySide(Protocol):
         """Yield results in the order in which they are ready.
 
         Args:
-            function: Of a module, to be called with ``common`` and each task.
+            function: Function of a module, to be called with ``common`` and each task.
             common: Sent with each of them.
             tasks: What to do.
         """

@@ -69,7 +69,7 @@ class Figure:
     """A figure as a picture.
 
     Attributes:
-        name: Of its file, without suffix.
+        name: Name of its file, without suffix.
         title: A few words.
         caption: What to see in it, one or two sentences.
         png: The picture.
@@ -86,7 +86,7 @@ class Drawing:
     """A figure as drawn.
 
     Attributes:
-        name: Of its file, without suffix.
+        name: Name of its file, without suffix.
         title: A few words.
         caption: What to see in it, one or two sentences.
         canvas: The drawing.
@@ -158,7 +158,7 @@ def shade(
         time: [samples] s.
         where: [samples] bool.
         label: What holds.
-        colour: Of the shade.
+        colour: Colour of the shade.
         hatch: Pattern, where colour alone could be mistaken.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(where, dtype=int), [0]])))
@@ -206,7 +206,7 @@ def is_dwarfed(time: FloatArray, values: FloatArray, ratio: float = 1.2) -> bool
     Args:
         time: [samples] s.
         values: [samples, dim] in any unit.
-        ratio: Of the largest magnitudes, from which on it counts.
+        ratio: Ratio of the largest magnitudes, from which on it counts.
     """
     return 0.0 < ratio * largest(values[late_samples(time)]) < largest(values)
 

@@ -76,7 +76,7 @@ class RecordedMotion:
         distance: What the colour of the tool's way tells; of one colour without.
         tool_force: What acts on the tool point, world axes [N], shape (frames, 3).
         trail: Where the tool's way is drawn [m], shape (frames, 3), if not where it is.
-        region_clock: Of regions that move [s], shape (frames,).
+        region_clock: Region clock of regions that move [s], shape (frames,).
         plates: ``[p, R by rows]`` of K plates, shape (frames, 12 K).
     """
 
@@ -294,7 +294,7 @@ def camera_and_target(points: np.ndarray, bodies: np.ndarray) -> tuple[np.ndarra
     It looks from the side of the path, which is then to the right of the robot.
 
     Args:
-        points: Of the path [m], shape (k, 3).
+        points: Points of the path [m], shape (k, 3).
         bodies: Origins of the robot's bodies [m], shape (bodies, 3), the base first.
     """
     seen = np.vstack([points, bodies])

@@ -81,21 +81,24 @@ class Arm(RobotPart):
 
     @property
     def gravity(self) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Gravitational acceleration in the world [m/s^2], shape (3,)."""
         return self.robot.gravity
 
     @property
     def drives(self) -> Drives:
-        """See :class:`RobotPart`."""
+        """What friction acts on."""
         return Drives(self.robot.D_M, step=self.model.time_step() or None)
 
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Return joint coordinates that put the tool where it starts, shape (N,)."""
         self.check_reach(target.y_t, "start")
         return start_posture(start.posture_deg, self.robot, target)
 
     def check_reach(self, position: np.ndarray, where: str) -> None:
-        """See :class:`RobotPart`; what is out of reach for other reasons has to be tried."""
+        """Refuse a position on the way that the robot is known not to reach.
+
+        What is out of reach for other reasons has to be tried.
+        """
         base, reach = self.robot.links[0].p_PF, self.robot.reach
         distance = float(np.linalg.norm(position - base))
         if distance > reach + _ROUNDING:
@@ -108,18 +111,18 @@ class Arm(RobotPart):
     def start_warnings(
         self, start: StartParameters, q_J: np.ndarray, target: ToolTarget
     ) -> list[str]:
-        """See :class:`RobotPart`."""
+        """Return what there is to say about the robot and its start, one sentence each."""
         found = posture_warnings(start.posture_deg, self.robot, q_J, target)
         return self.true.warnings + found + tilt_warnings(self.robot, q_J, target)
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Return the state of the model at rest, elastic joints carrying the links' weight."""
         return state_at_rest(self.robot, self.coordinates, q_J)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
-        """See :class:`RobotPart`."""
+        """Let a wrench act at the tool point, world axes, shape (6,)."""
         self._apply(
             builder, [add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)]
         )
@@ -154,13 +157,13 @@ class Arm(RobotPart):
         """
 
     def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
-        """See :class:`RobotPart`."""
+        """Refuse what no controller could believe of this robot; nothing is built."""
         belief, model = believe_arm(self.true, source)
         if sensor_joint is not None:
             belief.tool_load(model.tool_load(sensor_joint))
 
     def believed_load(self, joint: str) -> ToolLoad:
-        """See :class:`RobotPart`."""
+        """Return what is believed to be behind a sensor."""
         return self.belief.tool_load(self.believed.tool_load(joint))
 
 
@@ -176,32 +179,32 @@ class MultibodyArm(Arm):
 
     @property
     def plant(self) -> MultibodyPlant:
-        """See :class:`RobotPart`."""
+        """The system in the diagram that moves."""
         return self.model
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`RobotPart`."""
+        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return joint_state_of(builder, self.model.get_state_output_port(), self.coordinates)
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let drive torques ``tau_d`` act, shape (N,)."""
         connect_actuation(builder, self.model, self.coordinates, torque)
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
         rows = self.coordinates.motor_rows[self.robot.dimension :]
         connect_resistance(builder, self.model, rows, resistance)
 
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        """See :class:`Arm`."""
+        """Let everything from outside act."""
         connect_push(builder, self.model, forces)
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`RobotPart`."""
+        """Put the plant into a state of its model, ``[q, v]``."""
         self.model.SetPositionsAndVelocities(context, state)
 
     def hang(self, context: Context, joint: str, mass: float) -> None:
-        """See :class:`RobotPart`."""
+        """Let more hang below a force sensor than is believed, where the load's centre is."""
         mount, load = self.true.sensor_joint(joint), self.true.tool_load(joint)
         body = mount.child_body()
         p_BC = mount.frame_on_child().GetFixedPoseInBodyFrame() @ load.p_SC
@@ -210,7 +213,7 @@ class MultibodyArm(Arm):
         body.SetSpatialInertiaInBodyFrame(context, M_B)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """See :class:`RobotPart`."""
+        """Return where a force/torque sensor sits."""
         return SensorMount(
             self.true.tool_load(joint),
             self.believed_load(joint),
@@ -231,31 +234,31 @@ class CoupledArm(Arm):
 
     @property
     def plant(self) -> FullElasticPlant:
-        """See :class:`RobotPart`."""
+        """The system in the diagram that moves."""
         return self.full
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`RobotPart`."""
+        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return self.full.GetOutputPort("joint_state")
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let drive torques ``tau_d`` act, shape (N,)."""
         builder.Connect(torque, self.full.GetInputPort("drive_torque"))
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
         builder.Connect(resistance, self.full.GetInputPort("resistance"))
 
     def _apply(self, builder: DiagramBuilder, forces: Sequence[LeafSystem]) -> None:
-        """See :class:`Arm`."""
+        """Let everything from outside act."""
         connect_torques(builder, self.full.GetInputPort("external_torque"), forces)
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`RobotPart`."""
+        """Put the plant into a state of its model, ``[q, v]``."""
         self.full.set_joint_state(context, self.coordinates.rows @ state)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """See :class:`RobotPart`."""
+        """Return where a force/torque sensor sits."""
         load = self.true.tool_load(joint)
         acceleration = self.full.GetOutputPort("link_acceleration")
         reaction = add_tool_reaction(builder, self.robot, load, acceleration, ports)

@@ -66,7 +66,10 @@ class DeltaPart(RobotPart):
     belief: Belief
 
     def check_belief(self, source: BeliefSource, sensor_joint: str | None) -> None:
-        """See :class:`RobotPart`; no load of the sensor is too light."""
+        """Refuse what no controller could believe of this robot.
+
+        Nothing is built; no load of the sensor is too light.
+        """
         del sensor_joint
         _believe(self.robot, source)
 
@@ -78,7 +81,7 @@ class DeltaPart(RobotPart):
 
     @property
     def gravity(self) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Gravitational acceleration in the world [m/s^2], shape (3,)."""
         return self.robot.gravity
 
     def _drives(self, step: float | None) -> Drives:
@@ -88,7 +91,7 @@ class DeltaPart(RobotPart):
         return Drives(inertia, (friction.coulomb, friction.viscous), step)
 
     def believed_load(self, joint: str) -> ToolLoad:
-        """See :class:`RobotPart`."""
+        """Return what is believed to be behind a sensor."""
         return self.belief.tool_load(self._load(joint))
 
     @abstractmethod
@@ -96,15 +99,15 @@ class DeltaPart(RobotPart):
         """Return what is behind a sensor."""
 
     def posture(self, target: ToolTarget, start: StartParameters) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Return joint coordinates that put the tool where it starts, shape (N,)."""
         return self.robot.joint_coordinates(target.y_t, "start")
 
     def state_at_rest(self, q_J: np.ndarray) -> np.ndarray:
-        """See :class:`RobotPart`."""
+        """Return the state of the model at rest, elastic joints carrying the links' weight."""
         return np.concatenate([q_J, np.zeros(self.robot.dimension)])
 
     def check_reach(self, position: np.ndarray, where: str) -> None:
-        """See :class:`RobotPart`."""
+        """Refuse a position on the way that the robot is known not to reach."""
         self.robot.joint_coordinates(position, where)
 
 
@@ -120,24 +123,24 @@ class AnalyticDelta(DeltaPart):
 
     @property
     def plant(self) -> DeltaPlant:
-        """See :class:`RobotPart`."""
+        """The system in the diagram that moves."""
         return self.analytic
 
     @property
     def drives(self) -> Drives:
-        """See :class:`RobotPart`."""
+        """What friction acts on."""
         return self._drives(None)
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`RobotPart`."""
+        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         return joint_state_of(builder, self.analytic.GetOutputPort("state"), self.coordinates)
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let drive torques ``tau_d`` act, shape (N,)."""
         builder.Connect(torque, self.analytic.GetInputPort("actuation"))
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
         builder.Connect(resistance, self.analytic.GetInputPort("resistance"))
 
     def connect_wrench(
@@ -155,13 +158,13 @@ class AnalyticDelta(DeltaPart):
         return SensorMount(load, self.believed_load(joint), reaction)
 
     def _load(self, joint: str) -> ToolLoad:
-        """See :class:`DeltaPart`; a point mass in E."""
+        """Return what is behind a sensor; a point mass in E."""
         _require_joint(joint)
         mass, gravity = self.robot.parameters.masses.load, self.robot.gravity
         return ToolLoad(mass, np.zeros(3), np.zeros((3, 3)), np.eye(3), np.zeros(3), gravity)
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`RobotPart`."""
+        """Put the plant into a state of its model, ``[q, v]``."""
         self.analytic.set_state(context, *np.split(state, 2))
 
 
@@ -186,39 +189,39 @@ class ConstrainedDelta(DeltaPart):
 
     @property
     def plant(self) -> MultibodyPlant:
-        """See :class:`RobotPart`."""
+        """The system in the diagram that moves."""
         return self.multibody
 
     @property
     def drives(self) -> Drives:
-        """See :class:`RobotPart`."""
+        """What friction acts on."""
         return self._drives(self.multibody.time_step())
 
     def joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        """See :class:`RobotPart`."""
+        """Return the true ``[q_J, v_J, q_M, v_M]``, shape (4N,)."""
         rows = slide_state_rows(self.multibody, self.model)
         slides = builder.AddNamedSystem("slides", MatrixGain(rows))
         builder.Connect(self.multibody.get_state_output_port(), slides.get_input_port())
         return joint_state_of(builder, slides.get_output_port(), self.coordinates)
 
     def connect_drives(self, builder: DiagramBuilder, torque: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let drive torques ``tau_d`` act, shape (N,)."""
         connect_actuation(builder, self.multibody, self.coordinates, torque)
 
     def connect_resistance(self, builder: DiagramBuilder, resistance: OutputPort) -> None:
-        """See :class:`RobotPart`."""
+        """Let the friction torques ``-tau_fM`` act on the motors, shape (N,)."""
         rows = slide_state_rows(self.multibody, self.model)[self.robot.dimension :]
         connect_resistance(builder, self.multibody, rows, resistance)
 
     def connect_wrench(
         self, builder: DiagramBuilder, wrench: OutputPort, joint_state: OutputPort
     ) -> None:
-        """See :class:`RobotPart`."""
+        """Let a wrench act at the tool point, world axes, shape (6,)."""
         push = add_external_wrench(builder, self.tool, self.robot, wrench, joint_state)
         connect_push(builder, self.multibody, [push])
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
-        """See :class:`RobotPart`."""
+        """Return where a force/torque sensor sits."""
         load, plant = self._load(joint), self.multibody
         return SensorMount(
             load,
@@ -228,13 +231,13 @@ class ConstrainedDelta(DeltaPart):
         )
 
     def _load(self, joint: str) -> ToolLoad:
-        """See :class:`DeltaPart`."""
+        """Return what is behind a sensor."""
         _require_joint(joint)
         mount = self.multibody.GetJointByName(SENSOR_JOINT)
         return tool_load_from_plant(self.multibody, mount, self.tool)
 
     def place(self, context: Context, state: np.ndarray) -> None:
-        """See :class:`RobotPart`."""
+        """Put the plant into a state of its model, ``[q, v]``."""
         set_delta_positions(self.multibody, context, self.model, *np.split(state, 2))
 
 
@@ -317,7 +320,7 @@ def _weld_gripper(
         plant: The plant.
         end_effector: Its end-effector.
         robot: The robot.
-        reach: Of the gripper [m]; without one the load is a ball about E.
+        reach: Reach of the gripper [m]; without one the load is a ball about E.
         radius: Size of the load [m].
     """
     middle = -0.5 * reach * upwards(robot.gravity, "robot") if reach else np.zeros(3)

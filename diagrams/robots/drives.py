@@ -90,7 +90,7 @@ def add_drives(
     Args:
         builder: Builder of the diagram.
         part: The robot.
-        servos: Of a law that commands velocities; None where it commands torques.
+        servos: Servos of a law that commands velocities; None where it commands torques.
         period: Sampling time of the controller [s].
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
         initial_state: State of the plant at the start, for which servos are designed.

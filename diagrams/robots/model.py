@@ -36,7 +36,7 @@ def read_robot(
     Args:
         parameters: Which robot.
         folder: Where relative file names start.
-        time_step: Of the plant [s]; 0 for a continuous one.
+        time_step: Time step of the plant [s]; 0 for a continuous one.
         before_finalizing: What else is to be added to the plant.
 
     Returns:

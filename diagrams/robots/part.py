@@ -45,7 +45,7 @@ class SensorMount:
         believed_load: The same as the controller believes it to be.
         reaction: Reaction ``[torque, force]`` on the tool, shape (6,), or abstract, all
             reactions of a plant.
-        index: Of the sensor's joint in the plant's reactions, or None.
+        index: Index of the sensor's joint in the plant's reactions, or None.
     """
 
     load: ToolLoad
@@ -130,15 +130,15 @@ class RobotPart(ABC):
             joint: Fixed joint of the model with the sensor in it; empty for that at the flange.
 
         Raises:
-            InputError: See :meth:`sensor_mount`.
+            InputError: If the model has no such joint, or no tool behind it.
         """
 
     def hang(self, context: Context, joint: str, mass: float) -> None:
         """Let more hang below a force sensor than is believed, where the load's centre is.
 
         Args:
-            context: Of the plant.
-            joint: See :meth:`believed_load`.
+            context: Context of the plant.
+            joint: Fixed joint of the model with the sensor in it; empty for that at the flange.
             mass: [kg].
 
         Raises:
@@ -196,7 +196,7 @@ class RobotPart(ABC):
         """Refuse a position on the way that the robot is known not to reach.
 
         Args:
-            position: Of the tool point [m], shape (3,).
+            position: Position of the tool point [m], shape (3,).
             where: For the message.
 
         Raises:

@@ -105,7 +105,7 @@ def connect_torques(builder: DiagramBuilder, port: InputPort, pushes: Sequence[L
 
     Args:
         builder: Builder of the diagram.
-        port: Of the plant, for external torques, shape (N,).
+        port: Port of the plant, for external torques, shape (N,).
         pushes: One system or more with the port ``tau_ext``.
     """
     torques = [push.GetOutputPort("tau_ext") for push in pushes]
@@ -130,7 +130,7 @@ def add_tool_reaction(
         builder: Builder of the diagram.
         robot: The robot.
         load: Everything behind the sensor.
-        acceleration: Of the links, shape (N,).
+        acceleration: Acceleration of the links, shape (N,).
         ports: ``true_joint_state`` ``[q_J, v_J, q_M, v_M]``, shape (4N,), and ``wrench_ext`` on
             the tool point, world axes, shape (6,), if anything acts there.
     """

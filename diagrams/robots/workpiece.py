@@ -82,7 +82,7 @@ class Workpiece(ABC):
             gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
 
         Raises:
-            InputError: See :meth:`add`.
+            InputError: If it is not known where up is.
         """
 
     @abstractmethod
@@ -94,7 +94,7 @@ class Workpiece(ABC):
         Args:
             y_t: Motion of the tool point [m], shape (samples, 3).
             initial_place: Place on the manifold near the first sample.
-            gravity: See :meth:`start_shift`.
+            gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         """
 
     @abstractmethod
@@ -102,7 +102,7 @@ class Workpiece(ABC):
         """Return how it is drawn.
 
         Args:
-            gravity: See :meth:`start_shift`.
+            gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         """
 
     @abstractmethod

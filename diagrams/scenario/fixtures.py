@@ -108,7 +108,7 @@ class Swinging:
 
     @property
     def extent(self) -> float:
-        """See :class:`Visiting`."""
+        """Largest distance from where the scenario shows the region [m], or [deg]."""
         return self.amplitude
 
 
@@ -173,7 +173,8 @@ class RegionParameters:
             the normal, or ``below`` of a plane, a fitted surface and open profiles; empty for
             ``outside``, or ``above``.
         motion: ``!Shift`` or ``!Turn``; null for a region at rest.
-        stiffness: Of a soft region, that pushes back by so much [N/m]; null for a hard one.
+        stiffness: Stiffness of a soft region, that pushes back by so much [N/m]; null for a hard
+            one.
     """
 
     shape: RegionShape = dc.field(default_factory=Plane)
@@ -224,7 +225,8 @@ class FixtureParameters(FixtureOptions):
     Attributes:
         regions: Where the tool may not go.
         orientation: That the tool keeps.
-        start_inside: Of a region that the tool starts in: ``refuse``, or ``move_out`` slowly.
+        start_inside: Start inside of a region that the tool starts in: ``refuse``, or ``move_out``
+            slowly.
         servo_lag: ``tau`` [s] of the velocity servos as it is believed; negative for the inverse
             of ``servo.bandwidth``.
         bound: How deep the tool may be in a hard region [m]; a run in which it was deeper says so
@@ -249,7 +251,7 @@ class FixtureParameters(FixtureOptions):
         """Return ``tau`` [s] of the servos as it is believed.
 
         Args:
-            bandwidth: Of the servos as the scenario has it [rad/s].
+            bandwidth: Bandwidth of the servos as the scenario has it [rad/s].
         """
         return self.servo_lag if self.servo_lag >= 0.0 else 1.0 / bandwidth
 

@@ -29,7 +29,7 @@ class RandomModelError:
         seed: Another one draws other errors; the draws of a kind depend on nothing else.
         mass: Relative.
         inertia: Relative.
-        center: Of each link's centre of mass along every axis [m].
+        center: Error of each link's centre of mass along every axis [m].
         rotor_inertia: Relative.
         stiffness: Relative.
         friction: Relative, Coulomb and viscous apart.

@@ -46,9 +46,9 @@ class ReferenceParameters:
 
     Attributes:
         points: Arc lengths to visit [m], at most 1e6; the first is the start.
-        places: Of a surface, instead: pairs of tangential coordinates to visit [m], along straight
-            lines of these coordinates.
-        second: Of a surface, with points for its first coordinate: the motion of the second.
+        places: Places of a surface, instead: pairs of tangential coordinates to visit [m], along
+            straight lines of these coordinates.
+        second: Second of a surface, with points for its first coordinate: the motion of the second.
         velocity: Largest velocity, 1e-6 to 1e3 [m/s].
         acceleration: Largest acceleration, 1e-6 to 1e6 [m/s^2].
         dwell: Rest before, between and after the moves, 0 or 1e-6 to 1e6 [s].
@@ -103,8 +103,8 @@ class StartParameters:
     Attributes:
         offset: Transversal coordinates [m] beside the first point of the reference; of a surface
             the first is the distance along its normal.
-        theta: Of a surface: its parameters where the tool starts; empty for its middle.
-        position: Of a surface, instead: the tool point [m].
+        theta: Parameters of a surface: its parameters where the tool starts; empty for its middle.
+        position: Position of a surface, instead: the tool point [m].
         rotation_deg: ZYX angles [deg] away from the path's orientation.
         posture_deg: Joint angles [deg] near the start pose (m for prismatic joints); they
             choose the branch of the inverse kinematics.

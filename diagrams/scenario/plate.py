@@ -32,7 +32,7 @@ class PinParameters:
     """Pins of the plate, cylinders with round tips.
 
     Attributes:
-        positions: Of their axes in the plate's frame [m], one ``[x, y]`` each.
+        positions: Positions of their axes in the plate's frame [m], one ``[x, y]`` each.
         radius: [m].
         length: From the plate's underside to the tip [m], more than the radius.
     """
@@ -120,7 +120,7 @@ class FrameParameters(CarrierParameters):
         clearance: Diameter of the bores less that of the pins [m].
         ring: Radius around the axis of a bore within which there is material for a pin to touch
             [m].
-        depth: Of the bores [m].
+        depth: Depth of the bores [m].
         wedges: Number of convex pieces that a bore is made of, see :func:`bore_wedges`.
     """
 
@@ -146,10 +146,11 @@ class PlateContactParameters:
     """What happens where plate, magazine and frame touch.
 
     Attributes:
-        stiffness: Of point contact [N/m].
-        dissipation: Of Hunt and Crossley [s/m].
+        stiffness: Stiffness of point contact [N/m].
+        dissipation: Dissipation of Hunt and Crossley [s/m].
         friction: Coulomb coefficient.
-        time_step: Of the plates' plant, a whole fraction of the controller's sampling time [s].
+        time_step: Time step of the plates' plant, a whole fraction of the controller's sampling
+            time [s].
     """
 
     stiffness: float = 1e6

@@ -62,8 +62,8 @@ class ElasticParameters:
     Attributes:
         stiffness: ``K_s`` [Nm/rad or N/m]; ``.inf`` for joints that stay rigid.
         damping: ``K_d`` [Nm s/rad or N s/m]; none by default.
-        rotor_inertia: Of the drives, at the motor side [kg m^2], for rigid joints too; by
-            default the model's.
+        rotor_inertia: Rotor inertia of the drives, at the motor side [kg m^2], for rigid joints
+            too; by default the model's.
         gear_ratio: Motor revolutions per joint revolution; by default the model's.
     """
 
@@ -105,9 +105,10 @@ class RobotParameters:
             where the rotors of its drives sit. The robot then obeys the full elastic model
             (2.64), with the inertia coupling of spinning rotors and moving links that the
             laws neglect; empty for the simplified model (2.65).
-        plant: Of a DELTA robot: ``multibody`` for bodies that rods tie together, (2.71), discrete
-            with ``simulation.max_step`` or less where they touch nothing; ``analytic`` for (2.72)
-            in continuous time, without contact, whose error is that of the integration alone.
+        plant: Plant of a DELTA robot: ``multibody`` for bodies that rods tie together, (2.71),
+            discrete with ``simulation.max_step`` or less where they touch nothing; ``analytic`` for
+            (2.72) in continuous time, without contact, whose error is that of the integration
+            alone.
     """
 
     model: str = dc.field(default="comau_racer_1_4", metadata=NAME_OR_FILE)
@@ -226,10 +227,10 @@ class SensorParameters:
         bias: Reading without load, shape (6,).
         noise: Standard deviation of one sample, shape (6,). A sensor that has some and repeats
             itself to the last bit is lost; 0 where its steps are larger than that.
-        bandwidth: Of the sensor's filter, and of the tool compensation's [Hz].
+        bandwidth: Bandwidth of the sensor's filter, and of the tool compensation's [Hz].
         delay: Until the controller has what is measured [s], a multiple of its sampling time,
             shorter than taring and than what a sensor may stand still.
-        seed: Of the noise.
+        seed: Seed of the noise.
         inertia: ``differentiated`` or ``none``: whether the tool's inertia is taken off.
         unknown_mass: What may hang below the sensor beside what is believed [kg]: for what is
             said before a run alone, see

@@ -24,7 +24,7 @@ class SensorFailureParameters:
         component: Index in ``[q_J, v_J, q_M, v_M]``.
         kind: ``nan``: it is no number any more; ``frozen``: it rests at its last value;
             ``jump``: it is off by ``size``.
-        size: Of the jump [rad, rad/s, m or m/s].
+        size: Size of the jump [rad, rad/s, m or m/s].
         whole_joint: Whether everything fails that is measured of the component's joint, on
             both sides.
     """

@@ -46,7 +46,7 @@ class Fitted(Placed):
     Attributes:
         file: CSV file with columns ``x, y, z``, or vertices of an STL, OBJ or PLY file; relative
             to the scenario's folder.
-        unit: Of its numbers: ``m``, ``cm``, ``mm``, ``inch``.
+        unit: Unit of its numbers: ``m``, ``cm``, ``mm``, ``inch``.
         grid: ``[rows, columns]`` of points that are given row by row, theta_1 leading from row
             to row; empty for scattered points.
         closed: Whether a grid closes from its last row, or column, to the first.
@@ -147,8 +147,8 @@ class Extruded(Placed):
     Attributes:
         file: CSV file with columns ``x, y, z`` [m], points of the profile in order, which theta_1
             runs along; relative to the scenario's folder.
-        direction: Of the line, in the file's axes, of any length.
-        length: Of the line [m].
+        direction: Direction of the line, in the file's axes, of any length.
+        length: Length of the line [m].
         closed: Whether the profile closes from the last point to the first.
         smoothness: Class C^k of the spline through it; 0 chooses what the law needs.
     """

@@ -106,7 +106,7 @@ class Paraboloid(OverRectangle):
     """A paraboloid of revolution (4.53), (4.54) about its third axis, as a graph.
 
     Attributes:
-        coefficient: Of ``theta_1^2 + theta_2^2`` in its height [1/m].
+        coefficient: Coefficient of ``theta_1^2 + theta_2^2`` in its height [1/m].
     """
 
     coefficient: float = 1.0

@@ -19,7 +19,7 @@ class SoftBall:
     Attributes:
         radius: Radius, 1e-4 to 10 [m].
         modulus: Elasticity of the shell, pressure per relative depth [Pa].
-        dissipation: Of Hunt and Crossley [s/m].
+        dissipation: Dissipation of Hunt and Crossley [s/m].
         friction: Coulomb coefficient between ball and workpiece.
         resolution: Edge length of the mesh that contact is computed with, 1e-4 m or more.
     """
@@ -111,11 +111,12 @@ class NotchParameters:
 
     Attributes:
         ball: The ball.
-        displacement: Of the workpiece since then [m], world axes (z_0 down for DELTA robots).
-        radius: Of the bottom [m], more than the ball's.
+        displacement: Displacement of the workpiece since then [m], world axes (z_0 down for DELTA
+            robots).
+        radius: Radius of the bottom [m], more than the ball's.
         depth: From the rim down to the bottom [m], not less than ``radius``.
-        width: Of the workpiece across the notch [m].
-        time_step: Of the plant, a whole fraction of the controller's sampling time [s].
+        width: Width of the workpiece across the notch [m].
+        time_step: Time step of the plant, a whole fraction of the controller's sampling time [s].
     """
 
     ball: BallParameters = dc.field(default_factory=BallParameters)
@@ -154,10 +155,10 @@ class WorkpieceParameters:
 
     Attributes:
         ball: The ball, whose centre is its radius behind the tool point.
-        shift: Of the workpiece since it was taught [m], world axes.
+        shift: Shift of the workpiece since it was taught [m], world axes.
         turn_zyx_deg: How it turned about the middle of the surface since then [deg].
         spacing: Between the vertices of its mesh [m].
-        time_step: Of the plant, a whole fraction of the controller's sampling time [s].
+        time_step: Time step of the plant, a whole fraction of the controller's sampling time [s].
     """
 
     ball: SoftBall = dc.field(default_factory=SoftBall)

@@ -182,7 +182,7 @@ def _sum(
 
     Args:
         builder: Builder of the diagram.
-        name: Of the system.
+        name: Name of the system.
         sources: The wrenches, each (6,).
         period: Sampling time [s].
     """

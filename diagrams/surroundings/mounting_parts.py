@@ -71,7 +71,7 @@ def connect_hand(
     Args:
         builder: Builder of the diagram.
         robot: The robot.
-        task: See :func:`add_hand`.
+        task: Task whose coordinates the hand may be told in.
         parameters: The hand.
         period: Sampling time [s].
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.
@@ -79,7 +79,8 @@ def connect_hand(
             of the manifold are.
 
     Raises:
-        InputError: See :func:`add_hand`.
+        InputError: If a target is off the path, or the reaction delay no multiple of the
+            sampling time.
     """
     if parameters.frame == "manifold":
         for i, place in enumerate(parameters.places()[1]):
@@ -112,7 +113,7 @@ def add_mounting(
         mounting: Where the plates come from and go.
         part: The robot.
         task: What it is to do.
-        hand: Of an operator who mounts them, if one does.
+        hand: Hand of an operator who mounts them, if one does.
         period: Sampling time [s].
         start: Where its tool starts.
         joint_state: The true ``[q_J, v_J, q_M, v_M]``.

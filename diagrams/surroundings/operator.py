@@ -92,7 +92,7 @@ class Operator:
     Attributes:
         panel: What looks at them.
         regions: Names of what can be switched on and off.
-        hand: Of the person.
+        hand: Hand of the person.
     """
 
     panel: OperatorPanel

@@ -48,21 +48,24 @@ class NotchedWorkpiece(Workpiece):
 
     @property
     def time_step(self) -> float:
-        """See :class:`Workpiece`."""
+        """Step of the plant with contact [s]."""
         return self.parameters.time_step
 
     @property
     def reach(self) -> float:
-        """See :class:`Workpiece`."""
+        """Distance of what touches from the tool point [m]."""
         return self.parameters.ball.distance
 
     @property
     def radius(self) -> float:
-        """See :class:`Workpiece`."""
+        """Its size [m]."""
         return self.parameters.ball.radius
 
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """See :class:`Workpiece`; a tool with a ball below it has the axes of the world."""
+        """Fix the workpiece to the world, and what touches it to the tool.
+
+        A tool with a ball below it has the axes of the world.
+        """
         ball, up = self.parameters.ball, upwards(plant.gravity_field().gravity_vector(), "notch")
         add_rigid_surface(
             plant, *notch_surface(self._path, self.parameters, up), "notch", ball.friction
@@ -75,7 +78,7 @@ class NotchedWorkpiece(Workpiece):
         return np.array(self.parameters.displacement) + self.parameters.clearance * up
 
     def check_start(self, y_t: np.ndarray) -> None:
-        """See :class:`Workpiece`; :meth:`start_shift` leads out of it."""
+        """Refuse a start inside of the workpiece; :meth:`start_shift` leads out of it."""
 
     def lengths(
         self, y_t: np.ndarray, initial_place: np.ndarray, gravity: np.ndarray
@@ -191,21 +194,21 @@ class PressedWorkpiece(Workpiece):
 
     @property
     def time_step(self) -> float:
-        """See :class:`Workpiece`."""
+        """Step of the plant with contact [s]."""
         return self.parameters.time_step
 
     @property
     def reach(self) -> float:
-        """See :class:`Workpiece`."""
+        """Distance of what touches from the tool point [m]."""
         return 0.0
 
     @property
     def radius(self) -> float:
-        """See :class:`Workpiece`."""
+        """Its size [m]."""
         return self.parameters.ball.radius
 
     def add(self, plant: MultibodyPlant, tool: Frame) -> list[GeometryId]:
-        """See :class:`Workpiece`."""
+        """Fix the workpiece to the world, and what touches it to the tool."""
         ball = self.parameters.ball
         add_rigid_surface(plant, *self.mesh(), "workpiece", ball.friction)
         return [add_soft_ball(plant, tool, ball, self._p_TC)]
@@ -249,7 +252,7 @@ class PressedWorkpiece(Workpiece):
         return self.parameters.ball.stiffness(force)
 
     def check_start(self, y_t: np.ndarray) -> None:
-        """See :class:`Workpiece`; the ball reaches to the tool point."""
+        """Refuse a start inside of the workpiece; the ball reaches to the tool point."""
         height, _, _ = self.touch(y_t)
         if height < 0.0:
             raise InputError(
@@ -270,7 +273,7 @@ class PressedWorkpiece(Workpiece):
         return {}
 
     def look(self, gravity: np.ndarray) -> WorkpieceLook:
-        """See :class:`Workpiece`."""
+        """Return how it is drawn."""
         del gravity
         ball = ToolPart(
             "ball", Sphere(self.parameters.ball.radius), ACCENT, RigidTransform(self._p_TC)
@@ -320,10 +323,10 @@ def add_rigid_surface(
     """Fix a rigid surface to the world.
 
     Args:
-        plant: See :func:`add_soft_ball`.
-        vertices: World axes [m], shape (k, 3).
+        plant: Plant to add it to, not finalized.
+        vertices: Vertices in world axes [m], shape (k, 3).
         triangles: Counter-clockwise seen from outside of the material, shape (n, 3).
-        name: Of the geometry.
+        name: Name of the geometry.
         friction: Coulomb coefficient.
     """
     properties = ProximityProperties()

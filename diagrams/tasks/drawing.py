@@ -63,12 +63,12 @@ class PathDrawing:
     layout: PathPointLayout
 
     def outline(self) -> list[np.ndarray]:
-        """See :class:`ManifoldDrawing`."""
+        """Return lines that show the manifold [m], each (points, 3)."""
         curve = self.path.position
         return [curve.derivatives(np.linspace(*curve.domain, _POINTS), 0)[:, 0]]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """See :class:`ManifoldDrawing`."""
+        """Add what draws it."""
         curve = self.path.position
         if isinstance(curve, CurveOnSurface):
             draw_surface(meshcat, "path_surface", *skin_and_lines(curve.surface))
@@ -90,11 +90,11 @@ class SurfaceDrawing:
     manifold: PlaceManifold
 
     def outline(self) -> list[np.ndarray]:
-        """See :class:`ManifoldDrawing`."""
+        """Return lines that show the manifold [m], each (points, 3)."""
         return skin_and_lines(self.surface)[1]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """See :class:`ManifoldDrawing`."""
+        """Add what draws it."""
         layout = self.manifold.layout
 
         def place(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,12 +130,12 @@ class SpaceDrawing:
     manifold: SpaceManifold
 
     def outline(self) -> list[np.ndarray]:
-        """See :class:`ManifoldDrawing`."""
+        """Return lines that show the manifold [m], each (points, 3)."""
         surfaces = [surface for fixture in self.fixtures for surface in fixture.surfaces]
         return [line for surface in surfaces for line in skin_and_lines(surface)[1]]
 
     def add(self, builder: DiagramBuilder, meshcat: Meshcat, period: float) -> InputPort:
-        """See :class:`ManifoldDrawing`."""
+        """Add what draws it."""
         shapes: list[tuple[np.ndarray, list[np.ndarray]]] = []
         placements = {}
         for fixture in self.fixtures:

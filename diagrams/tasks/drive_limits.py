@@ -61,7 +61,7 @@ def keep_drive_limits(
     Args:
         reference: The reference, and whether it may be slowed.
         controller: What is chosen of the controller.
-        duration: Of the run [s]; 0 for that of the reference.
+        duration: Duration of the run [s]; 0 for that of the reference.
         task: What the tool is to do.
         law: The law that does it.
         start: Where the robot starts, near the first place of the reference.

@@ -166,7 +166,7 @@ def add_law(
         builder: Builder of the diagram.
         following: What the robot is to do.
         place: Where the tool is.
-        forces: Of ``wrench_ext`` and ``wrench_measured`` what there is.
+        forces: Forces of ``wrench_ext`` and ``wrench_measured`` what there is.
 
     Returns:
         The controller, and its signals ``reference`` and ``law``; with compliance also

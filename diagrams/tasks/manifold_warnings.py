@@ -51,9 +51,9 @@ def euler_warnings(
     """Return what to say of a reference near the singularity of its Euler angles, if it is.
 
     Args:
-        convention: Of the angles that are coordinates; None where they are not.
+        convention: Convention of the angles that are coordinates; None where they are not.
         R_d: Orientations of the reference, shape (samples, 3, 3).
-        block: Of the scenario that tells the orientation.
+        block: Block of the scenario that tells the orientation.
         place: Where a sample is, in words.
 
     Raises:
@@ -102,7 +102,7 @@ def turning_back(positions: np.ndarray) -> str | None:
     """Return what to say of waypoints of which a path turns back on itself, or None.
 
     Args:
-        positions: Of the waypoints [m], shape (n, 3).
+        positions: Positions of the waypoints [m], shape (n, 3).
     """
     sides = np.diff(positions, axis=0)
     lengths = np.linalg.norm(sides, axis=1)
@@ -123,7 +123,7 @@ def far_waypoints(positions: np.ndarray) -> str | None:
     """Return what to say of waypoints that look like millimetres, or None.
 
     Args:
-        positions: Of the waypoints [m], shape (n, 3).
+        positions: Positions of the waypoints [m], shape (n, 3).
     """
     farthest = float(np.abs(positions).max())
     if farthest <= _LARGE:

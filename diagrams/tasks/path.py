@@ -93,7 +93,7 @@ def require_orientation(path: Path, task: str, num_joints: int) -> None:
     Args:
         path: The path, from :func:`make_path`.
         task: ``path.orientation.task`` of the scenario.
-        num_joints: Of the robot.
+        num_joints: Number of joints of the robot.
 
     Raises:
         InputError: If there are too few joints, or four or more that nothing tells to give up the

@@ -107,28 +107,28 @@ class PathTask(Task):
 
     @property
     def lap(self) -> float | None:
-        """See :class:`Task`."""
+        """Length of the manifold [m] if it is closed in its only direction."""
         return self.path.length if self.path.closed else None
 
     @property
     def length(self) -> float:
-        """See :class:`Task`."""
+        """Length of the manifold [m] if it is a path; else 0."""
         return self.path.length
 
     def require_joints(self, num_joints: int) -> None:
-        """See :class:`Task`."""
+        """Refuse a robot that cannot follow, or would lose its orientation by oversight."""
         if self._is_on_surface:
             require_joints(self.manifold, num_joints)
         else:
             require_orientation(self.path, self._orientation_task, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the true place's manifold next to a tool, shape (size,)."""
         return self.path.evaluator(self.relative_degree)(y_t.tolist(), memory[0])
 
     @property
     def drawing(self) -> PathDrawing:
-        """See :class:`Task`."""
+        """How the manifold is drawn."""
         return PathDrawing(self.path, self.place.layout)
 
     def _check_points(self, points: list[float]) -> None:
@@ -162,7 +162,7 @@ class PathTask(Task):
         reference: OutputPort | None,
         period: float,
     ) -> ManifoldProjector:
-        """See :class:`Task`."""
+        """Add what finds the place on the manifold."""
         projector = builder.AddNamedSystem(
             "path_projector",
             BlockSystem(Projector(self.path.evaluator(self.relative_degree)), period),
@@ -171,7 +171,7 @@ class PathTask(Task):
         return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def start(self, shift: np.ndarray) -> StartPoint:
-        """See :class:`Task`."""
+        """Return where the tool starts."""
         start, eta, max_alpha = self._start_parameters, self._points[0], self._max_alpha
         theta = self.path.arc_length.parameter(eta)
         layout = self.place.layout
@@ -197,11 +197,11 @@ class PathTask(Task):
         return StartPoint(target, point[layout.memory])
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the manifold that the law acts on at the start."""
         return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.place[0])
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """See :class:`Task`."""
+        """Yield positions along the way of the tool [m], each (3,), with what to call them."""
         begin, end = min(self._points), max(self._points)
         if self.path.closed:  # every round is the same
             end = min(end, begin + self.path.length)
@@ -211,11 +211,11 @@ class PathTask(Task):
             yield position[0], f"path at eta = {eta:.4g} m"
 
     def target(self) -> PathTarget:
-        """See :class:`Task`."""
+        """Return where given coordinates of the manifold are in the world."""
         return PathTarget(self.path)
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
-        """See :class:`Task`."""
+        """Refuse coordinates off the manifold."""
         allowed = f"eta from 0 to {self.path.length:.6g} m"
         require(self._is_on_path(coordinates[0]), key, coordinates.tolist(), allowed)
 
@@ -232,7 +232,10 @@ class TrajectoryTask(PathTask):
         reference: OutputPort | None,
         period: float,
     ) -> ManifoldProjector:
-        """See :class:`Task`; the law acts on the point that time prescribes."""
+        """Add what finds the place on the manifold.
+
+        The law acts on the point that time prescribes.
+        """
         projector = super().add_place(builder, tool_pose, reference, period).projector
         num_outputs = len(self.manifold.coordinates)
         point = TrajectoryPoint(self.path, self.relative_degree, num_outputs)
@@ -245,5 +248,5 @@ class TrajectoryTask(PathTask):
         return ManifoldProjector(projector, leader.GetOutputPort("manifold_point"))
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the manifold that the law acts on at the start."""
         return self.path.evaluator(self.relative_degree).evaluate_at(start.place[0])

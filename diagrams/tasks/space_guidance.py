@@ -31,7 +31,7 @@ class SpaceTask(Task):
 
     Args:
         parameters: The regions, and the orientation that the tool keeps.
-        relative_degree: Of the law.
+        relative_degree: Relative degree of the law.
         motion: How the tool moves where no region is near.
         lead: What is between the velocity that is asked for and the tool.
         start: Where the tool starts.
@@ -80,16 +80,16 @@ class SpaceTask(Task):
             )
 
     def require_joints(self, num_joints: int) -> None:
-        """See :class:`Task`."""
+        """Refuse a robot that cannot follow, or would lose its orientation by oversight."""
         require_joints(self.manifold, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the true place's manifold next to a tool, shape (size,)."""
         return self.place.point(y_t.tolist())
 
     @property
     def drawing(self) -> SpaceDrawing:
-        """See :class:`Task`."""
+        """How the manifold is drawn."""
         return SpaceDrawing(self.fixtures, self.place)
 
     def add_place(
@@ -99,7 +99,7 @@ class SpaceTask(Task):
         reference: OutputPort | None,
         period: float,
     ) -> ManifoldProjector:
-        """See :class:`Task`."""
+        """Add what finds the place on the manifold."""
         projector = builder.AddNamedSystem(
             "tool_place",
             BlockSystem(Projector(self.place), period),
@@ -108,7 +108,7 @@ class SpaceTask(Task):
         return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def start(self, shift: np.ndarray) -> StartPoint:
-        """See :class:`Task`."""
+        """Return where the tool starts."""
         y_t, R_e = self._start + shift, None
         if self.place.is_oriented:
             deviation = zyx_to_matrix(np.deg2rad(self._rotation_deg))
@@ -118,15 +118,21 @@ class SpaceTask(Task):
         return StartPoint(ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis), y_t)
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the manifold that the law acts on at the start."""
         return self.place.point(start.target.y_t.tolist())
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """See :class:`Task`; where the hand will lead it nobody knows."""
+        """Yield positions along the way of the tool [m], each (3,), with what to call them.
+
+        Where the hand will lead it nobody knows.
+        """
         yield self._start, "start"
 
     def target(self) -> Place:
-        """See :class:`Task`; coordinates are those of the world."""
+        """Return where given coordinates of the manifold are in the world.
+
+        Coordinates are those of the world.
+        """
         return lambda coordinates, rates: (coordinates, rates)
 
     def distances(self, y_t: np.ndarray, clock: np.ndarray) -> np.ndarray:
@@ -134,7 +140,7 @@ class SpaceTask(Task):
 
         Args:
             y_t: Tool points [m], shape (samples, 3).
-            clock: Of moving regions at each sample [s], shape (samples,).
+            clock: Clock of moving regions at each sample [s], shape (samples,).
         """
         places = zip(y_t.tolist(), clock.tolist(), strict=True)
         return np.array(
@@ -142,4 +148,4 @@ class SpaceTask(Task):
         ).reshape(len(y_t), len(self.fixtures))
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
-        """See :class:`Task`; all of space is there."""
+        """Refuse coordinates off the manifold; all of space is there."""

@@ -100,7 +100,7 @@ def surface_from_shape(
         shape: What the scenario says.
         smoothness: k of the class C^k that one from a file gets, unless the scenario says another.
         folder: Where relative file names start.
-        progress: See :func:`make_surface`.
+        progress: Told how far it is.
 
     Raises:
         InputError: If the surface cannot be made.
@@ -186,7 +186,7 @@ def require_joints(manifold: Manifold, num_joints: int) -> None:
 
     Args:
         manifold: The manifold.
-        num_joints: Of the robot.
+        num_joints: Number of joints of the robot.
 
     Raises:
         InputError: If it has.

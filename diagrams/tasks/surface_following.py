@@ -92,16 +92,16 @@ class SurfaceTask(Task):
         self.warnings += self._euler_warnings()
 
     def require_joints(self, num_joints: int) -> None:
-        """See :class:`Task`."""
+        """Refuse a robot that cannot follow, or would lose its orientation by oversight."""
         require_joints(self.manifold, num_joints)
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the true place's manifold next to a tool, shape (size,)."""
         return self._evaluator(y_t.tolist(), memory[:2].tolist(), memory[2:].tolist())
 
     @property
     def drawing(self) -> SurfaceDrawing:
-        """See :class:`Task`."""
+        """How the manifold is drawn."""
         return SurfaceDrawing(self.surface, self.place)
 
     def add_place(
@@ -111,7 +111,7 @@ class SurfaceTask(Task):
         reference: OutputPort | None,
         period: float,
     ) -> ManifoldProjector:
-        """See :class:`Task`."""
+        """Add what finds the place on the manifold."""
         projector = builder.AddNamedSystem(
             "surface_projector",
             BlockSystem(Projector(self._evaluator), period),
@@ -148,7 +148,7 @@ class SurfaceTask(Task):
         return euler_warnings(self.place.tool.euler, R_d, "surface", lambda _: "at the start")
 
     def start(self, shift: np.ndarray) -> StartPoint:
-        """See :class:`Task`."""
+        """Return where the tool starts."""
         y_t, max_alpha = self._start + shift, self._max_alpha
         try:
             foot = self._evaluator.project_globally(y_t)
@@ -177,7 +177,7 @@ class SurfaceTask(Task):
         return StartPoint(target, place)
 
     def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:
-        """See :class:`Task`."""
+        """Return what a start may have been meant to be, and how to say so."""
         R_e = start.target.R_e
         if not self._is_normal or R_e is None:
             return None
@@ -192,11 +192,14 @@ class SurfaceTask(Task):
         return replace(start.target, R_e=turned), advice
 
     def point(self, start: StartPoint) -> np.ndarray:
-        """See :class:`Task`."""
+        """Return the point of the manifold that the law acts on at the start."""
         return self.evaluate(start.target.y_t, start.place)
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
-        """See :class:`Task`; the way of the reference over the surface must stay on it."""
+        """Yield positions along the way of the tool [m], each (3,), with what to call them.
+
+        The way of the reference over the surface must stay on it.
+        """
         begin, end = self.motion.domain
         times = np.linspace(begin, end, 2 + int((end - begin) / _SPACING))
         first = self.start(np.zeros(3)).place[:2]
@@ -214,11 +217,14 @@ class SurfaceTask(Task):
             yield self.surface.partials(theta, 0)[0], f"surface at {where}"
 
     def target(self) -> SurfaceTarget:
-        """See :class:`Task`; coordinates are ``(theta_1, theta_2, xi)``."""
+        """Return where given coordinates of the manifold are in the world.
+
+        Coordinates are ``(theta_1, theta_2, xi)``.
+        """
         return SurfaceTarget(self.surface)
 
     def check_place(self, coordinates: np.ndarray, key: str) -> None:
-        """See :class:`Task`."""
+        """Refuse coordinates off the manifold."""
         for value, ends, closed in zip(
             coordinates[:2], self.surface.domain, self.surface.closed, strict=True
         ):

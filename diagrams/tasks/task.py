@@ -48,7 +48,7 @@ class DrivePlan:
     """What a reference asks of the drives, as it is believed.
 
     Attributes:
-        times: Of the samples, in the time of the reference that is followed [s], (samples,).
+        times: Times of the samples, in the time of the reference that is followed [s], (samples,).
         demand: Torques [Nm or N] and joint speeds [rad/s or m/s] that it asks for, (samples, 2N).
         asked: The same of the reference that was asked for, at the same places.
         limits: What is believed of the drives, (2N,).
@@ -123,7 +123,7 @@ class Task(ABC):
         """Refuse a robot that cannot follow, or would lose its orientation by oversight.
 
         Args:
-            num_joints: Of the robot.
+            num_joints: Number of joints of the robot.
 
         Raises:
             InputError: If so.
@@ -194,7 +194,7 @@ class Task(ABC):
 
         Args:
             coordinates: Translational ones [m], shape (3,).
-            key: Of the scenario, for the message.
+            key: Key of the scenario, for the message.
 
         Raises:
             InputError: If they are.

@@ -173,7 +173,7 @@ def servo_warnings(bandwidth: float, robot: RobotModel, link_state: np.ndarray) 
     They hold the motors against the links' oscillation, which nothing damps then.
 
     Args:
-        bandwidth: Of the servos [rad/s].
+        bandwidth: Bandwidth of the servos [rad/s].
         robot: The robot.
         link_state: ``[q_J, v_J]`` at the start, shape (2N,).
     """

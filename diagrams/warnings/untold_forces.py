@@ -45,7 +45,7 @@ def largest_yield(
     Args:
         robot: The robot, as the law believes it.
         linearization: The law, which commands torques.
-        gains: Of all coordinates, and of the posture if there is one.
+        gains: Gains of all coordinates, and of the posture if there is one.
         loop: The law on the robot at rest.
         rest: Where it rests.
         period: Sampling time [s].
@@ -146,7 +146,7 @@ def untold_friction(
     """Return what joints' friction does to a tool among hard regions that is not compensated.
 
     Args:
-        bearable: See :func:`untold_forces`.
+        bearable: How far the tool may give way without a word [m].
         parameters: The controller.
         law: Its law.
     """

@@ -64,7 +64,7 @@ def render_figures(
     """Returns all figures that the log has signals for, in the order of the report.
 
     Args:
-        log: Of a path following run.
+        log: Log of a path following run.
         outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
         fit: Where the points stand that a surface was fitted to, if it was.
     """
@@ -78,7 +78,7 @@ def draw_figures(
     """Draws all figures that the log has signals for, one after the other.
 
     Args:
-        log: Of a path following run.
+        log: Log of a path following run.
         outline: Lines that show what is followed, each [k, 3] m, in the frame of ``y_t``.
         fit: Where the points stand that a surface was fitted to, if it was.
     """

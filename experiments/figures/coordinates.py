@@ -243,7 +243,7 @@ def _draw_with_references(
     Args:
         panel: Where to draw, in thousandths of the log's unit.
         log: With signal ``name``, perhaps ``name_p`` and ``name_d``.
-        name: Of the coordinate.
+        name: Name of the coordinate.
         symbol: The same in TeX.
         labels: One per component.
 

@@ -95,7 +95,7 @@ def _draw_limits(
     """Scales a panel and shades what is beyond the limits that are in sight; whether one is.
 
     Args:
-        panel: Of one joint.
+        panel: Panel of one joint.
         log: The log.
         axis: The joint.
         shown: What the panel has to show, in its unit.

@@ -71,8 +71,8 @@ class Pages:
         """Say which names there are.
 
         Args:
-            hand: Of what pulls and pushes.
-            settings: Of sliders and buttons.
+            hand: Hand of what pulls and pushes.
+            settings: Settings of sliders and buttons.
         """
         self._hands, self._settables = frozenset(hand), frozenset(settings)
 

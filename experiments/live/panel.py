@@ -43,7 +43,7 @@ class Panel:
 
     Args:
         pages: Who sets it.
-        force_limit: Of the hand [N].
+        force_limit: Force limit of the hand [N].
         tuned: What of the impedance can be changed.
         regions: Names of what can be switched on and off.
     """

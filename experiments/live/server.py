@@ -44,7 +44,7 @@ class PageServer:
     a page of another origin; what is posted has to come from the page itself.
 
     Args:
-        port: Of the page; 0 for any that is free.
+        port: Port of the page; 0 for any that is free.
         status: Returns what the page shows; called in other threads.
         hear: Told what the page posts, in other threads; returns whether the page leads, and
             raises InputError if it is nonsense.

@@ -67,7 +67,7 @@ class LiveSession:
 
     Args:
         prepared: A station with an operator.
-        name: Of its scenario.
+        name: Name of its scenario.
         pages: Who leads.
         status: What is told at every moment, kept up to date.
         output: What is left of it.

@@ -64,7 +64,7 @@ class LiveSimulation:
         """Set what the person does from this tick on.
 
         Args:
-            controls: See :class:`Operator`.
+            controls: What the operator's hand and switches do.
         """
         assert self._station.operator is not None
         self._station.operator.fix(self.root, controls)

@@ -56,7 +56,7 @@ def run_live(
     Args:
         scenario: The scenario as read; its written hand, if any, gives way to the person's.
         out: Folder in which takes get folders of their own.
-        port: Of the page; 0 for any that is free.
+        port: Port of the page; 0 for any that is free.
         duration: Simulated time after which the session ends [s]; by default DURATION.
         figures: Whether takes get figures.
         recording: Whether takes get a recording.

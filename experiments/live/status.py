@@ -89,7 +89,7 @@ class LiveStatus:
 
         Args:
             station: The station.
-            signals: See :meth:`SignalLog.now`.
+            signals: Values now, by signal, as of :meth:`SignalLog.now`.
         """
         coordinates = station.law.linearization.manifold.coordinates
         names = [coordinate.name for coordinate in coordinates]

@@ -97,7 +97,7 @@ class TakeFolders:
 
         Args:
             prepared: The live station.
-            name: Of its scenario.
+            name: Name of its scenario.
             result: What came of it; its context is used up.
             record: The controls.
             progress: Told what goes on.

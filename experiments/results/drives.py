@@ -166,7 +166,7 @@ def saturation_count(log: RunLog) -> int:
     """Number of samples at which the law or a drive is at a limit, see :func:`is_saturated`.
 
     Args:
-        log: See there.
+        log: Log of the run.
 
     Returns:
         Between 0 and the number of samples.
@@ -222,7 +222,7 @@ def plan_metrics(plan: DrivePlan | None) -> Metrics:
     """Return the shares of the drives' limits that a reference takes, and how it was slowed.
 
     Args:
-        plan: Of the reference; None where nobody planned it.
+        plan: Plan of the reference; None where nobody planned it.
     """
     metrics = Metrics()
     if plan is None or not len(plan.times):
@@ -246,7 +246,7 @@ def add_friction(log: RunLog, station: Station, raw: dict[str, FloatArray]) -> N
     """Add friction, its estimate, and the momenta and coefficients if those are estimated.
 
     Args:
-        log: Of the run.
+        log: Log of the run.
         station: The station that was simulated.
         raw: What its station logged.
     """

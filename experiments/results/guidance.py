@@ -125,7 +125,7 @@ def guidance_metrics(log: RunLog) -> Metrics:
     """Return how well forbidden regions were respected, and what that cost.
 
     Args:
-        log: Of a run; without ``region_distance`` there are no such metrics.
+        log: Log of a run; without ``region_distance`` there are no such metrics.
     """
     metrics = Metrics()
     if "region_distance" not in log or not log.time.size:
@@ -195,7 +195,7 @@ def limit_metrics(log: RunLog) -> Metrics:
     """Return for how long, and how hard, the robot's own limits held the hand.
 
     Args:
-        log: Of a run; without ``limit_force`` there are no such metrics.
+        log: Log of a run; without ``limit_force`` there are no such metrics.
     """
     metrics = Metrics()
     if "limit_force" not in log or log.time.size < 2:
@@ -212,7 +212,7 @@ def guidance_warnings(log: RunLog, settings: Scenario) -> list[str]:
     """Return what a run within fixtures has shown to be otherwise, one sentence each.
 
     Args:
-        log: Of the run.
+        log: Log of the run.
         settings: Its scenario.
     """
     if "squeezed" not in log or not log.time.size or settings.fixtures is None:
@@ -228,7 +228,7 @@ def observed_lag(log: RunLog, believed: float) -> float | None:
     ``tau`` times the change of ``y'``.
 
     Args:
-        log: Of a run with the law ``velocity_servo``.
+        log: Log of a run with the law ``velocity_servo``.
         believed: ``tau`` [s].
 
     Returns:

@@ -133,7 +133,7 @@ def plate_poses(state: FloatArray) -> FloatArray:
     """Return ``[p, R by rows]`` of K plates, world axes, shape (samples, 12 K).
 
     Args:
-        state: Of their plant, see :func:`~pfsc_drake.physics.suction.cups_function`, shape
+        state: State of their plant, see :func:`~pfsc_drake.physics.suction.cups_function`, shape
             (samples, 13 K).
     """
     samples, count = len(state), state.shape[1] // 13

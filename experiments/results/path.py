@@ -27,7 +27,7 @@ def path_following_metrics(
     """Return the metrics of following that the log has signals for.
 
     Args:
-        log: Of a run.
+        log: Log of a run.
         settling_tolerance: Distance from the path that counts as converged [m].
         converged_after: Time from which on deviations count [s].
         min_speed: Speed from which on the tool counts as moving [m/s].

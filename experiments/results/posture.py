@@ -55,7 +55,7 @@ def posture_metrics(log: RunLog, lap: float | None) -> Metrics:
     """Return the metrics of posture and pushes that a run has.
 
     Args:
-        log: Of a run.
+        log: Log of a run.
         lap: Length of its path [m] if that is closed.
     """
     metrics, angle = Metrics(), log["q_J"].unit

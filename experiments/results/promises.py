@@ -74,7 +74,7 @@ def set_promises(metrics: Metrics, settings: Scenario) -> None:
     """Give metrics their targets: what every run promises, then what the scenario says.
 
     Args:
-        metrics: Of the run.
+        metrics: Metrics of the run.
         settings: Its scenario.
     """
     if settings.fixtures is not None and "deepest_violation" in metrics:
@@ -144,8 +144,8 @@ class GuidanceRules:
     Attributes:
         mass: m [kg].
         damping: d [N s/m]; None where a person may change it, so that the log's counts.
-        largest_speed: Of the free motion [m/s]; the log tells where it was lower.
-        capacity: Of the tank [J].
+        largest_speed: Largest speed of the free motion [m/s]; the log tells where it was lower.
+        capacity: Capacity of the tank [J].
     """
 
     mass: float
@@ -180,7 +180,7 @@ def audit(log: RunLog, promise: GuidanceRules) -> Metrics:
     """Return by how much, at worst, a run breaks what was promised.
 
     Args:
-        log: Of a run with fixtures, by the rules ``program``.
+        log: Log of a run with fixtures, by the rules ``program``.
         promise: Numbers that the rules were given.
 
     Returns:

@@ -173,7 +173,7 @@ def add_pressing(
         log: To add to.
         station: The station that was simulated.
         raw: What it logged.
-        points: Of the manifold, next to the tool, shape (samples, size).
+        points: Points of the manifold, next to the tool, shape (samples, size).
     """
     if "press" in raw:
         log.add("press", raw["press"])

@@ -60,7 +60,7 @@ class _Line:
         self._name, self._tell, self._phase = name, tell, ""
 
     def expect(self, duration: float) -> None:
-        """See :class:`ProgressListener`."""
+        """Told the simulated time at the end [s], once it is known."""
 
     def __call__(self, simulated_time: float, phase: str) -> None:
         if phase != self._phase:

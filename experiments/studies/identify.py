@@ -61,7 +61,7 @@ class Drive:
         scenario: Its name.
         model: Which of the written models it believes.
         metric: What it is judged by.
-        overrides: Of the scenario, for all beliefs.
+        overrides: Overrides of the scenario, for all beliefs.
         friction: Whether it believes a friction.
     """
 
@@ -79,9 +79,9 @@ class CircularRun:
     Attributes:
         robot: Name of a shipped one.
         drives: By what they are called on the page.
-        starts: Of the search for an excitation.
+        starts: Starts of the search for an excitation.
         runs: How often the experiment is made.
-        limits: Of the joints where not those of the model, see
+        limits: Limits of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
         validation: Name of another shipped motion; searched for without.
     """

@@ -64,7 +64,7 @@ class StudyPoint:
 
     Attributes:
         law: The law.
-        stiffness: Of axis 1 [Nm/rad].
+        stiffness: Stiffness of axis 1 [Nm/rad].
         resonance: Fastest joint resonance at the start [rad/s].
         deviation: Largest distance from the path after the first rest [m]; NaN after a fault.
         fault: Why the run was stopped, or None.

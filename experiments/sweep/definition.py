@@ -44,7 +44,7 @@ class SweepDefinition:
         overrides: Each ``--set``.
         duration: Simulated time [s]; None for the scenario's.
         samples: Number of random draws; None without any.
-        seed: Of the draws.
+        seed: Seed of the draws.
         content: SHA-256 of the scenario with ``overrides`` applied.
     """
 
@@ -74,7 +74,7 @@ class SweepDefinition:
         """Returns the command line that repeats one run.
 
         Args:
-            overrides: Of its sample.
+            overrides: Overrides of its sample.
         """
         return shlex.join([*_PROGRAM, "run", self.scenario, *self._common(overrides)])
 
@@ -247,7 +247,7 @@ def draw_samples(variations: Sequence[Variation], count: int | None, seed: int) 
     Args:
         variations: What varies.
         count: Number of random draws; None if nothing is random.
-        seed: Of the draws, 0 or more.
+        seed: Seed of the draws, 0 or more.
 
     Raises:
         InputError: If ``count`` is missing, or there for nothing, or there are more than MAX_RUNS.

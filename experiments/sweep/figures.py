@@ -34,7 +34,7 @@ def draw_sweep(spread: Spread, columns: Columns, varied: Sequence[str]) -> list[
     """Draws the pictures of a sweep.
 
     Args:
-        spread: Of the metric to draw.
+        spread: Spread of the metric to draw.
         columns: The table.
         varied: Columns of what was varied.
     """

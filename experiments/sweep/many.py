@@ -117,9 +117,9 @@ def open_cluster(address: str | None, workers: int) -> Iterator["Client"]:
     """Connects to processes that take runs, until the end of the context.
 
     Args:
-        address: Of a Dask scheduler, e.g. ``tcp://10.0.0.1:8786``; None for processes of this
-            machine, which listen on its loopback address alone. Scheduler and workers must find
-            the program: ``python -m dask scheduler`` and ``python -m dask worker ADDRESS
+        address: Address of a Dask scheduler, e.g. ``tcp://10.0.0.1:8786``; None for processes of
+            this machine, which listen on its loopback address alone. Scheduler and workers must
+            find the program: ``python -m dask scheduler`` and ``python -m dask worker ADDRESS
             --nthreads 1`` in a clone of the same revision.
         workers: Number of processes; of this machine only.
 
@@ -171,8 +171,8 @@ class _Run:
     """A run that was handed out.
 
     Attributes:
-        future: Of its row.
-        address: Of the process that it was meant for.
+        future: Future of its row.
+        address: Address of the process that it was meant for.
         begin: When [s].
     """
 

@@ -35,13 +35,13 @@ class Spread:
     """How one metric is spread over the runs that completed.
 
     Attributes:
-        name: Of the metric.
+        name: Name of the metric.
         unit: SI.
         runs: Number of the samples with a value.
         values: Theirs.
         is_better_large: Whether the worst is the smallest.
-        target: Of the metric, if there is one.
-        source: Of the target.
+        target: Target of the metric, if there is one.
+        source: Source of the target.
     """
 
     name: str
@@ -79,7 +79,7 @@ def choose_metric(spreads: Mapping[str, Spread], wanted: str | None) -> str | No
     """Returns the metric to draw: the one asked for if a run has it, else the usual one.
 
     Args:
-        spreads: Of the sweep's metrics.
+        spreads: Spreads of the sweep's metrics.
         wanted: Name of a metric; None for the usual one.
 
     Returns:
@@ -120,7 +120,7 @@ def summary_metrics(rows: Mapping[int, RunRow], chosen: str | None) -> Metrics:
     """Returns how many runs ended in which way, then the worst value of each metric.
 
     Args:
-        rows: Of the sweep.
+        rows: Rows of the sweep.
         chosen: Metric that comes first, with its quantiles.
     """
     metrics = Metrics()
@@ -167,7 +167,7 @@ def striking_runs(rows: Mapping[int, RunRow], chosen: str | None, most: int) -> 
     """Returns the runs that one wants to look at, by what strikes in them.
 
     Args:
-        rows: Of the sweep.
+        rows: Rows of the sweep.
         chosen: Metric by which the worst run is found.
         most: Number of runs of each kind of end, completed ones aside.
     """
@@ -237,7 +237,7 @@ def to_parquet(columns: Columns, units: Mapping[str, str]) -> bytes:
 
     Args:
         columns: The table.
-        units: Of its columns; kept as ``unit`` in the metadata of the column.
+        units: Units of its columns; kept as ``unit`` in the metadata of the column.
     """
     import pyarrow
     from pyarrow import parquet

@@ -54,7 +54,7 @@ class Sweep:
     Attributes:
         definition: What makes it the sweep it is.
         scenario: The scenario with what is the same in all runs.
-        samples: Of all runs.
+        samples: Samples of all runs.
         tasks: The runs, in the same order.
     """
 
@@ -117,7 +117,7 @@ def define_sweep(
         overrides: ``key.path=value`` each, the same for all runs.
         duration: Simulated time [s] instead of the scenario's.
         samples: Number of random draws.
-        seed: Of the draws.
+        seed: Seed of the draws.
 
     Raises:
         InputError: If anything of it is wrong, or the scenario's schema takes none of the samples.

@@ -60,7 +60,7 @@ class Random:
 
     Attributes:
         draw: Draws one value.
-        length: Of the list that is drawn; None for a single value.
+        length: Length of the list that is drawn; None for a single value.
     """
 
     draw: Draw
@@ -77,7 +77,7 @@ def parse_values(text: str, source: str) -> Grid | Random:
     """Reads what stands behind ``--vary KEY=``.
 
     Args:
-        text: See the module.
+        text: Values in the words of the command line.
         source: The option as given, for messages.
 
     Raises:

@@ -40,8 +40,8 @@ class RunRow:
         end: Simulated time at the end [s].
         seconds: Wall clock time [s].
         host: Machine that ran it.
-        revision: Of the program there.
-        memory: Of its process after the run [bytes]; not kept in files.
+        revision: Revision of the program there.
+        memory: Memory of its process after the run [bytes]; not kept in files.
     """
 
     status: str

@@ -27,11 +27,11 @@ class Fit:
 
     Attributes:
         eta: Arc length of each waypoint's foot [m], shape (n,).
-        distances: Of the waypoints from the path [m], shape (n,).
+        distances: Distances of the waypoints from the path [m], shape (n,).
         turns: Angle between their orientations and the path's [rad], shape (n,); zero without.
         motion: Distance of everything that was seen between the first and the last waypoint from
             the path [m], shape (samples,).
-        shape: Of the path.
+        shape: Shape of the path.
         through: The path through all waypoints, None if there is no such path.
         shape_through: Its shape.
     """
@@ -113,7 +113,7 @@ def compare_followed(taught: Taught, log: RunLog) -> FollowedShape:
 
     Args:
         taught: The path.
-        log: Of the run along it.
+        log: Log of the run along it.
     """
     y_taught, R_taught, error_taught = _led_tool(taught)
     y_t, R_e = true_tool(log)
@@ -228,7 +228,7 @@ class Nearest:
     Attributes:
         distances: From it [m], shape (n,).
         samples: The sample before that place, shape (n,).
-        shares: Of the way from there to the next sample, shape (n,).
+        shares: Shares of the way from there to the next sample, shape (n,).
     """
 
     distances: FloatArray

@@ -33,7 +33,7 @@ class TeachingOptions:
     """How waypoints are picked, how closely a path fits them, and how fast it is followed.
 
     Attributes:
-        spacing: Of the waypoints [m].
+        spacing: Spacing of the waypoints [m].
         angle_deg: Turn after which a waypoint is taken before that [deg].
         closed: Whether the tool was led back to where it began.
         tolerance: How far the path may be from a waypoint [m].
@@ -69,8 +69,8 @@ class Taught:
     """A taught path.
 
     Attributes:
-        settings: Of the run in which a hand led the tool.
-        log: Of that run.
+        settings: Settings of the run in which a hand led the tool.
+        log: Log of the run.
         rows: Samples that became waypoints, shape (n,).
         table: The waypoints, where the controller took the tool to be.
         path: Near them.
@@ -92,7 +92,7 @@ def read_run(folder: FilePath) -> tuple[Scenario, RunLog]:
     """Return what was run, and its log.
 
     Args:
-        folder: Of a run's results.
+        folder: Folder of a run's results.
 
     Raises:
         InputError: If it holds none, or none of a tool that a hand led through space.
@@ -113,8 +113,8 @@ def taught_path(settings: Scenario, log: RunLog, options: TeachingOptions) -> Ta
     """Return the path that a hand taught.
 
     Args:
-        settings: Of a run with ``controller.manifold: space``.
-        log: Of that run.
+        settings: Settings of a run with ``controller.manifold: space``.
+        log: Log of the run.
         options: How waypoints are picked, and how closely the path fits them.
 
     Raises:
@@ -160,7 +160,7 @@ def seen_tool(log: RunLog) -> tuple[FloatArray, FloatArray]:
     By encoders and the model that it believes, where these are not perfect.
 
     Args:
-        log: Of a run.
+        log: Log of a run.
 
     Returns:
         Tool points [m], shape (samples, 3), and orientations, shape (samples, 3, 3).

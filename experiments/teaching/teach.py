@@ -103,7 +103,7 @@ def check_folders(out: Path, run: Path) -> None:
 
     Args:
         out: For the results.
-        run: Of the run in which a hand leads the tool.
+        run: Run of the run in which a hand leads the tool.
 
     Raises:
         InputError: If so.
@@ -153,11 +153,11 @@ class _Quarters:
         self._duration, self._told = 0.0, 0
 
     def expect(self, duration: float) -> None:
-        """See :class:`reporting.progress.ProgressListener`."""
+        """Told the simulated time at the end [s], once it is known."""
         self._duration = duration
 
     def __call__(self, simulated_time: float, phase: str) -> None:
-        """See :class:`reporting.progress.ProgressListener`."""
+        """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
         if self._duration > 0.0 and 4.0 * simulated_time / self._duration >= self._told + 1:
             self._told += 1
             self._tell(f"{self._name}: {simulated_time:.1f} of {self._duration:.1f} s")
@@ -235,7 +235,7 @@ def write_teach_in(
         The page.
 
     Raises:
-        InputError: See :func:`teach`; nothing has been run where a folder cannot take results.
+        InputError: If a run is refused; nothing has been run where a folder cannot take results.
         KeyboardInterrupt: If the user stopped a run.
     """
     check_folders(out, out / GUIDE)

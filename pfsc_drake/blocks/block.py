@@ -13,7 +13,7 @@ class Port:
     Attributes:
         size: Number of elements.
         unit: Their unit, or units, for people and for ``interface.json``.
-        optional: Of an input: whether it need not be connected.
+        optional: Whether optional: of an input: whether it need not be connected.
     """
 
     size: int
@@ -82,7 +82,7 @@ class Block:
         return {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """Return all outputs, and what is :attr:`inner`.
+        """Return all outputs, and the inner values.
 
         Args:
             x: States.

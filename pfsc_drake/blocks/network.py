@@ -35,7 +35,7 @@ class Node:
 
     Attributes:
         function: The function; vectors in, vectors out.
-        sources: Of its arguments.
+        sources: Sources of its arguments.
         results: Names of wires, or of states.
     """
 
@@ -51,7 +51,7 @@ class Network:
     Attributes:
         inputs: Ports at the border; none that is optional is left open.
         outputs: Wires that are led out, by port.
-        units: Of these ports.
+        units: Units of these ports.
         states: Sizes by name.
         wires: Sizes by name.
         nodes: What evaluates wires, each by one node.

@@ -24,7 +24,7 @@ class Program:
     Attributes:
         network: The same.
         states: Where in ``x`` each state is, those last that the network shows as they are.
-        size: Of ``x``.
+        size: Size of ``x``.
         stages: In an order in which they can be evaluated.
         update: ``x`` of the next tick, called ``x_next``.
         update_inputs, update_states, update_stages: What it takes.

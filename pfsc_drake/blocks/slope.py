@@ -89,7 +89,7 @@ class SlopeAt:
     """The derivative of a network at one tick.
 
     Attributes:
-        slope: Of which network.
+        slope: Slope, and of which network.
         known: All values at that tick: states, inputs, wires.
     """
 

@@ -16,7 +16,7 @@ class Stage:
     """All wires that depend on the same inputs.
 
     Attributes:
-        function: Of ``sources``, then the results of earlier ``stages``; one vector out.
+        function: Function of ``sources``, then the results of earlier ``stages``; one vector out.
         inputs: Names of the inputs among its arguments.
         states: Names of the states that it depends on.
         stages: Numbers of the earlier stages among its arguments.
@@ -80,7 +80,7 @@ def names_of(sources: Iterable[Source], kind: str) -> tuple[str, ...]:
 
     Args:
         sources: Any.
-        kind: See :class:`Source`.
+        kind: Kind of the source.
     """
     return tuple(dict.fromkeys(source.name for source in sources if source.kind == kind))
 
@@ -89,7 +89,7 @@ def ends_of(sizes: Mapping[str, int]) -> list[int]:
     """Return where each of consecutive vectors begins, and the last ends.
 
     Args:
-        sizes: Of the vectors.
+        sizes: Sizes of the vectors.
     """
     ends = [0]
     for size in sizes.values():
@@ -101,7 +101,7 @@ def slices_of(sizes: Mapping[str, int]) -> dict[str, slice]:
     """Return where each of consecutive vectors is, by name.
 
     Args:
-        sizes: Of the vectors.
+        sizes: Sizes of the vectors.
     """
     ends = ends_of(sizes)
     return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}

@@ -53,8 +53,8 @@ class Stepper:
         """Set what is remembered, after the start.
 
         Args:
-            name: Of the state.
-            value: Of the state.
+            name: Name of the state.
+            value: Value of the state.
         """
         self._x[self._program.states[name]] = value
         self._name_states()

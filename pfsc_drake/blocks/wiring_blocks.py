@@ -17,7 +17,7 @@ class Collect(Block):
         all (output): The parts one after another.
 
     Args:
-        sizes: Of the parts, by the names of their ports.
+        sizes: Sizes of the parts, by the names of their ports.
 
     Attributes:
         rows: Where each part is in the whole.
@@ -32,7 +32,7 @@ class Collect(Block):
         self.outputs, self.states = {"all": Port(ends[-1])}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"all": ca.vertcat(*(getattr(u, name) for name in self.inputs))}
 
 
@@ -44,7 +44,7 @@ class Rows(Block):
         part (output): The elements, shape (len(rows),).
 
     Args:
-        size: Of the whole vector.
+        size: Size of the whole vector.
         rows: Which elements.
     """
 
@@ -54,7 +54,7 @@ class Rows(Block):
         self.states = {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"part": u.whole[self._rows]}
 
 
@@ -76,7 +76,7 @@ class Linear(Block):
         self.states = {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"product": ca.densify(self._matrix @ u.vector)}
 
 
@@ -89,7 +89,7 @@ class Sum(Block):
 
     Args:
         count: Number of terms.
-        size: Of each.
+        size: Size of each.
     """
 
     def __init__(self, count: int, size: int) -> None:
@@ -97,7 +97,7 @@ class Sum(Block):
         self.outputs, self.states = {"sum": Port(size)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         terms = [getattr(u, name) for name in self.inputs]
         return {"sum": sum(terms[1:], terms[0])}
 
@@ -118,7 +118,7 @@ class Constant(Block):
         self.outputs = {"value": Port(self._value.numel())}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"value": self._value}
 
 
@@ -134,7 +134,7 @@ class Hold(Block):
         What is ``held``, the oldest first, shape (ticks size,).
 
     Args:
-        size: Of the vector.
+        size: Size of the vector.
         ticks: How old what is put out is at a tick.
     """
 
@@ -143,9 +143,9 @@ class Hold(Block):
         self.states, self._size = {"held": ticks * size}, size
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"held": x.held[: self._size]}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"held": ca.vertcat(*ca.vertsplit(x.held, self._size)[1:], u.value)}

@@ -111,7 +111,7 @@ class CController:
         """Return the controller that a network is.
 
         Args:
-            network: Of blocks.
+            network: Network of blocks.
             period: Sampling time [s].
             about: Further attributes.
 

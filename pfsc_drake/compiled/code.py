@@ -59,7 +59,7 @@ class Tables:
     """Constants that functions share, each content once.
 
     Args:
-        prefix: Of their names.
+        prefix: Prefix of their names.
 
     Attributes:
         names: Their pointers by content, which is doubles as they are in memory.
@@ -89,8 +89,8 @@ class Code(ABC):
 
     Attributes:
         nowhere: The pointer to nothing, for what has no elements.
-        most_instructions: Of one function; machine code without optimizations keeps every value
-            on the stack.
+        most_instructions: Largest number of instructions of one function; machine code without
+            optimizations keeps every value on the stack.
     """
 
     nowhere: ClassVar[str]
@@ -225,7 +225,7 @@ class Code(ABC):
 
         Args:
             name: Its name.
-            parameters: Of both.
+            parameters: Parameters of both.
             sizes: Number of elements in a part, of each parameter.
             called: The other.
             repetitions: Number of parts.

@@ -43,7 +43,7 @@ def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callabl
     argument holds what has no content, a Drake system for example, the function is called anew.
 
     Args:
-        most_kept: Of how many contents results are kept, those asked for last.
+        most_kept: Largest number kept of how many contents results are kept, those asked for last.
     """
 
     def decorator(function: Callable[P, R]) -> Callable[P, R]:

@@ -39,7 +39,7 @@ class ObjectStore:
 
     Args:
         folder: The folder; it need not exist.
-        capacity: Of all files together [bytes]; the oldest give way.
+        capacity: Capacity of all files together [bytes]; the oldest give way.
     """
 
     def __init__(self, folder: Path, capacity: int = 200_000_000) -> None:

@@ -39,7 +39,7 @@ class Translation:
     """Functions that are translated, each before those that call it.
 
     Args:
-        language: Of the code.
+        language: Language of the code.
         tables: Those of other functions, where they are to be shared.
 
     Attributes:

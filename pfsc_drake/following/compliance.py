@@ -51,7 +51,7 @@ def reference_order(compliance: ComplianceParameters, linearization: Linearizati
 
     Args:
         compliance: How the tool yields.
-        linearization: Of the law.
+        linearization: Linearization of the law.
 
     Raises:
         InputError: If there is compliance that the law cannot have.
@@ -96,12 +96,12 @@ def add_compliance(
     Args:
         builder: Builder of the diagram.
         compliance: How the tool yields.
-        linearization: Of the law that follows the reference.
+        linearization: Linearization of the law that follows the reference.
         robot: The robot as it is believed, N joints.
         wanted: What is wanted of the tool without forces.
-        ports: See :func:`force_ports`; ``joint_state``, ``manifold_point``, ``manifold_state`` and
-            ``desired_reference`` with derivatives up to :func:`reference_order`; with an operator
-            ``impedance_request``.
+        ports: Those of :func:`force_ports`, and ``joint_state``, ``manifold_point``,
+            ``manifold_state`` and ``desired_reference`` with derivatives up to
+            :func:`reference_order`; with an operator ``impedance_request``.
         period: Sampling time [s].
 
     Returns:

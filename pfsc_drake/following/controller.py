@@ -37,7 +37,7 @@ def add_reference(
     Args:
         builder: Builder of the diagram.
         controller: The controller.
-        linearization: Of its law.
+        linearization: Linearization of its law.
         robot: The robot as it is believed, N joints.
         compliance: How the tool yields.
         wanted: What is wanted of the tool.

@@ -57,8 +57,8 @@ def make_lead(
         relative_degree: r of the law.
         options: What is chosen.
         period: Sampling time [s].
-        lag: Of velocity servos [s], for r = 1.
-        delay: Of commands on their way to them [s].
+        lag: Lag of velocity servos [s], for r = 1.
+        delay: Delay of commands on their way to them [s].
     """
     if relative_degree > 1:
         return FilterLead(relative_degree, options.smoothing, period)

@@ -23,7 +23,7 @@ class Guided:
     Attributes:
         place: Space, with the orientation that the tool keeps.
         fixtures: The M regions.
-        speeds: Of each the largest speed near the tool [m/s].
+        speeds: Speeds of each the largest speed near the tool [m/s].
         motion: The free motion.
         lead: What is between the velocity that is asked for and the tool.
         options: What else is chosen.
@@ -48,7 +48,7 @@ class Followed:
         start: Where the tool is when the motion begins.
         point: The manifold's point there, laid out by the manifold's layout.
         lap: Length of the path [m] if it is closed.
-        length: Of the path [m], if there is one.
+        length: Length of the path [m], if there is one.
         guided: What a hand leads the tool through, where one leads.
     """
 
@@ -71,7 +71,7 @@ class Wanted:
         transition: How long the reference takes from where the tool is at the start to the motion
             that is wanted [s]; 0 for no such transition.
         lap: Length of the path [m] if it is closed.
-        length: Of the path [m], if there is one.
+        length: Length of the path [m], if there is one.
         end: When the motion ends [s].
         tuning: How the impedance follows what an operator sets, if there is one.
     """

@@ -92,7 +92,7 @@ def add_guidance(
         tool: Name of the frame whose origin is kept out of the regions.
         regions: Where the tool point may be, each at rest or moving; hard, or as a
             :class:`~pfsc_drake.Fixture` with a stiffness.
-        law: See :func:`add_path_following`.
+        law: Which law follows, with its gains.
         start: Where the tool is at the start, in the world; where ``options.posture`` has it if
             omitted.
         oriented: Whether it keeps the orientation that it has at the start; False for robots of

@@ -46,7 +46,7 @@ def gains_of(
         parameters: What is chosen.
         relative_degree: ``r`` of the law.
         law: Name of the law.
-        name: Of the kind, for messages.
+        name: Name of the kind, for messages.
 
     Raises:
         InputError: If there are more or fewer than r, or they do not make the error vanish.
@@ -82,7 +82,8 @@ def loop_gains(by_kind: LawGains, law: str, linearization: Linearization) -> Loo
         linearization: The law.
 
     Raises:
-        InputError: See :func:`gains_of`; or a coordinate is free that follows a moving point.
+        InputError: If gains do not fit the law, or a coordinate is free that follows a moving
+            point.
     """
     r = linearization.relative_degree
     names = [coordinate.kind.value for coordinate in linearization.manifold.coordinates]
@@ -199,7 +200,7 @@ class Believed:
     Attributes:
         robot: The robot, N joints.
         friction: Coefficients f_c and f_v, if any are known.
-        resolution: Of the measured positions, shape (N,) [rad or m], or one for all.
+        resolution: Resolution of the measured positions, shape (N,) [rad or m], or one for all.
         velocity_delay: How old measured velocities are [s]; a difference quotient is that of
             mid-interval.
         filter_time: By how much measured velocities are smoothed besides [s].
@@ -222,7 +223,7 @@ def safe_state(
     """Return how a robot is stopped and held after a fault.
 
     Args:
-        parameters: Of the controller.
+        parameters: Parameters of the controller.
         robot: The robot as it is believed.
         faults: What is a fault.
     """

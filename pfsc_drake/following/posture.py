@@ -40,7 +40,7 @@ def make_posture(
     Args:
         parameters: What is chosen.
         robot: The robot as it is believed.
-        gains: Of the joints, if there are more than outputs.
+        gains: Gains of the joints, if there are more than outputs.
         rest: Tells where the robot starts at rest; needed to keep an elbow.
 
     Raises:

@@ -41,7 +41,7 @@ def add_surface_following(
         surface: The surface, smooth enough for the law.
         motion: Two tangential coordinates over time [m], e.g. from
             :func:`~pfsc_drake.straight_lines`.
-        law: See :func:`add_path_following`.
+        law: Which law follows, with its gains.
         orientation: ``normal``: the tool's axes are those of the surface, turned by ``offset``;
             None if its orientation does not matter.
         offset: Rotation from the surface's axes to the tool's, shape (3, 3).

@@ -29,8 +29,8 @@ class ForceTorqueParameters:
         measurement_range: Largest magnitude that is measured, shape (6,).
         bias: Reading without load, shape (6,).
         noise: Standard deviation of the white noise of one sample, shape (6,).
-        bandwidth: Of the amplifier's first-order filter [Hz].
-        seed: Of the noise.
+        bandwidth: Bandwidth of the amplifier's first-order filter [Hz].
+        seed: Seed of the noise.
         source: Where the numbers are from.
     """
 
@@ -98,11 +98,11 @@ class ForceTorqueSensor(Block):
         self.states = {"filter": 6}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"filter": ca.DM.nan(6)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         limit = ca.DM(self._parameters.measurement_range)
         load = -ca.vertcat(u.reaction[3:], u.reaction[:3])
         filtered = self._low_pass.output(self._at_rest(x, load), load)
@@ -112,7 +112,7 @@ class ForceTorqueSensor(Block):
         return {"measured_wrench": where(reading < -limit, -limit, reading), "load": load}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"filter": self._low_pass.update(self._at_rest(x, y.load), y.load)}
 
     def _at_rest(self, x: Values, load: Any) -> Any:
@@ -151,7 +151,7 @@ class SensorFailure(Block):
         size: Size of the measurement.
         indices: Components that fail.
         time: When they fail [s].
-        period: Of the ticks [s].
+        period: Period of the ticks [s].
         kind: How: ``nan``, ``frozen`` or ``jump``.
         jump: By how much a jumping one is off.
 
@@ -177,11 +177,11 @@ class SensorFailure(Block):
         self.states = {"last": size} if kind == "frozen" else {}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"last": u.measured} if self.states else {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         wrong = u.measured + self._jump
         if self._kind == "nan":
             wrong = np.nan
@@ -190,7 +190,7 @@ class SensorFailure(Block):
         return {"delivered": where(ca.DM(self._fails) * self._has_failed(t), wrong, u.measured)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"last": where(self._has_failed(t), x.last, u.measured)} if self.states else {}
 
     def _has_failed(self, t: Any) -> Any:

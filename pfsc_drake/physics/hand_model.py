@@ -48,7 +48,7 @@ class Wander:
         """Return times [s], shape (k,), ascending, and places [m], shape (k, 3).
 
         Args:
-            seed: Of the random numbers.
+            seed: Seed of the random numbers.
         """
         random = np.random.default_rng(seed)
         count = 2 + int((self.end - self.begin) / self.shortest)
@@ -100,7 +100,7 @@ class HandParameters:
     """Properties of a hand; stiffness and damping are of the order of a relaxed human arm's.
 
     Attributes:
-        waypoints: Of the target, in ascending time.
+        waypoints: Waypoints of the target, in ascending time.
         frame: ``world``: positions are along the world's axes; ``manifold``: they are
             ``eta, xi_1, xi_2`` of the path.
         stiffness: K [N/m].
@@ -116,7 +116,7 @@ class HandParameters:
         tremor_band: Lowest and highest frequency of the tremor [Hz], shape (2,).
         grip_ramp: Time in which the hand takes hold and lets go [s].
         release: When the hand begins to let go [s]; infinite: never.
-        seed: Of the tremor.
+        seed: Seed of the tremor.
         source: Where the numbers are from.
         wander: Instead of the waypoints, a box whose places the hand goes to at random, as the seed
             says; null for the waypoints.

@@ -51,7 +51,7 @@ class HandWay:
 
     Args:
         times: At the waypoints, ascending, shape (k,) [s].
-        positions: Of the waypoints, shape (k, 3).
+        positions: Positions of the waypoints, shape (k, 3).
         place: Where these are in the world; None if they are world coordinates [m].
     """
 
@@ -118,7 +118,7 @@ class OrientationTarget:
     It rests in each, as the target of the tool point does.
 
     Args:
-        times: Of the orientations, ascending, shape (k,) [s].
+        times: Times of the orientations, ascending, shape (k,) [s].
         zyx_deg: Their ZYX angles (2.7), shape (k, 3) [deg].
     """
 

@@ -20,9 +20,9 @@ class EncoderOptions:
     of a slide. An encoder on the motor shaft has its own number times the gear ratio.
 
     Attributes:
-        link_increments: Of the encoders of ``q_J``: none (exact), one number for all joints,
-            or one per joint; 0 is exact.
-        motor_increments: Of the encoders of ``q_M``, likewise.
+        link_increments: Link increments of the encoders of ``q_J``: none (exact), one number for
+            all joints, or one per joint; 0 is exact.
+        motor_increments: Motor increments of the encoders of ``q_M``, likewise.
         difference_quotient: Whether velocities are difference quotients of the measured
             positions, else the true ones.
         filter_time: Time constant of a first-order filter behind the difference quotient
@@ -81,13 +81,13 @@ class JointEncoders(Block):
         self.states = {"measured": 4 * n, "tick": 1} if self._differs else {}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         if not self._differs:
             return {}
         return {"measured": ca.vertcat(*self._quantized(u)), "tick": np.inf}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         q_J, v_J, q_M, v_M = self._quantized(u)
         if self._differs:
             before = ca.vertsplit(x.measured, self._size)
@@ -98,7 +98,7 @@ class JointEncoders(Block):
         return {"joint_state": ca.vertcat(q_J, v_J, q_M, v_M)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"measured": y.joint_state, "tick": t} if self._differs else {}
 
     def _velocity(self, x: Values, t: Any, q: Any, q_before: Any, v_before: Any) -> Any:

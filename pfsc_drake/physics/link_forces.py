@@ -52,7 +52,7 @@ class LinkForces(Block):
         self.states = {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         q_J = u.joint_state[: self._n]
         tau_ext = self._torque(q_J, u.wrenches)
         acting = any_of(u.wrenches != 0.0)
@@ -68,7 +68,7 @@ def link_points_function(chain: SerialChain, points: Points) -> ca.Function:
 
     Args:
         chain: The arm, N joints.
-        points: Of each the index of its link and where it is in that link's frame [m].
+        points: For each point the index of its link and where it is in that link's frame [m].
 
     Returns:
         Function of q, shape (N,), to positions one after the other, shape (3K,) [m].
@@ -87,7 +87,7 @@ def link_torque_function(chain: SerialChain, points: Points) -> ca.Function:
 
     Args:
         chain: The arm, N joints.
-        points: Of each the index of its link and where it is in that link's frame [m].
+        points: For each point the index of its link and where it is in that link's frame [m].
 
     Returns:
         Function of q, shape (N,), and of wrenches ``[force, torque]`` on the arm at K points,
@@ -115,7 +115,7 @@ class LinkHandParameters:
         point: Where, in the axes of that link or frame [m], shape (3,).
         way: How far the hand moves, world axes [m], shape (3,).
         begin: When it takes hold and begins to move [s].
-        duration: Of the way [s].
+        duration: Duration of the way [s].
         hold: How long it stays at the end of the way [s].
         comes_back: Whether it then goes the way back, and lets go there; else it lets go.
         stiffness: K [N/m].
@@ -197,11 +197,11 @@ class LinkHand(Block):
         self.states = {"wrench": 6, "last": 3, "seen": 1, "start": 3, "holds": 1}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"wrench": x.wrench}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         time, sees = t * self._period, all_finite(u.point)
         takes = all_of(ca.logic_not(x.holds), time >= self._begin, sees)
         start = where(takes, u.point, x.start)
@@ -222,7 +222,7 @@ class LinkHand(Block):
         Args:
             time: [s].
             point: Where the point is [m], shape (3,).
-            velocity: Of the point [m/s], shape (3,).
+            velocity: Velocity of the point [m/s], shape (3,).
             start: Where the point was when the hand took hold [m], shape (3,).
         """
         twist = ca.vertcat(velocity, ca.DM.zeros(3))

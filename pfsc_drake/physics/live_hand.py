@@ -88,11 +88,11 @@ class LiveHand(Block):
         self.states = sizes | {"first": ASKED, "second": ASKED}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"wrench": x.wrench}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         hand, asked, pose = self._hand, u.asked, u.tool_pose
         sees = all_finite(pose)
         share = -math.expm1(-self._period / hand.response_time)

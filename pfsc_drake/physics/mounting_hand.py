@@ -45,15 +45,15 @@ class MountingHandParameters:
         turning_stiffness: Moment per angle that is seen [Nm/rad].
         turning_persistence: Growth of that moment [Nm/(rad s)].
         turning_limit: Largest moment that persistence leads to [Nm].
-        search_radius: Of the spiral in which the bores are felt for [m].
+        search_radius: Radius of the spiral in which the bores are felt for [m].
         search_time: Until the spiral is that wide [s].
-        search_period: Of one turn [s].
+        search_period: Duration of one turn of that spiral [s].
         captured: Depth in the bores from which on the hands follow [m].
         relaxation: Time constant with which they then give up what persistence led to [s].
         wobble: Moment by which a plate that sticks is worked in [Nm].
         patience: How long nothing moves until a person tries something else [s].
         look_time: How long a person aligns at most before trying [s].
-        seed: Of what the eye errs by.
+        seed: Seed of the errors of the eye.
     """
 
     task: str = "mount"
@@ -150,12 +150,12 @@ class MountingHand(OperatorHand):
         parameters: Properties of the hand; its waypoints lead.
         mounting: How it goes about.
         goal: Tool point and orientation when the plate is seated, shapes (3,) and (3, 3).
-        pin_length: Of the plate [m].
+        pin_length: Pin length of the plate [m].
         period: Sampling time [s].
-        place: See :class:`OperatorHand`.
+        place: Where the hand pulls to.
 
     Raises:
-        InputError: See :class:`OperatorHand`.
+        InputError: If the reaction delay is not a multiple of the period.
     """
 
     def __init__(
@@ -182,7 +182,7 @@ class MountingHand(OperatorHand):
         self.states = {**self.states, **sizes, "deepest": 1, "when": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {
             "phase": float(MountingPhase.RELEASE if self._returns else MountingPhase.GRIP),
             "since": self._hand.begin,
@@ -190,7 +190,7 @@ class MountingHand(OperatorHand):
         }
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         off = [MountingPhase.LEAVE, MountingPhase.RELEASE, MountingPhase.DONE]
         if self._returns:
             off = [MountingPhase.LEAVE, MountingPhase.LEAD]
@@ -198,14 +198,14 @@ class MountingHand(OperatorHand):
         return super().output(x, u, t) | {"vacuum": vacuum, "phase": x.phase}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         after = self.following(x, t * self._period, u.tool_pose, u.held)
         sees = all_finite(u.tool_pose)
         after = {name: where(sees, value, getattr(x, name)) for name, value in after.items()}
         return super().update(x, u, y, t) | after
 
     def wanted(self, x: Values, time: Any, pose: Any, twist: Any) -> Any:
-        """See :class:`OperatorHand`."""
+        """Return the wrench that the hand wants, world axes, shape (6,) [N, Nm]."""
         hand, tool_axis = self._mounting, orientation(pose)[:, 2]
         lead = self._hand.wanted(time - x.clock, pose[:3], twist, reach=hand.reach)
         return first_of(

@@ -57,11 +57,11 @@ class OperatorHand(Block):
         self.states = {"wrench": 6, "last_pose": 12, "seen": 1, "waiting": 6 * delay}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"wrench": x.wrench}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         time, sees = t * self._period, all_finite(u.tool_pose)
         twist = where(x.seen, observed_twist(x.last_pose, u.tool_pose, self._period), 0.0)
         wanted = where(sees, self.wanted(x, time, u.tool_pose, twist), 0.0)

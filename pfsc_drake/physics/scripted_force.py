@@ -176,12 +176,12 @@ class DecoupledForce(Block):
         self.outputs, self.states = {"wrench": Port(6, "N, Nm")}, {"unit": 6}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         pulse = smooth_pulse(t * self._period, self._begin, self._end, self._ramp)
         return {"wrench": self._force * pulse * x.unit}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         time, q = t * self._period, u.joint_state[: self._size]
         near = all_of(time >= self._begin - _LOOKS_BEFORE, time <= self._end)
         unit = ca.if_else(near, self._wrench(q, u.manifold_point), x.unit, True)
@@ -251,16 +251,16 @@ class ScriptedForce(Block):
             self.states["axes"] = 9
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return self._seen(u, ca.DM.zeros(9)) if self.states else {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         axes = ca.reshape(x.axes, 3, 3) if self.states else ca.DM.zeros(3, 3)
         return {"wrench": self._profile.at(t * self._period, axes)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return self._seen(u, x.axes) if self.states else {}
 
     def _seen(self, u: Values, before: Any) -> dict[str, Any]:

@@ -19,8 +19,8 @@ class SuctionParameters:
 
     Attributes:
         cups: Middles of their rims in the tool's frame [m], one ``[x, y]`` each, at z = 0.
-        stiffness: Of the rubber of one cup, in every direction [N/m].
-        damping: Of the same [N s/m].
+        stiffness: Stiffness of the rubber of one cup, in every direction [N/m].
+        damping: Damping of the same [N s/m].
         press: Depth from which on a cup that is pressed on a plate is tight [m].
         pull_off: Tension at which a cup comes off [N].
         shear: Force along the plate at which a cup slips [N].
@@ -121,17 +121,17 @@ class SuctionGripper(Block):
         self.inner = self.states = {"cups": 4 * self._count}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"cups": ca.DM(self._start)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         wrench, pushes, later = self._function(x.cups, u.tool_motion, u.plate_state, u.vacuum)
         held = ca.sum1(x.cups[::4] >= 0.0) / self._count
         return {"wrench": wrench, "pushes": pushes, "held": held, "cups": later}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"cups": y.cups}
 
 

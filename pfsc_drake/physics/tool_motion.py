@@ -24,6 +24,6 @@ class ToolMotion(Block):
         self.outputs, self.states = {"tool_motion": Port(18, "m, 1, m/s, rad/s")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         n = self._size
         return {"tool_motion": self._motion(u.joint_state[:n], u.joint_state[n : 2 * n])}

@@ -213,7 +213,7 @@ class SampledServo(Block):
         self.inner, self.states = {"integral": n}, {"integral": n}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         q_J, _, _, v_M = ca.vertsplit(u.joint_state, x.integral.shape[0])
         load = self._gravity(q_J) + self._viscous * u.velocity_reference
         torque, integral = self._law.torque(v_M, u.velocity_reference, load, x.integral)
@@ -227,7 +227,7 @@ class SampledServo(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"integral": where(u.stopping, x.integral, y.integral)}
 
 
@@ -280,18 +280,18 @@ class BusDelay(Block):
         self.states = {"samples": size * count, "ages": count, "tick": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"samples": self._everywhere(u), "tick": np.inf}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         n, moves = self._size, t > x.tick + 0.5  # what is sent at this tick is not among them yet
         oldest, before = x.samples[-n:], x.samples[-2 * n : -n]
         age = where(moves, x.ages[-2], x.ages[-1])
         return {"delivered": where(moves, before, oldest), "silence": self._period * age}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         time, (begin, end) = t * self._period, self._lost
         lost, has_begun = all_of(time >= begin, time < end), is_finite(x.tick)
         newest = where(lost, x.samples[: self._size], u.sent)

@@ -68,7 +68,7 @@ class BlockAccess:
         Args:
             root: Context of the diagram.
             name: ``block.state``.
-            value: Of the state.
+            value: Value of the state.
         """
         system, state = self._states[name]
         system.set_state(system.GetMyMutableContextFromRoot(root), state, value)

@@ -102,7 +102,7 @@ class BlockSystem(LeafSystem):
         """Return ``block.name`` of a state or a wire; those of a network are called so already.
 
         Args:
-            name: Of the state or wire.
+            name: Name of the state or wire.
         """
         return name if self.block is None else f"{self.get_name()}.{name}"
 
@@ -111,7 +111,7 @@ class BlockSystem(LeafSystem):
 
         Args:
             context: The system's own.
-            name: Of the state.
+            name: Name of the state.
         """
         if name in self._shown:
             group, _ = self._shown[name]
@@ -123,7 +123,7 @@ class BlockSystem(LeafSystem):
 
         Args:
             context: The system's own.
-            name: Of the state.
+            name: Name of the state.
         """
         flag = 1 + list(self.states).index(name)
         return bool(context.get_discrete_state(self._memory).value()[flag])
@@ -133,8 +133,8 @@ class BlockSystem(LeafSystem):
 
         Args:
             context: The system's own.
-            name: Of the state.
-            value: Of the state.
+            name: Name of the state.
+            value: Value of the state.
         """
         variables = self._variables(context)
         variables[self.states[name]] = value
@@ -146,7 +146,7 @@ class BlockSystem(LeafSystem):
 
         Args:
             context: The system's own.
-            name: Of the output; in a network ``block.output``.
+            name: Name of the output; in a network ``block.output``.
         """
         if name in self._shown_wires:
             return self.state(context, self._shown_wires[name])

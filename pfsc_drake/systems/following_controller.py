@@ -25,7 +25,7 @@ class FaultAccess:
         period: Sampling time of its blocks [s].
 
     Attributes:
-        name: Of the diagram.
+        name: Name of the diagram.
         period: Sampling time [s].
     """
 
@@ -37,7 +37,7 @@ class FaultAccess:
         """Return the fault that holds since the last tick, the present instant if it is one.
 
         Args:
-            blocks: Of the diagram.
+            blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
         latch = f"{self.name}.fault_latch.fault"
@@ -48,7 +48,7 @@ class FaultAccess:
         """Return which measured values are not believed, nonzero if so, shape (4N,).
 
         Args:
-            blocks: Of the diagram.
+            blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
         ignored = blocks.state(root, f"{self.name}.safe_stop.ignored")
@@ -85,7 +85,7 @@ class FollowingController(Diagram):
 
     Attributes:
         period: Sampling time [s].
-        layout: Of the port ``law``.
+        layout: Layout of the port ``law``.
         relative_degree: ``r`` of the law.
         drive_port: Name of the port that leads to the drives.
     """
@@ -186,7 +186,7 @@ class ControllerAccess(FaultAccess):
         """Return what the drives are told, shape (N,).
 
         Args:
-            blocks: Of the diagram.
+            blocks: Blocks of the diagram.
             root: Context of the diagram.
         """
         return blocks.output(root, f"{self.name}.switch.command")
@@ -195,7 +195,7 @@ class ControllerAccess(FaultAccess):
         """Let a state be that of the last tick, before which nothing has been compared.
 
         Args:
-            blocks: Of the diagram.
+            blocks: Blocks of the diagram.
             root: Context of the diagram.
             joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         """

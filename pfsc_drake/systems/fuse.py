@@ -94,7 +94,7 @@ def fuse_blocks(builder: DiagramBuilder, name: str = "blocks") -> list[BlockSyst
 
     Args:
         builder: The builder, with everything connected.
-        name: Of the new system.
+        name: Name of the new system.
 
     Returns:
         What has been added.

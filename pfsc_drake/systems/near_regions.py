@@ -99,7 +99,7 @@ def value_or_none(port: InputPort | None, context: Context) -> np.ndarray | None
 
     Args:
         port: The port.
-        context: Of its system.
+        context: Context of its system.
     """
     if port is None or not port.HasValue(context):
         return None

@@ -36,7 +36,7 @@ def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     and reading one may never end.
 
     Args:
-        path: Of the file; links are followed.
+        path: Path of the file; links are followed.
         max_bytes: Largest size that is read.
 
     Raises:

@@ -163,7 +163,7 @@ class StationLoop:
 
         Args:
             section: Context right after a tick, whose sensor is tared.
-            load: See :meth:`external_load`.
+            load: Torques that act from outside.
         """
         blocks = self.station.blocks
         residual = self.derivative.wires(section)[f"{_SENSOR}.residual"]
@@ -183,7 +183,7 @@ class StationLoop:
 
         Args:
             section: Context right after a tick.
-            joint: Of the sensor, see :meth:`~diagrams.robots.part.RobotPart.hang`.
+            joint: Joint of the sensor, see :meth:`~diagrams.robots.part.RobotPart.hang`.
             mass: [kg].
 
         Raises:
@@ -207,7 +207,7 @@ class StationLoop:
 
         Args:
             section: Context right after a tick; unchanged.
-            stiffness: Of the other one [N/m].
+            stiffness: Stiffness of the other one [N/m].
         """
         assert self.spring is not None
         result = section.Clone()

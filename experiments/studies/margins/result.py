@@ -65,8 +65,8 @@ class DriveMargins:
 
     Attributes:
         instant: When and where.
-        drives: Of each drive alone, N of them.
-        common: Of all at once.
+        drives: Drives of each drive alone, N of them.
+        common: What is common of all at once.
         delay: Further sampling intervals of delay that are borne, -1 for none.
     """
 

@@ -144,10 +144,10 @@ class TouchedSurface:
     Attributes:
         instant: Where: the place in contact with the slowest loop.
         force: With which the tool presses there [N].
-        stiffness: Of the spring along the normal that the surface is there [N/m].
+        stiffness: Stiffness of the spring along the normal that the surface is there [N/m].
         borne: The largest multiple of it that keeps the loop stable; infinite if all that were
             tried do.
-        frequency: Of what grows with a little more [rad/s].
+        frequency: Frequency of the mode that grows with a little more [rad/s].
     """
 
     instant: Instant

@@ -36,7 +36,7 @@ class ImpedanceState(NamedTuple):
     Attributes:
         position: y_p, shape (m,) [m, rad].
         velocity: y_p', shape (m,) [m/s, rad/s].
-        force: Of the last interval, shape (m,) [N, Nm].
+        force: Force of the last interval, shape (m,) [N, Nm].
         impedance: Rows mass, damping, stiffness of the last interval, shape (3 m,).
     """
 

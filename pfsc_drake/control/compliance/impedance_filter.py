@@ -45,7 +45,8 @@ class ImpedanceFilter(Block):
             not tared. Then it goes on to y_d as its impedance does. Shape (1,).
         impedance (input, optional): Rows mass, damping, stiffness of every coordinate,
             shape (3 m,), in place of the law's own.
-        allowed_speed (input, optional): Of the ``wanted_speed`` of the coordinates ``free``, what
+        allowed_speed (input, optional): Part of the ``wanted_speed`` of the coordinates ``free``,
+        what
             the robot can follow [m/s]; they move no faster. From :class:`LedMotion`.
         reference (output): Derivatives 0..r of y_p by rows, shape ((r + 1) m,).
         status (output): :class:`ImpedanceStatus` of the last update, shape (1,).
@@ -102,7 +103,7 @@ class ImpedanceFilter(Block):
         self.states |= dict.fromkeys(flags, 1)
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         motion = self._start_motion(u)
         known = all_finite(motion)
         state = self._law.start(where(known, motion, 0.0))
@@ -110,7 +111,7 @@ class ImpedanceFilter(Block):
         return state._asdict() | {"started": known, "waits": waits, "engaged": 1.0}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         m, r = self._law.num_outputs, self._law.relative_degree
         state, desired = _state(x), u.desired_reference[: (r + 1) * m]
         # at rest where it yields
@@ -133,7 +134,7 @@ class ImpedanceFilter(Block):
         return made | {"wanted_speed": ca.vertcat(speed, mass)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         now, moves, flags = self._begun(x, u)
         later, status = self._moved(now, u)
         if self._free is not None and u.allowed_speed is not None:
@@ -227,7 +228,7 @@ class ManifoldForceTransform(Block):
         self.outputs, self.states = {"manifold_force": Port(m, "N, Nm")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         angles = u.reference[: self._m] if "reference" in self.inputs else ca.DM.zeros(self._m)
         return {"manifold_force": self._force(u.wrench, u.manifold_point, angles)}
 
@@ -245,7 +246,8 @@ class LedMotion(Block):
     twelve tightest of these, :func:`program_function` finds the motion next to the wanted one.
 
     Ports:
-        wanted_speed (input): Of the tangential coordinates, then their mass, shape (count + 1,)
+        wanted_speed (input): Speeds of the tangential coordinates, then their mass, shape (count +
+        1,)
             [m/s, kg]; from :class:`ImpedanceFilter`. What is no number is left as it is.
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
         manifold_point (input): Where on the manifold the tool is.
@@ -257,7 +259,7 @@ class LedMotion(Block):
         limit_force: The same.
 
     Args:
-        limits: Of the tool's velocity.
+        limits: Limits of the tool's velocity.
         manifold: The path or surface.
         period: Sampling time [s].
 
@@ -290,7 +292,10 @@ class LedMotion(Block):
         self.inner = {"held": len(self.kinds)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`; ``held``: by how much of each kind of limit [m/s^2]."""
+        """Return all outputs, and the inner values.
+
+        ``held``: by how much of each kind of limit [m/s^2].
+        """
         wanted = u.wanted_speed[: self._count]
         speed, held = self._allowed(u.joint_state, u.manifold_point, wanted)
         return {
@@ -300,7 +305,7 @@ class LedMotion(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         moves, mass = all_finite(u.wanted_speed[: self._count]), u.wanted_speed[self._count]
         return {"limit_force": where(moves, mass * y.held, x.limit_force)}
 

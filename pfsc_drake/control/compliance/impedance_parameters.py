@@ -214,9 +214,9 @@ class ImpedanceParameters:
     """Impedance of all coordinates; those not given are position-controlled.
 
     Attributes:
-        tangential: Of the tangential coordinates.
-        transversal: Of the transversal ones.
-        rotational: Of the angles.
+        tangential: Tangential of the tangential coordinates.
+        transversal: Transversal of the transversal ones.
+        rotational: Rotational of the angles.
     """
 
     tangential: CoordinateImpedance = field(default_factory=CoordinateImpedance)

@@ -27,7 +27,7 @@ class MeasuredWrench(Block):
         self.outputs = {"measured": Port(6, "N, Nm"), "sensor_fault": Port(1), "tared": Port(1)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         fault = where(all_finite(u.wrench), SensorFault.NONE, SensorFault.LOST)
         return {"measured": u.wrench, "sensor_fault": fault, "tared": ca.DM(1.0)}
 
@@ -71,7 +71,7 @@ class PayloadCompensation(Block):
         self.states = {"at_taring": 1}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         R_e = ca.reshape(u.tool_pose[3:], 3, 3).T
         load = ca.vertcat(self._weight, ca.cross(R_e @ self._p_TC, self._weight))
         return {
@@ -80,5 +80,5 @@ class PayloadCompensation(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"at_taring": where(u.tared < 0.5, u.held, x.at_taring)}

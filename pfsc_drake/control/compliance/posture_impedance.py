@@ -93,7 +93,7 @@ class NullSpaceImpedance:
         """Return the motion one period later as an expression, shape ((r + 1) N,).
 
         Args:
-            motion: See the class.
+            motion: Derivatives of the posture under way, as the class says.
             torque: u, shape (N,) [Nm or N]; zero instead unless all of it is finite.
             goal: ``q_goal``, shape (N,).
         """
@@ -135,7 +135,7 @@ class YieldingPosture(Block):
         posture: How the law follows the posture; its weight decides the projection.
         impedance: How the posture moves.
         potential: ``V``, one of ``POTENTIALS``, or empty for none.
-        pull_stiffness: Of the potential [Nm/rad or N/m], not negative.
+        pull_stiffness: Pull stiffness of the potential [Nm/rad or N/m], not negative.
         goal: Where the posture goes, shape (N,) [rad or m]; None for where it starts.
 
     Raises:
@@ -173,17 +173,17 @@ class YieldingPosture(Block):
         self.states = {"motion": size, "goal": n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         q = u.joint_state[: self._n]
         goal = q if self._goal is None else ca.DM(self._goal)
         return {"motion": self._impedance.start(q), "goal": goal}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"posture_reference": x.motion}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         q_0 = x.motion[: self._n]
         free, pull = 0.0, self._impedance.parameters.stiffness * (x.goal - q_0)
         if u.tau_ext is not None or self._pulls:

@@ -148,7 +148,7 @@ class Pressing(Block):
         touching: Force of touch-down [N].
         coordinate: Which coordinate it acts along.
         num_outputs: m.
-        reference_size: Of the port.
+        reference_size: Reference size of the port.
         period: Between looks at the force [s].
         allowed: Difference of measured force and reference that is allowed [N].
         off: From when on the way counts [s].
@@ -184,11 +184,11 @@ class Pressing(Block):
         self.states = {"touch_down": 1, "place": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"touch_down": ca.DM.inf(), "place": ca.DM.inf()}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         place = u.reference[self._coordinate]
         lifted = where(x.place < ca.inf, place - x.place, 0.0)
         press = self._press(t * self._period, x.touch_down, lifted)
@@ -199,7 +199,7 @@ class Pressing(Block):
         return {"press": press, "pressed_force": u.manifold_force - along * press, "lost": lost}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         time, met = t * self._period, u.manifold_force[self._coordinate] >= self._touching
         touches = all_of(met, u.ready > 0.5, x.touch_down == ca.inf)
         lifts = ca.logic_and(time >= self._off, x.place == ca.inf)

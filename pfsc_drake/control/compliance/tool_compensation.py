@@ -43,7 +43,7 @@ class ToolCompensationParameters:
         inertia: ``differentiated``: inertial load from filtered differences of the joint
             velocities; ``given``: from accelerations that another component knows;
             ``none``: only the weight.
-        bandwidth: Of the filter for the joints' motion [Hz]; that of the sensor.
+        bandwidth: Bandwidth of the filter for the joints' motion [Hz]; that of the sensor.
         taring_time: Length of the window whose mean becomes the bias [s].
         taring_spread: Largest difference of means over 10 ms within the window, shape (6,)
             [N, Nm].
@@ -104,7 +104,7 @@ def compensation_function(
         robot: The robot.
         load: The tool.
         low_pass: Filter of the joints' motion.
-        inertia: See :class:`ToolCompensationParameters`.
+        inertia: ``differentiated``, ``given`` or ``none``.
         dead_bands: Widths for force [N] and torque [Nm].
 
     Returns:
@@ -190,7 +190,7 @@ class ToolCompensation(Block):
     Args:
         robot: The robot with the tool.
         load: Everything behind the sensor.
-        measurement_range: Of the sensor, shape (6,) [N, Nm].
+        measurement_range: Measurement range of the sensor, shape (6,) [N, Nm].
         parameters: How to compensate.
         period: Sampling time [s].
 
@@ -239,7 +239,7 @@ class ToolCompensation(Block):
         self.states |= Taring.states
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         measured, motion = u.measured_wrench, u.joint_state[: self._measured_motion]
         if "joint_acceleration" in self.inputs:
             motion = ca.vertcat(motion, u.joint_acceleration)
@@ -265,7 +265,7 @@ class ToolCompensation(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         lost = y.fault == SensorFault.LOST
         stretch = self._taring.extended(x, y.residual)
         bias, is_long, is_believed = self._taring.bias(stretch)
@@ -302,7 +302,7 @@ class Alarms(Block):
         self.outputs, self.states = {"fault": Port(1)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         if u.alarms is None:
             return {"fault": ca.DM(Fault.NONE)}
         sensor, tared, compliance, press_lost = ca.vertsplit(u.alarms)

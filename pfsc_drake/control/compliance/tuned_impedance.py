@@ -100,10 +100,10 @@ class ImpedanceTuner(Block):
         Impedance by rows, rates ``e'`` of the last tick, and tank.
 
     Args:
-        parameters: See :class:`TuningParameters`.
-        law: Of the filter, whose impedance is the one without requests.
+        parameters: How mass and damping follow the hand.
+        law: Law of the filter, whose impedance is the one without requests.
         coordinates: The m coordinates of the virtual output.
-        masses: Of coordinates that are rigid as given, for the time that they are not, (m,).
+        masses: Masses of coordinates that are rigid as given, for the time that they are not, (m,).
     """
 
     def __init__(
@@ -130,11 +130,11 @@ class ImpedanceTuner(Block):
         self.inner = {"rate": m, "left": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"impedance": self._given(u), "tank": ca.DM(self._parameters.reserve)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         m = self._law.num_outputs
         error = u.reference[: 2 * m] - u.desired_reference[: 2 * m]
         known, (e, rate) = all_finite(error), ca.vertsplit(error, m)
@@ -147,7 +147,7 @@ class ImpedanceTuner(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"impedance": y.impedance, "rate": y.rate, "tank": y.left}
 
     def _given(self, u: Values) -> Any:
@@ -160,7 +160,7 @@ class ImpedanceTuner(Block):
         Args:
             x: States.
             given: The impedance without requests, shape (3 m,).
-            request: See the port.
+            request: Requested stiffnesses and dampings, as at the port ``impedance_request``.
             e: ``y_p - y_d``, shape (m,).
             rate: ``e'``, shape (m,).
         """
@@ -233,8 +233,9 @@ def carried_share(inertia: np.ndarray, A: np.ndarray, masses: np.ndarray) -> tup
 
     Args:
         inertia: ``M_L`` in joint coordinates, shape (N, N), see :func:`load_inertia`.
-        A: Of the coordinates, ``y' = A q'``, shape (m, N).
-        masses: Of the impedance [kg or kg m^2], shape (m,), infinite for what does not yield.
+        A: Matrix of the coordinates, ``y' = A q'``, shape (m, N).
+        masses: Masses of the impedance [kg or kg m^2], shape (m,), infinite for what does not
+            yield.
 
     Returns:
         Zero where nothing yields.
@@ -284,8 +285,8 @@ def bearable_mass_error(inertia: np.ndarray, A: np.ndarray, bearable: np.ndarray
     """Return the relative error of all masses that a compliance bears.
 
     Args:
-        inertia: Of the links in joint coordinates, ``D_E``, shape (N, N).
-        A: Of the coordinates, ``y' = A q'``, shape (m, N).
+        inertia: Inertia of the links in joint coordinates, ``D_E``, shape (N, N).
+        A: Matrix of the coordinates, ``y' = A q'``, shape (m, N).
         bearable: :func:`bearable_inertia_error` of each coordinate, shape (m,).
 
     Returns:

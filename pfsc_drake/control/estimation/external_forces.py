@@ -36,9 +36,9 @@ class ExternalTorque(Block):
 
     Args:
         robot: The robot.
-        num_derivatives: Of the output, r - 2.
+        num_derivatives: Number of derivatives of the output, r - 2.
         period: Sampling time [s].
-        bandwidth: Of the estimator [rad/s]; 0 for none.
+        bandwidth: Bandwidth of the estimator [rad/s]; 0 for none.
 
     Raises:
         InputError: If number of derivatives or bandwidth are out of range.
@@ -61,7 +61,7 @@ class ExternalTorque(Block):
             self.states = {"predicted": values, "seen": 1}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         wrench = ca.DM.zeros(6) if u.wrench is None else u.wrench
         tau = self._torque(u.joint_state[: self._n], wrench)
         if u.link_torque is not None:
@@ -73,7 +73,7 @@ class ExternalTorque(Block):
         return {"tau_ext": self._estimator.estimate(predicted, tau)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         if self._estimator is None:
             return {}
         good, predicted = all_finite(y.tau_ext), self._estimator.predict(y.tau_ext)
@@ -103,7 +103,7 @@ class ToolWrench(Block):
 
     Args:
         robot: The robot, N joints, three or at least six.
-        damping: Of the inverse, beside the singular values of J in m and rad.
+        damping: Damping of the inverse, beside the singular values of J in m and rad.
         dead_bands: Widths for force [N] and torque [Nm].
 
     Raises:
@@ -132,7 +132,7 @@ class ToolWrench(Block):
         self.outputs, self.states = {"wrench": Port(6, "N, Nm")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         found = self._fit(u.joint_state[: self._n], u.tau_ext)
         force, torque = (
             dead_band(part, width)

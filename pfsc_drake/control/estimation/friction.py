@@ -70,7 +70,7 @@ class FrictionModel(Block):
         self.outputs, self.states = {"friction_torque": Port(n, "Nm or N")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         v = u.velocity[-self._f_c.numel() :]
         return {"friction_torque": friction_torque(self._f_c, self._f_v, v, self._smoothing)}
 
@@ -155,7 +155,7 @@ class FrictionKalmanFilter(Block):
         period: Sampling time T [s].
         intervals: ``mean`` or ``begin``.
         resting_velocity: Below which an axis is at rest [rad/s or m/s], for ``mean``.
-        smoothing: See :func:`friction_torque`.
+        smoothing: Speed within which friction is smooth [rad/s or m/s].
 
     Raises:
         InputError: If a number is out of range.
@@ -203,7 +203,7 @@ class FrictionKalmanFilter(Block):
         self.inner = {"corrected": 3 * n, "covariance": 6 * n} | sampled
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         zero, one = ca.DM.zeros(self._model.dimension), ca.DM.ones(self._model.dimension)
         P_0 = self._noise.initial
         return {
@@ -212,7 +212,7 @@ class FrictionKalmanFilter(Block):
         }
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         momentum, forces = self._momentum(u.joint_state)
         n, delay = self._model.dimension, self._model.delay
         q_M, v = ca.vertsplit(u.joint_state, n)[2:]
@@ -231,7 +231,7 @@ class FrictionKalmanFilter(Block):
         }
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         sampled = {
             "estimate": y.corrected,
             "covariance": y.covariance,

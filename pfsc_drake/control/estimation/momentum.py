@@ -32,8 +32,8 @@ class MomentumModel:
         state: Symbol ``[q_J, v_J, q_M, v_M]``, shape (4N, 1).
         momentum: p as an expression of the state, shape (N, 1) [Nm s or N s].
         forces: f as an expression of the state, shape (N, 1) [Nm or N].
-        drive_weight: Of each drive, 1 or 0, shape (N,).
-        known_weight: Of each known torque, shape (N,).
+        drive_weight: Drive weight of each drive, 1 or 0, shape (N,).
+        known_weight: Weight of each known torque, shape (N,).
         sign: 1 or -1.
         delay: Age of the velocities when they are measured [s].
     """
@@ -238,7 +238,7 @@ class MomentumObserver(Block):
         self.inner = {"momentum": n, "forces": n}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         model, T = self._model, self._period
         p, f = self._momentum(u.joint_state)
         tau = model.acting_when_measured(x.acting, x.acted, T)
@@ -249,7 +249,7 @@ class MomentumObserver(Block):
         return {"estimate": estimate, "momentum": p, "forces": f}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         sampled = {
             "estimate": self._filter.predict(y.estimate),
             "momentum": y.momentum,

@@ -19,7 +19,7 @@ class Restraint(NamedTuple):
 
     Attributes:
         rest: Highest joint derivative with which they come to rest, shape (N,).
-        velocity: Of the joints, shape (N,); None where the highest derivative is one.
+        velocity: Velocity of the joints, shape (N,); None where the highest derivative is one.
         settling: ``a_2``: in the end joints move with ``(x - rest) / a_2``.
         speeds: Largest of the joints, shape (N,), infinite for any.
         to_ends: Largest upwards and downwards with which they come to rest before their ends,
@@ -40,7 +40,7 @@ class Spare(NamedTuple):
         desired: Highest joint derivative that is wanted, shape (N,).
         scale: Upper triangular ``S`` with ``S S' = W^-1``, shape (N, N), of the weight W by which
             deviations from it are judged, see :func:`scale_of`; None for the identity.
-        slope: Of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
+        slope: Slope of one more coordinate ``c`` of the joints, ``h = dc/dq``, shape (N,); None for
             none.
         rate: ``h q^(r)`` that this coordinate is to have.
         restraint: By what all of this is held back; None for nothing.
@@ -225,7 +225,7 @@ def _restrained(Q: ca.SX, y: ca.SX, spare: Spare) -> tuple[ca.SX, ca.SX | None, 
 
     Args:
         Q: Orthonormal columns that span the rows of ``A S``, shape (N, m).
-        y: Of each side of :func:`_sides`, as columns.
+        y: Value of each side of :func:`_sides`, as columns.
         spare: What joints are to do.
     """
     x, restraint = _next_to(Q, y[:, 0], spare), spare.restraint

@@ -18,7 +18,7 @@ class Relation(NamedTuple):
         Y: Derivatives 0..r-1 of the virtual output in columns, shape (m, r).
         A: Decoupling matrix, shape (m, N).
         b: Shape (m,).
-        gain: Of the drives' ``u = gain q^(r) + drift + offset``, shape (N, N).
+        gain: Gain of the drives' ``u = gain q^(r) + drift + offset``, shape (N, N).
         drift: Shape (N,).
         offset: Shape (N,).
         motion: Derivatives 0..r-1 of the joint coordinates in columns, shape (N, r).
@@ -88,7 +88,7 @@ class ExactLinearization(Block):
         self.outputs, self.states = {"relation": Port(Relation.size(linearization))}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         linearization, progress = self._linearization, []
         if linearization.manifold.follows_time:
             along = indices(linearization.manifold.coordinates, Kind.TANGENTIAL)

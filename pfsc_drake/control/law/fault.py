@@ -75,12 +75,12 @@ class FaultLatch(Block):
         self.outputs, self.states = {"fault": Port(1)}, {"fault": 1}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         found = [getattr(u, name) for name in self.inputs]
         return {"fault": latched(x.fault, first_of(*zip(found, found, strict=True), otherwise=0))}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"fault": y.fault}
 
 
@@ -95,7 +95,7 @@ class FaultSwitch(Block):
 
     Args:
         num_drives: N.
-        unit: Of what they are told.
+        unit: Unit of what they are told.
     """
 
     def __init__(self, num_drives: int, unit: str = "") -> None:
@@ -107,6 +107,6 @@ class FaultSwitch(Block):
         self.outputs, self.states = {"command": Port(num_drives, unit)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         stop = ca.DM(*u.drive.shape) if u.stop is None else u.stop
         return {"command": where(u.fault, stop, u.drive)}

@@ -102,7 +102,7 @@ class DriveRelation(NamedTuple):
         drift: Shape (N,).
         offset: What is not extrapolated, shape (N,).
         lead: In ticks.
-        last_held: Of the last tick, shape (N,).
+        last_held: Last held of the last tick, shape (N,).
     """
 
     gain: ca.SX
@@ -198,7 +198,7 @@ def left_to_outputs(
 
     Args:
         drives: What they do.
-        limits: Of their inputs, shape (N,).
+        limits: Limits of their inputs, shape (N,).
         solution: What is asked for.
     """
     x, rest = solution.x, solution.rest

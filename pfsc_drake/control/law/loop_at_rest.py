@@ -148,8 +148,9 @@ class LoopAtRest:
         """Return the map of one sampling interval, from right after a tick to right after the next.
 
         Args:
-            gains: Of all coordinates, and of the posture if there is one.
-            mass: Of the robot that moves, in units of the believed one: links' masses and inertias.
+            gains: Gains of all coordinates, and of the posture if there is one.
+            mass: Mass of the robot that moves, in units of the believed one: links' masses and
+                inertias.
             stiffness: The same of joint stiffnesses.
 
         Returns:
@@ -162,7 +163,7 @@ class LoopAtRest:
         """Return what external torques do that the law is not told of.
 
         Args:
-            gains: Of all coordinates, and of the posture if there is one.
+            gains: Gains of all coordinates, and of the posture if there is one.
 
         Returns:
             ``A``, ``B``, ``C`` of ``x_{k+1} = A x_k + B tau_ext``, ``q_J = C x_k``, the torques

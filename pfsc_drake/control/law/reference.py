@@ -108,7 +108,8 @@ def straight_lines(
         A curve of as many dimensions over time [s], starting at t = 0.
 
     Raises:
-        InputError: See :func:`rest_to_rest`, or if places have different numbers of coordinates.
+        InputError: If fewer than two places differ, the motion is far too long or short, or places
+            have different numbers of coordinates.
     """
     table = _checked_places(places)
     # the coordinate that moves most keeps the limits, the others move in proportion
@@ -130,14 +131,14 @@ def together(
     """Return motions of several coordinates that start at the same time, each at its own pace.
 
     Args:
-        motions: Of each coordinate points, velocity, acceleration and dwell as for
+        motions: For each coordinate points, velocity, acceleration and dwell as for
             :func:`rest_to_rest`; what ends earlier rests.
 
     Returns:
         A curve of as many dimensions over time [s], starting at t = 0.
 
     Raises:
-        InputError: See :func:`rest_to_rest`.
+        InputError: If fewer than two places differ, or the motion is far too long or short.
     """
     single = [
         rest_to_rest(points, velocity=velocity, acceleration=acceleration, dwell=dwell)
@@ -248,7 +249,7 @@ class SmoothStart(Block):
         duration: How long the transition takes [s].
         order: Highest derivative.
         num_outputs: m.
-        state_size: Of ``manifold_state``.
+        state_size: State size of ``manifold_state``.
         period: Sampling time [s].
 
     Raises:
@@ -265,12 +266,12 @@ class SmoothStart(Block):
         self.states = {"distance": num_outputs, "begin": 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         distance = u.manifold_state[: self._m] - u.desired_reference[: self._m]
         return {"distance": where(is_finite(distance), distance, 0.0), "begin": t}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         elapsed = (t - x.begin) * self._period
         left = ca.vec(x.distance @ self._transition.at(elapsed).T)
         rest = where(elapsed < self._transition.duration, left, 0.0)

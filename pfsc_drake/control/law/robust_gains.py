@@ -37,8 +37,8 @@ class RobotError:
     """What is believed of the robot, in units of the truth.
 
     Attributes:
-        mass: Of the links' masses and inertias.
-        stiffness: Of the joint stiffnesses.
+        mass: Mass of the links' masses and inertias.
+        stiffness: Stiffness of the joint stiffnesses.
     """
 
     mass: float = 1.0
@@ -74,7 +74,7 @@ class SampledRobot:
         """Return the rate of the slowest or of the fastest growing mode [1/s].
 
         Args:
-            gains: Of all coordinates.
+            gains: Gains of all coordinates.
             error: What is believed of the robot.
         """
         A = self.loop.closed(gains, 1.0 / error.mass, 1.0 / error.stiffness)
@@ -107,7 +107,7 @@ class SampledRobot:
         """Return the error of one kind under which the loop grows fastest; None if it is stable.
 
         Args:
-            gains: Of all coordinates.
+            gains: Gains of all coordinates.
             size: Relative.
         """
         worst = max(self.errors(size), key=lambda error: self.rate(gains, error))
@@ -117,7 +117,7 @@ class SampledRobot:
         """Return how large a relative error in some direction is borne, up to 0.3.
 
         Args:
-            gains: Of all coordinates.
+            gains: Gains of all coordinates.
             direction: The error of any size that tells what is wrong, and which way.
         """
 
@@ -143,7 +143,7 @@ def rule_of_poles(bandwidth: float, fast: float, relative_degree: int) -> list[f
     """Return two slow poles and as many fast ones as a law has beyond [1/s].
 
     Args:
-        bandwidth: Of the convergence, positive [1/s].
+        bandwidth: Bandwidth of the convergence, positive [1/s].
         fast: The slower of the fast ones, positive [1/s].
         relative_degree: ``r``, 1 to 4.
     """
@@ -165,7 +165,7 @@ def choose_fast_pole(
     Args:
         robot: Law and robot.
         gains: Gains of all coordinates for a fast pole.
-        bandwidths: Of the coordinates, positive [1/s].
+        bandwidths: Bandwidths of the coordinates, positive [1/s].
         error: Relative.
     """
     slowest, fastest = max(bandwidths), max(_FASTEST / robot.period, 1.01 * max(bandwidths))

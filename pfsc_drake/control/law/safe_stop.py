@@ -92,7 +92,8 @@ class SafeStop(Block):
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         fault (input): Nonzero from the fault on, shape (1,).
         suspects (input): What of the state is found implausible now, nonzero if so, shape (4N,).
-        torque (output): Of the drives, within their limits, shape (N,) [Nm or N]; zero without a
+        torque (output): Torques of the drives, within their limits, shape (N,) [Nm or N]; zero
+        without a
             fault.
         ignored (output): What of the state is not used any more, nonzero if so, shape (4N,). It
             depends on the state alone.
@@ -136,11 +137,11 @@ class SafeStop(Block):
         self.states = {"stopping": 1} | self._sizes
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         before = StopMemory(*[getattr(x, name) for name in self._sizes])
         fresh = ca.vertcat(*self._start(x.last, u.joint_state, u.suspects))
         begun = ca.if_else(x.stopping, ca.vertcat(*before), fresh, True)
@@ -152,7 +153,7 @@ class SafeStop(Block):
         return {"torque": torque, "ignored": x.ignored, "later": later}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"stopping": u.fault != 0.0} | self._split(y.later)
 
     def _split(self, memory: Any) -> dict[str, Any]:

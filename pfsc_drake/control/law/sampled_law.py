@@ -83,7 +83,7 @@ class SampledLaw(Block):
             self.states["reference_velocity"] = n
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         law, layout = self._law, self._law.layout
         told = {
             "state": u.joint_state,
@@ -113,7 +113,7 @@ class SampledLaw(Block):
         return outputs
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         law, layout = self._law, self._law.layout
         m = x.output.shape[0]
         output, saturated = y.manifold_state[:m], y.evaluation[layout.status.stop - 1]
@@ -143,7 +143,7 @@ class LawReport(Block):
         status (output): ``[fault, rcond, saturated drives]``, shape (3,).
 
     Args:
-        layout: Of the result.
+        layout: Layout of the result.
     """
 
     def __init__(self, layout: LawLayout) -> None:
@@ -152,7 +152,7 @@ class LawReport(Block):
         self.outputs, self.states = {"law": Port(layout.size), "status": Port(3)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         status = self._layout.status
         between = u.evaluation[self._layout.drive.stop : status.start]
         law = ca.vertcat(u.command, between, u.fault, u.evaluation[status.start + 1 :])

@@ -50,8 +50,8 @@ def gains_from_poles(
 
     Args:
         poles: Without the integral part's [1/s].
-        integral_pole: Of the integral part, which takes constant errors away at this rate
-            [1/s]; 0 for none.
+        integral_pole: Integral pole of the integral part, which takes constant errors away at this
+            rate [1/s]; 0 for none.
 
     Raises:
         InputError: If there are no poles, or complex ones do not come in conjugate pairs.
@@ -110,7 +110,7 @@ class Stabilization:
         names: Names of the coordinates, for messages.
 
     Raises:
-        InputError: See :func:`check_gains`.
+        InputError: If gains have the wrong number, or a loop would not be stable.
     """
 
     def __init__(
@@ -143,9 +143,9 @@ class LoopGains(NamedTuple):
     """All gains of a law.
 
     Attributes:
-        outputs: Of the virtual output's m coordinates.
-        posture: Of the N joints' deviations from the posture reference, where there are more
-            joints than outputs.
+        outputs: Outputs of the virtual output's m coordinates.
+        posture: Posture of the N joints' deviations from the posture reference, where there are
+            more joints than outputs.
     """
 
     outputs: Stabilization

@@ -29,14 +29,14 @@ class StopMemory(NamedTuple):
 
     Attributes:
         elapsed: Since the fault [s], shape (1,).
-        duration: Of the stop [s], shape (1,).
+        duration: Duration of the stop [s], shape (1,).
         q_0: Position of the links at the fault, shape (N,).
         v_0: Their velocity, shape (N,).
         offset: By how much the motors were beside their reference at the fault, shape (N,).
         offset_rate: The same of their velocity, shape (N,).
         inertia: Diagonal of ``D_E + D_M`` at the fault, shape (N,).
-        position: Of the motors, as far as it is integrated, shape (N,).
-        rate: Of their position, differentiated, shape (N,).
+        position: Position of the motors, as far as it is integrated, shape (N,).
+        rate: Rate of their position, differentiated, shape (N,).
         ignored: What of the state is not to be believed, nonzero if so, shape (4N,).
         last: State of the last tick, shape (4N,).
     """
@@ -73,8 +73,8 @@ class Joints(NamedTuple):
         compliance: Its inverse, 0 of a rigid joint.
         D_M: Inertia of the motors [kg m^2 or kg].
         viscous: Friction of the motors [Nm s/rad or N s/m].
-        limits: Of the drives' torques [Nm or N].
-        damping: Of every drive at least [Nm s/rad or N s/m].
+        limits: Limits of the drives' torques [Nm or N].
+        damping: Damping of every drive at least [Nm s/rad or N s/m].
     """
 
     elastic: ca.DM
@@ -91,8 +91,8 @@ class Joints(NamedTuple):
 
         Args:
             robot: The robot.
-            limits: Of its drives' torques [Nm or N], shape (N,).
-            damping: Of every drive at least [Nm s/rad or N s/m], shape (N,).
+            limits: Limits of its drives' torques [Nm or N], shape (N,).
+            damping: Damping of every drive at least [Nm s/rad or N s/m], shape (N,).
         """
         elastic = robot.elastic_joints
         stiffness = np.where(elastic, robot.K_s, 0.0)

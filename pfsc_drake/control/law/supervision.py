@@ -29,8 +29,8 @@ class SupervisionParameters:
     Attributes:
         tolerance: By how much positions and integrated velocities of a joint may differ
             [rad or m]; 0 to compare nothing.
-        resolution: Of the measured positions [rad or m], shape (N,) or one for all; widens the
-            tolerance by twice its value.
+        resolution: Resolution of the measured positions [rad or m], shape (N,) or one for all;
+            widens the tolerance by twice its value.
         filter_time: By which measured velocities are late [s]; widens it by twice the way that a
             joint makes in that time at its fastest.
         joint_limits: Whether a joint at its limit is a fault.
@@ -93,7 +93,7 @@ class Supervision(Block):
 
     Args:
         robot: The robot as it is believed, N joints.
-        limits: Of the drives' torques [Nm or N], shape (N,).
+        limits: Limits of the drives' torques [Nm or N], shape (N,).
         parameters: What is watched.
         period: Sampling time [s].
 
@@ -125,16 +125,16 @@ class Supervision(Block):
         self.states = {"last": 4 * n, "known": 1, "sums": 4 * n, "unchanged": 4 * n}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"last": where(is_finite(u.joint_state), u.joint_state, 0.0)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         results = self._function(u.joint_state, x.last, x.sums, x.unchanged, x.known, u.ignored)
         return dict(zip(("fault", "suspects", "sums", "unchanged"), results, strict=True))
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         return {"last": u.joint_state, "known": 1.0, "sums": y.sums, "unchanged": y.unchanged}
 
 
@@ -266,7 +266,7 @@ class DriveWatch(Block):
         ``turns``, each of shape (N,).
 
     Args:
-        limits: Of what drives are told, shape (N,).
+        limits: Limits of what drives are told, shape (N,).
         parameters: How much is too much.
         period: Sampling time [s].
     """
@@ -284,7 +284,7 @@ class DriveWatch(Block):
         self.states = {"ticks": n, "side": n, "turns": n}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         fault = first_of(
             (any_of(x.ticks >= self._ticks), Fault.DRIVE_SATURATED),
             (any_of(x.turns >= self._turns), Fault.DRIVE_CHATTERS),
@@ -293,7 +293,7 @@ class DriveWatch(Block):
         return {"fault": fault}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         at_limit = ca.fabs(u.drive) >= self._limits
         side = where(at_limit, ca.sign(u.drive), 0.0)
         counted = {

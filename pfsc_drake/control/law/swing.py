@@ -116,7 +116,7 @@ class SwingingManifold(Block):
         self.outputs = {"reference": Port(size)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         swings = self._swings.at(t * self._period)
         return {"reference": u.desired_reference + ca.vec(swings.T)}
 
@@ -155,5 +155,5 @@ class SwingingCourse:
         self.largest_rate = abs(amplitude) * max(2.0 * math.pi * frequency, rising)
 
     def at(self, clock: ca.MX) -> ca.MX:
-        """See :class:`~pfsc_drake.geometry.regions.moving.Course`."""
+        """Value at a time of the clock [s], m or rad, as an expression."""
         return self._amplitude * self._unit.at(clock)

@@ -49,7 +49,7 @@ class TimedReference(Block):
         order: r, of the highest derivative.
         num_outputs: m.
         period: Sampling time T [s].
-        bandwidth: Of the override's filter [1/s].
+        bandwidth: Bandwidth of the override's filter [1/s].
 
     Raises:
         InputError: If the bandwidth is not positive.
@@ -74,14 +74,17 @@ class TimedReference(Block):
         self.states = {"pace": order + 1}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`; a motion starts at the pace that is asked for."""
+        """Return what is remembered at the start.
+
+        What is left out is zero; a motion starts at the pace that is asked for.
+        """
         if u.override is None:
             return {}
         start = [t * self._period, _pace(u.override), *[0.0] * (self._order - 1)]
         return {"pace": ca.vertcat(*start)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         r = self._order
         if u.override is None:
             s, rates = ca.MX(t * self._period), [ca.MX(1.0), *[ca.MX(0.0)] * (r - 1)]
@@ -101,7 +104,7 @@ class TimedReference(Block):
         return {"reference": ca.vec(rows.T)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         if u.override is None:
             return {}
         s, *rates = ca.vertsplit(ca.DM(self._step) @ ca.vertcat(x.pace, _pace(u.override)))
@@ -142,7 +145,7 @@ class StreamLimits:
     Attributes:
         velocity: Largest speed V [m/s].
         acceleration: Largest acceleration A [m/s^2].
-        bandwidth: Of the filter that makes it smooth enough for the law [1/s].
+        bandwidth: Bandwidth of the filter that makes it smooth enough for the law [1/s].
     """
 
     velocity: float = 0.1
@@ -209,7 +212,7 @@ class StreamedReference(Block):
         self.states = {"goal": 1, "place": 2, "filtered": order}
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`; at rest."""
+        """Return what is remembered at the start; what is left out is zero; at rest."""
         start = ca.DM(self._start)
         rest = ca.DM.zeros(self._order - 1)
         return {
@@ -219,14 +222,14 @@ class StreamedReference(Block):
         }
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         top = ca.DM(self._rates[self._order - 1, :-1]).T @ ca.vertcat(x.filtered, x.place)
         eta = ca.vertcat(x.filtered, top)
         rest = ca.MX(self._order + 1, self._m - 1)
         return {"reference": ca.vec(ca.horzcat(eta, ca.densify(rest)).T)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         goal = ca.fmax(x.goal, ca.fmin(where(is_finite(u.goal), u.goal, x.goal), self._end))
         speed = self._speed(x, u, goal)
         acceleration = (speed - x.place[1]) / self._period

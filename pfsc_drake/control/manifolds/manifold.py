@@ -150,7 +150,7 @@ def indices(coordinates: Sequence[Coordinate], kind: Kind) -> slice:
     """Return where the coordinates of a kind stand; they are neighbours.
 
     Args:
-        coordinates: Of a manifold.
+        coordinates: Coordinates of a manifold.
         kind: The kind.
     """
     matching = [i for i, coordinate in enumerate(coordinates) if coordinate.kind is kind]
@@ -162,7 +162,8 @@ def manifold_force_function(manifold: Manifold, *, with_turning: bool = False) -
 
     Args:
         manifold: The manifold.
-        with_turning: See there.
+        with_turning: Whether torques act along tangential coordinates, as of
+            :meth:`Manifold.force`.
 
     Returns:
         ``(wrench, manifold_point, reference) -> force``, shapes (6,), (size,), (m,), (m,).
@@ -201,7 +202,7 @@ class ToolKinematics(Block):
         self.outputs, self.states = {"tool_pose": Port(12, "m, 1")}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"tool_pose": self._pose(u.joint_state[self._part])}
 
 
@@ -243,7 +244,7 @@ class Projector(Block):
             motion along a surface begins with; nothing if omitted.
 
     Attributes:
-        layout: Of the manifold's point.
+        layout: Layout of the manifold's point.
     """
 
     def __init__(self, evaluator: PlaceEvaluator, start: np.ndarray | None = None) -> None:
@@ -255,14 +256,14 @@ class Projector(Block):
         self._start = np.zeros(self.states["place"]) if start is None else start
 
     def initial(self, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the start; what is left out is zero."""
         return {"place": self._evaluator.find(u.tool_pose[:3]) + ca.DM(self._start)}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"manifold_point": self._evaluator.evaluate(u.tool_pose[:3], x.place)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return what is remembered at the next tick; what is left out stays."""
         place = y.manifold_point[self.layout.memory]
         return {"place": where(all_finite(place), place, x.place)}

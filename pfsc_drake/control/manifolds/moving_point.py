@@ -95,7 +95,7 @@ class TrajectoryPoint(Block):
         num_outputs: ``m``.
 
     Attributes:
-        layout: Of the manifold's point.
+        layout: Layout of the manifold's point.
     """
 
     def __init__(self, path: Path, relative_degree: int, num_outputs: int) -> None:
@@ -109,7 +109,7 @@ class TrajectoryPoint(Block):
         self.outputs, self.states = {"manifold_point": Port(self.layout.size)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
-        """See :class:`Block`."""
+        """Return all outputs, and the inner values."""
         return {"manifold_point": self._at(self._parameter(ca.MX(u.reference[0])))}
 
     def _parameter(self, eta: ca.MX) -> ca.MX:

@@ -82,7 +82,7 @@ class SpaceManifold:
 
     Args:
         order: Relative degree r of the law.
-        quaternion: Of ``R_d`` (w, x, y, z), shape (4,); None for no orientation.
+        quaternion: Quaternion of ``R_d`` (w, x, y, z), shape (4,); None for no orientation.
         tool_axis: The axis that alone keeps the orientation, in the tool frame, of any length,
             shape (3,); None if the whole tool does.
         yaw_axis: The axis about which alone the tool's turn keeps the orientation, world axes,

@@ -51,7 +51,7 @@ class CourseFinder:
         manifold: What it follows; one that the tool is projected onto.
         projection: Finds the place on it.
         inverse: Inverts the decoupling matrix.
-        posture: Of a robot with more joints than outputs.
+        posture: Posture of a robot with more joints than outputs.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class CourseFinder:
             start: Where it begins.
             reference: Derivatives 0..r of the virtual output's reference, shape (samples, r + 1,
                 m).
-            times: Of the samples, evenly spaced [s], shape (samples,).
+            times: Times of the samples, evenly spaced [s], shape (samples,).
             still: Whether joints beyond the outputs only move with them, as little as they can.
                 The posture's own motion needs samples as close as those of the law.
 

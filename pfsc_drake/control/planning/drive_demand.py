@@ -238,7 +238,7 @@ def find_pace(
     Args:
         demand: Tells what a motion asks of the drives.
         course: Joint coordinates and derivatives by ``tau``, shape (samples, K + 1, N).
-        step: Of the grid [s].
+        step: Step of the grid [s].
         allowed: What may be asked, shape (samples, 2N).
         change: Largest change of pace ``dc/dt`` [1/s].
         smoothing: Width of the filters together [s].
@@ -318,7 +318,7 @@ class Clock:
 
     Args:
         pace: ``dtau/dt`` on an even grid of ``tau`` from 0 on, shape (samples,).
-        step: Of the grid [s].
+        step: Step of the grid [s].
     """
 
     def __init__(self, pace: np.ndarray, step: float) -> None:

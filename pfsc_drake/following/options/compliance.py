@@ -25,8 +25,8 @@ class ObservedForceParameters:
     """Forces on the tool from the torques in the joints, without a sensor.
 
     Attributes:
-        rate: Of the observer [1/s].
-        damping: Of the inverse of the Jacobian in singular postures.
+        rate: Rate of the observer [1/s].
+        damping: Damping of the inverse of the Jacobian in singular postures.
         force_dead_band: [N]; friction and model errors are taken for forces below it.
         torque_dead_band: [Nm].
     """
@@ -50,9 +50,10 @@ class ComplianceParameters:
         source: Where the forces come from: the ``sensor``, or ``observed`` from how the joints
             move, for robots that can be moved at their links.
         observed: How they are observed.
-        tangential: Of eta.
-        transversal: Of xi_1 and xi_2.
-        rotational: Of the angles, three or those of the tool's axis; oriented paths only.
+        tangential: Tangential of eta.
+        transversal: Transversal of xi_1 and xi_2.
+        rotational: Rotational of the angles, three or those of the tool's axis; oriented paths
+            only.
         with_turning: Whether torques act along eta where the path's orientation turns.
         press: With which force a tool presses on a surface, whose transversal coordinate has no
             stiffness then. None without the block.

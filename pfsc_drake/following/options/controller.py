@@ -40,11 +40,11 @@ class PostureParameters:
         joint_weights: The same as one positive number per joint; empty for ``weight``.
         elbow_joints: Numbers of the joints whose origins are shoulder, elbow and wrist, the first
             joint being 1.
-        inertia: Of the posture in the null space, every joint [kg m^2 or kg].
-        damping: Of the same [Nm s/rad or N s/m].
-        stiffness: Of its spring [Nm/rad or N/m], or of the pull of ``limits`` and
+        inertia: Inertia of the posture in the null space, every joint [kg m^2 or kg].
+        damping: Damping of the same [Nm s/rad or N s/m].
+        stiffness: Stiffness of its spring [Nm/rad or N/m], or of the pull of ``limits`` and
             ``conditioning``; 0 for a posture that stays where it is left.
-        filter_rate: Of the filter [rad/s].
+        filter_rate: Filter rate of the filter [rad/s].
         yields: To which external torques it yields: ``none``; ``known``: those of all forces on
             the robot; ``observed``: as they show in how the links move, without a sensor.
         observer_rate: How fast torques are observed [rad/s].
@@ -164,8 +164,8 @@ class LawGains:
         eta: Tangential.
         xi: Both transversal.
         phi: Rotational; unused by arms that only position.
-        posture: Of the joints next to the posture reference, where there are more joints than
-            outputs; by default those of ``xi`` without their integral part.
+        posture: Posture of the joints next to the posture reference, where there are more joints
+            than outputs; by default those of ``xi`` without their integral part.
     """
 
     eta: GainParameters = dc.field(default_factory=GainParameters)
@@ -194,9 +194,9 @@ class ExternalTorqueParameters:
         source: ``none``: nothing; ``known``: from the wrench that acts on the tool;
             ``measured``: from the force/torque sensor; ``observed``: from how the links move,
             without a sensor.
-        bandwidth: Of the estimated derivatives, of which laws for elastic joints need one or
-            two, and of the torque itself [rad/s]; 0 for the torque as it is, without derivatives,
-            which only an observer cannot do.
+        bandwidth: Bandwidth of the estimated derivatives, of which laws for elastic joints need one
+            or two, and of the torque itself [rad/s]; 0 for the torque as it is, without
+            derivatives, which only an observer cannot do.
     """
 
     source: str = "none"

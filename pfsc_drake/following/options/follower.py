@@ -47,7 +47,7 @@ class FaultParameters:
             ever where it commands velocities.
         chatter_turns: How many times a drive may turn from one limit to the other, fewer being
             forgotten with 0.2 s; 0 for any number.
-        hold_bandwidth: Of the position hold after a fault [rad/s].
+        hold_bandwidth: Hold bandwidth of the position hold after a fault [rad/s].
         effort_share: Part of the drives' limits that braking is planned with, up to 1.
         brakes: Holding brakes; none without the block or with ``brakes: null``.
     """
@@ -104,8 +104,8 @@ class FollowerOptions:
     """What can be chosen of a path or surface following controller.
 
     Attributes:
-        bandwidth: Of the error dynamics [1/s], for coordinates without gains of their own; their
-            poles are chosen by it, see :class:`GainParameters`.
+        bandwidth: Bandwidth of the error dynamics [1/s], for coordinates without gains of their
+            own; their poles are chosen by it, see :class:`GainParameters`.
         controller: Gains, limits, friction, forces, posture, sampling time. Its law is the one
             that the controller is added with.
         faults: What is a fault.

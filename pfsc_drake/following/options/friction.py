@@ -62,7 +62,7 @@ class KalmanParameters:
             thousandth of what is believed.
         viscous_noise: Variance that f_v gains per sample [(Nm s/rad)^2]; likewise.
         measurement_noise: Variance of a measured momentum [(Nm s)^2].
-        initial_variance: Of all states at the start.
+        initial_variance: Initial variance of all states at the start.
         resting_velocity: Magnitude below which a drive counts as stuck and teaches nothing
             [rad/s or m/s]; ``intervals: mean`` only.
     """

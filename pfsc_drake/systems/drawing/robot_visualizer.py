@@ -120,7 +120,7 @@ def turn_scene_over(meshcat: Meshcat, height: float) -> None:
 
     Args:
         meshcat: Where things are drawn.
-        height: Of the inertial frame's origin above the grid [m].
+        height: Height of the inertial frame's origin above the grid [m].
     """
     upside_down = RollPitchYaw(np.pi, 0.0, 0.0).ToRotationMatrix()
     meshcat.SetTransform(_SCENE, RigidTransform(upside_down, [0.0, 0.0, height]))

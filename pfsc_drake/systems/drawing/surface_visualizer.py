@@ -24,7 +24,7 @@ class SurfaceVisualizer(LeafSystem):
     Args:
         skin: Points of the surface on a grid [m], shape (rows, columns, 3).
         lines: Lines on it [m], each (points, 3).
-        size: Of the manifold's point.
+        size: Size of the manifold's point.
         place: ``point -> (position, axes)``, shapes (3,) and (3, 3).
         meshcat: Where to draw.
         period: Time between frames [s].
@@ -93,14 +93,14 @@ class RegionVisualizer(LeafSystem):
     """Draws the surfaces that a tool may not cross, and the world's axes at the tool.
 
     Ports:
-        manifold_point (input): Of the space manifold, the tool point first.
+        manifold_point (input): Point of the space manifold, the tool point first.
         region_clock (input, optional): Time of the clock by which regions move [s], shape (1,).
 
     Args:
-        surfaces: Of each region points on a grid [m], shape (rows, columns, 3), and lines on it
-            [m], each (points, 3).
+        surfaces: Surfaces of each region points on a grid [m], shape (rows, columns, 3), and lines
+            on it [m], each (points, 3).
         moving: How regions that move are placed at a time of the clock, by their index.
-        size: Of the manifold's point.
+        size: Size of the manifold's point.
         meshcat: Where to draw.
         period: Time between frames [s].
     """

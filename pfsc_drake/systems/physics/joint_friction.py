@@ -136,7 +136,7 @@ class HoldingBrakes(LeafSystem):
     holds at rest.
 
     Ports:
-        velocity (input): Of the motors [rad/s or m/s], shape (N,).
+        velocity (input): Velocities of the motors [rad/s or m/s], shape (N,).
         fault (input): Nonzero in one component if there is one, any size.
         resistance (output): ``-tau_b``, the generalized force on the motors [Nm or N], shape
             (N,).
@@ -147,7 +147,7 @@ class HoldingBrakes(LeafSystem):
 
     Args:
         friction: Holding torques ``f_c`` with their bristles, N joints.
-        size: Of the port ``fault``.
+        size: Size of the port ``fault``.
         delay: From the fault until they close [s].
         period: Sampling time [s].
     """

@@ -18,7 +18,7 @@ class SensorNoise(LeafSystem):
     the other half is there already, so that it does not matter who looks first at a tick.
 
     Ports:
-        noise (output): Of NOISE_TICKS ticks, that of tick k at ``k mod NOISE_TICKS``, shape
+        noise (output): Noise of NOISE_TICKS ticks, that of tick k at ``k mod NOISE_TICKS``, shape
             (size NOISE_TICKS,).
 
     State:
@@ -26,7 +26,7 @@ class SensorNoise(LeafSystem):
 
     Args:
         deviation: Standard deviation of each component, shape (size,).
-        seed: Of the noise.
+        seed: Seed of the noise.
         period: Sampling time [s].
     """
 

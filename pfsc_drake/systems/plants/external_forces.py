@@ -55,7 +55,7 @@ class PartnerForces(LeafSystem):
     """Sums the point contact forces of each of K partners on whatever touches it.
 
     Ports:
-        contact_results (input): Of the plant, abstract.
+        contact_results (input): Contacts of the plant, abstract.
         forces (output): Forces by the partners one after the other, world axes, shape (3 K,) [N].
 
     Args:

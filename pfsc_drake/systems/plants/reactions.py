@@ -24,7 +24,7 @@ class JointReaction(LeafSystem):
             frame on it, shape (6,) [Nm, N].
 
     Args:
-        index: Of the joint in the plant's reactions, see :func:`reaction_index`.
+        index: Index of the joint in the plant's reactions, see :func:`reaction_index`.
     """
 
     def __init__(self, index: int) -> None:
@@ -63,7 +63,7 @@ class ToolReaction(LeafSystem):
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, the true ones, shape (4N,).
-        acceleration (input): Of the links, from the plant, shape (N,).
+        acceleration (input): Accelerations of the links, from the plant, shape (N,).
         wrench (input): ``[force, torque]`` on the tool at the tool point, world axes, shape
             (6,) [N, Nm]; zero if not connected.
         reaction (output): ``[torque, force]`` on the tool, axes and origin of the sensor,
@@ -105,7 +105,7 @@ class ContactWrench(LeafSystem):
     """Sums the hydroelastic contact forces on one body.
 
     Ports:
-        contact_results (input): Of the plant, abstract.
+        contact_results (input): Contacts of the plant, abstract.
         tool_pose (input): ``[y_t, R_e]``, shape (12,); the torque is about ``y_t``.
         wrench (output): ``[force, torque]`` on the body, world axes, shape (6,) [N, Nm].
 
