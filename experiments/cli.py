@@ -19,7 +19,6 @@ from experiments.run_commands import (
 )
 from experiments.study_commands import (
     export_command,
-    inverse_kinematics_command,
     margins_command,
     replay_command,
     study_command,
@@ -42,7 +41,6 @@ app.command("teach")(teach_command)
 app.command("margins")(margins_command)
 app.command("export")(export_command)
 app.command("replay")(replay_command)
-app.command("inverse-kinematics")(inverse_kinematics_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

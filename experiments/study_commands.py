@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 
@@ -29,8 +28,6 @@ from experiments.command_options import (
     ScenarioName,
     read_duration,
 )
-
-_WIDEST_TABLE = 160  # columns, of postures
 
 
 def study_command(
@@ -197,37 +194,3 @@ def replay_command(
         with ProgressDisplay(console, place.name, None, paced=False) as progress:
             commands = replay_log(place, expand_home(log), progress)
         raise typer.Exit(judge_commands(console, commands))
-
-
-def inverse_kinematics_command(
-    model: Annotated[
-        str, typer.Argument(help="Name of a shipped arm, or path of a parameters.yaml.")
-    ],
-    position: Annotated[
-        tuple[float, float, float],
-        typer.Option(metavar="X Y Z", help="Tool point in the base frame [m]."),
-    ],
-    zyx_deg: Annotated[
-        tuple[float, float, float],
-        typer.Option(
-            metavar="A B C",
-            help="Angles of the flange about z, then the new y, then the new x [deg].",
-        ),
-    ],
-) -> None:
-    """Print all postures of an arm with a spherical wrist that reach a pose, in closed form."""
-    from experiments.inverse_kinematics import find_postures, posture_table
-
-    with interruptible():
-        postures = find_postures(model, np.array(position), np.array(zyx_deg))
-        table, console = posture_table(postures), Console()
-        # angles that a narrow terminal cuts off are worth nothing
-        console.width = max(console.width, _WIDEST_TABLE)
-        console.print(table)
-        within = sum(posture.branch.is_within_limits for posture in postures)
-        console.print(f"{within} of {len(postures)} within the limits, angles in deg")
-        if any(p.branch.is_singular for p in postures):
-            console.print(
-                "theta_1 of an open shoulder and theta_4 of a straight wrist are free: 0 stands "
-                "for all"
-            )

@@ -10,7 +10,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.plate_plant import PAD, pin_shape
-from pfsc_drake.geometry.bore import bore_wedges
+from pfsc_drake.geometry.workpieces import bore_wedges
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Triangles
 from pfsc_drake.systems.drawing.tool_visualizer import ToolPart, ToolVisualizer

@@ -13,7 +13,7 @@ from diagrams.scenario.checks import (
     require_place,
 )
 from diagrams.scenario.surface import SurfaceShape, require_jacobian
-from pfsc_drake.geometry.size import FARTHEST, SHORTEST
+from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.yaml.reading import FILE
 
 _SHORTEST_TOLERANCE = 1e-7  # m

@@ -21,7 +21,7 @@ from diagrams.scenario.surface_shapes import (
     Torus,
     Turned,
 )
-from pfsc_drake.geometry.size import FARTHEST
+from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.yaml.reading import FILE
 
 _UNITS = ("m", "cm", "mm", "inch")

@@ -11,8 +11,8 @@ from diagrams.scenario.checks import (
     require_numbers,
     require_place,
 )
-from pfsc_drake.geometry.size import FARTHEST
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+from pfsc_drake.geometry.curves.curve import FARTHEST
+from pfsc_drake.geometry.surfaces.surface import rotation_from_axes
 
 _LARGEST_TURN = 720.0  # deg
 _MOST_BENT = 1e4  # 1/m

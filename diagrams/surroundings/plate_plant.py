@@ -26,7 +26,7 @@ from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.scenario.plate import PlateContactParameters, PlateParameters
-from pfsc_drake.geometry.bore import bore_wedges
+from pfsc_drake.geometry.workpieces import bore_wedges
 from pfsc_drake.systems.plants.external_forces import PartnerForces
 
 REST_RADIUS = 2e-3  # m, of the bosses on which a plate lies

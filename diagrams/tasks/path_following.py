@@ -33,7 +33,7 @@ from pfsc_drake.geometry import (
     shape_report,
     zyx_to_matrix,
 )
-from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.geometry.paths.path import PathTarget
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem

@@ -32,8 +32,7 @@ from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
-from pfsc_drake.geometry.surfaces.grid import surface_through_grid
-from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
+from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.point_file import Unit, read_profile, read_surface_points
 from pfsc_drake.geometry.surfaces.scattered import ScatteredFitOptions, fit_scattered

@@ -16,14 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.elastic.equation import MotorEquation, motor_equation
 from identification.elastic.signals import (
     JointSignals,
+    MotorEquation,
     TestFunction,
     check_locked,
     check_same_travel,
     joint_signals,
     long_run_covariance,
+    motor_equation,
 )
 from identification.measurement.record import Record
 from identification.model.subject import Subject

@@ -11,6 +11,7 @@ from pfsc_drake.geometry.curves.smoothing import noise_level
 from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.intersections.edge import Edge, find_edge, find_edges
 from pfsc_drake.geometry.intersections.meeting import find_corners
+from pfsc_drake.geometry.nearest import ProjectionStatus
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
@@ -26,7 +27,6 @@ from pfsc_drake.geometry.paths.waypoints import (
     read_waypoints,
     waypoints_text,
 )
-from pfsc_drake.geometry.projection_status import ProjectionStatus
 from pfsc_drake.geometry.rotation import (
     angle_between,
     check_rotation_matrix,
@@ -51,9 +51,7 @@ from pfsc_drake.geometry.surfaces.generated import (
     surface_of_revolution,
     translated_surface,
 )
-from pfsc_drake.geometry.surfaces.grid import surface_through_grid
-from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
-from pfsc_drake.geometry.surfaces.placement import rotation_from_axes
+from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.point_file import read_surface_points
 from pfsc_drake.geometry.surfaces.product import ProductSurface
@@ -79,6 +77,7 @@ from pfsc_drake.geometry.surfaces.surface import (
     partial_count,
     partial_index,
     partial_orders,
+    rotation_from_axes,
 )
 
 __all__ = [

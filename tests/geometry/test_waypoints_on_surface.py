@@ -13,7 +13,7 @@ from pfsc_drake.geometry.path_on_surface import (
     path_on_surface,
     project_waypoints,
 )
-from pfsc_drake.geometry.paths.target import PathTarget
+from pfsc_drake.geometry.paths.path import PathTarget
 from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
 
 RADIUS = 0.2

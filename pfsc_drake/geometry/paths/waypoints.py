@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.curves.curve import Curve
+from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST, Curve
 from pfsc_drake.geometry.curves.orientation import (
     OrientationCurve,
     check_neighbours,
@@ -26,7 +26,6 @@ from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.smoothing import smooth_orientation, smooth_positions
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.geometry.rotation import matrix_to_quaternion, zyx_to_quaternion, zyz_to_quaternion
-from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 
 # rad; two turns
 _LARGEST_ANGLE = 4.0 * np.pi

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.regions.region import FormulaRegion, Symbol, Triple, direction
-from pfsc_drake.geometry.surfaces.placement import checked_placement
+from pfsc_drake.geometry.surfaces.surface import checked_placement
 
 # Planes whose coefficients differ by less are one, m.
 _SAME = 1e-9

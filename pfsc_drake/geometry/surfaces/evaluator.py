@@ -12,8 +12,7 @@ from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import Foot, FootFinder, first_and_bend, largest_eigenvalue
-from pfsc_drake.geometry.nearest_samples import nearest_samples
-from pfsc_drake.geometry.projection_status import ProjectionStatus
+from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
 from pfsc_drake.geometry.surfaces.point import SurfacePointLayout

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.geometry.size import FARTHEST
 
 Unit = Literal["m", "cm", "mm", "inch"]
 

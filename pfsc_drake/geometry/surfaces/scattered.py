@@ -7,12 +7,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
+from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.curves.spline import check_smoothness
-from pfsc_drake.geometry.size import FARTHEST, SHORTEST
 from pfsc_drake.geometry.surfaces.base import Base
-from pfsc_drake.geometry.surfaces.choose_base import BaseChoice, choose_base
-from pfsc_drake.geometry.surfaces.coverage import Neighbourhoods, cover, neighbourhoods, stand
-from pfsc_drake.geometry.surfaces.grid_smoothing import smoothest_within
+from pfsc_drake.geometry.surfaces.choose_base import (
+    BaseChoice,
+    Neighbourhoods,
+    choose_base,
+    cover,
+    neighbourhoods,
+    stand,
+)
+from pfsc_drake.geometry.surfaces.grid import smoothest_within
 from pfsc_drake.geometry.surfaces.penalized_surface import (
     PenalizedSurface,
     Residuals,

@@ -11,8 +11,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.fourier import FourierCurve
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.surfaces.generated import surface_of_revolution, translated_surface
-from pfsc_drake.geometry.surfaces.placement import checked_placement
 from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.surface import checked_placement
 
 Pair = tuple[float, float]
 

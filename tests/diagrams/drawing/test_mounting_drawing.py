@@ -10,7 +10,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 from diagrams.drawing.mounting_look import add_mounting_drawing, mounting_look, ring_surface
 from diagrams.scenario.plate import PlateParameters
 from diagrams.surroundings.mounting import Mounting
-from pfsc_drake.geometry.bore import bore_wedges
+from pfsc_drake.geometry.workpieces import bore_wedges
 
 X_WM, X_WF = RigidTransform([0.7, -0.4, 0.5]), RigidTransform([0.8, 0.3, 0.6])
 

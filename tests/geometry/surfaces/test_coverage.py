@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.coverage import _largest_rectangle, cover, stand
+from pfsc_drake.geometry.surfaces.choose_base import _largest_rectangle, cover, stand
 from pfsc_drake.geometry.surfaces.surface import Interval
 
 SIDES = Interval(0.0, 1.0), Interval(2.0, 2.5)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from pfsc_drake.geometry.curves.spline import interpolate
-from pfsc_drake.geometry.projection_status import ProjectionStatus
+from pfsc_drake.geometry.nearest import ProjectionStatus
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, translated_surface

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.geometry.surfaces.shapes import Turned, cylinder, paraboloid
-from pfsc_drake.geometry.sweep import surface_mesh
+from pfsc_drake.geometry.workpieces import surface_mesh
 
 SPACING = 5e-3
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.coverage import neighbourhoods
+from pfsc_drake.geometry.surfaces.choose_base import neighbourhoods
 
 
 def grid(step, count, noise=0.0, begin=0.0):

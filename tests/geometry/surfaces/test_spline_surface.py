@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.grid import surface_through_grid
-from pfsc_drake.geometry.surfaces.grid_smoothing import smooth_surface_near_grid
+from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
 from pfsc_drake.geometry.surfaces.spline_surface import (
     UniformKnots,
     interpolated_surface,

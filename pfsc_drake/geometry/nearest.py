@@ -1,6 +1,7 @@
-"""Which of many points are nearest, as expressions."""
+"""Where the search of the nearest point begins, as expressions, and how it ended."""
 
 import math
+from enum import IntEnum
 
 import casadi as ca
 import numpy as np
@@ -83,3 +84,11 @@ def _repeated(step: ca.Function, calls: int) -> ca.Function:
     for part in ca.horzsplit(samples, step.size2_in(1)):
         state = step(state, part)
     return ca.Function(f"{step.name()}_{calls}", [begin, samples], [state])
+
+
+class ProjectionStatus(IntEnum):
+    """Value of the field `status` of a manifold's point."""
+
+    OK = 0
+    BEYOND_END = 1
+    NOT_CONVERGED = 2
