@@ -31,7 +31,7 @@ class Findings:
     Attributes:
         runs: Estimates, one for each run.
         choice: How friction was chosen; None if it was not.
-        prediction: Of a motion that was not used; None without one.
+        prediction: Prediction of a motion that was not used; None without one.
         truth: True base parameters, shape (n_b,); None for a real robot.
         notes: What torques cannot tell about their units or make doubtful, one sentence each.
     """
@@ -71,9 +71,9 @@ def find_parameters(
     """Estimate the base parameters of a robot from each of several motions.
 
     Args:
-        regressor: Of the robot.
+        regressor: Regressor of the robot.
         base: Its base parameters.
-        motions: Of one excitation, averaged; at least one.
+        motions: Periods of one excitation, averaged; at least one.
         validation: Another motion, on which friction is chosen and which is predicted.
         choose: Whether to choose friction beyond Coulomb's and viscous.
         truth: True parameters of the robot, shape (n,), if it is simulated.
@@ -121,7 +121,7 @@ def find_consistent(runs: Repetitions, bounds: PhysicalBounds) -> ConsistentPara
         bounds: What is known of the bodies.
 
     Raises:
-        InputError: See :func:`~identification.consistency.nearest.nearest_consistent`.
+        InputError: If no bodies within the bounds have the estimated parameters.
     """
     first = runs.estimates[0]
     robot = first.robot_base

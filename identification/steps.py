@@ -71,7 +71,7 @@ def check_duration(period: float, periods: int) -> None:
     """Refuse a run that is longer than anybody lets a robot move.
 
     Args:
-        period: Of the motion [s].
+        period: Period of the motion [s].
         periods: How often it is run.
 
     Raises:
@@ -137,10 +137,10 @@ def simulate_runs(
         subject: The robot.
         robot: What it was loaded by.
         trajectory: The excitation.
-        imperfections: Of all runs; None for those shipped with the robot.
+        imperfections: Imperfections of all runs; None for those shipped with the robot.
         folder: Where to write; made if it is not there.
         runs: How many.
-        seed: Of the first one.
+        seed: Seed of the first one.
         progress: Told the fraction done and what is done.
     """
     make_folder(folder)
@@ -195,12 +195,12 @@ def estimate_files(
     Args:
         subject: The robot.
         records: Runs of one excitation.
-        validation: Of another motion.
+        validation: Measurement of another motion.
         reading: What files say in other words or not at all.
-        period: Of the excitation [s], if files do not state it.
+        period: Period of the excitation [s], if files do not state it.
         skip: Periods at the start that are left out.
-        bandwidth_hz: Of the motion [Hz]; by default the least with which the model explains the
-            torques of the first record as well as with any.
+        bandwidth_hz: Bandwidth of the motion [Hz]; by default the least with which the model
+            explains the torques of the first record as well as with any.
         choose: Whether to choose friction beyond Coulomb's and viscous.
         simulated: Whether the robot's model is the truth.
         progress: Told the fraction done and what is done.

@@ -100,7 +100,7 @@ class PhysicalBounds:
     """What is known of a robot; either links, or the masses of a DELTA robot.
 
     Attributes:
-        name: Of the robot.
+        name: Name of the robot.
         links: From the base on; of the last one without tool, if the tool is not identified.
         rotor_inertia: ``[2]`` least and largest ``I_M`` of each joint [kg m^2], at the motor side
             as in the parameters; empty for no bounds but zero.
@@ -249,7 +249,7 @@ def other_intervals(layout: Layout, bounds: PhysicalBounds) -> Intervals:
     robot.
 
     Args:
-        layout: Of the n parameters.
+        layout: Order of the n parameters.
         bounds: What is known.
     """
     unit, none = np.eye(layout.size), [0.0, np.inf]

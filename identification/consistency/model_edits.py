@@ -51,7 +51,7 @@ def urdf_text(subject: Subject, parameters: np.ndarray) -> str:
 
     Args:
         subject: A serial robot of N joints.
-        parameters: Of the robot, with or without friction, shape (n,).
+        parameters: Parameters of the robot, with or without friction, shape (n,).
 
     Raises:
         InputError: If the robot is no chain, there are not as many parameters or one is not finite.
@@ -178,7 +178,7 @@ def edited_model(subject: Subject, parameters: np.ndarray) -> str:
 
     Args:
         subject: A serial robot read from a URDF or an SDF file with rigid joints.
-        parameters: Of the robot, with or without friction, shape (n,).
+        parameters: Parameters of the robot, with or without friction, shape (n,).
 
     Raises:
         InputError: If the model is of another kind or spread over several files, or a body would

@@ -27,7 +27,7 @@ class Prediction:
 
     Attributes:
         matrices: Regression matrices ``Y_b`` of a motion, shape (K, N, n_b).
-        standard_deviation: Of the torques [Nm or N], shape (N,).
+        standard_deviation: Standard deviation of the torques [Nm or N], shape (N,).
         weight: For how many measurements of each torque the motion counts.
 
     Raises:
@@ -61,14 +61,14 @@ class ConsistentParameters:
     """A physically consistent set of n parameters.
 
     Attributes:
-        names: Of the parameters.
+        names: Names of the parameters.
         parameters: ``rho``, SI units, shape (n,).
         chi_squared: ``|L^-1 (K_b rho - rho_b)|^2`` with the covariance ``L L'`` of the base
             parameters ``rho_b``: how far it is from what was measured.
-        base_names: Of the n_b base parameters, in words.
+        base_names: Names of the n_b base parameters, in words.
         base_values: ``K_b rho``, shape (n_b,).
         deviations: ``K_b rho - rho_b`` in standard deviations of each, shape (n_b,).
-        prior_weight: Of what decides on parameters without effect.
+        prior_weight: Prior weight of what decides on parameters without effect.
     """
 
     names: list[str]
@@ -96,9 +96,9 @@ def nearest_consistent(
     :func:`~identification.consistency.program.least_squares`.
 
     Args:
-        base: Of the robot, or other combinations of its parameters.
+        base: Base of the robot, or other combinations of its parameters.
         values: Identified base parameters ``rho_b``, shape (n_b,).
-        covariance: Of the values, shape (n_b, n_b).
+        covariance: Covariance of the values, shape (n_b, n_b).
         bounds: What is known of the bodies.
         prior: What parameters without effect tend to, shape (n,); by default the middle of the
             bounds.
@@ -137,7 +137,7 @@ def refuse_far(found: ConsistentParameters, source: str) -> None:
 
     Args:
         found: The set.
-        source: Of what was measured.
+        source: Source of what was measured.
 
     Raises:
         InputError: If chi squared is far above the number of base parameters; names the parameters

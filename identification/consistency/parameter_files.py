@@ -184,7 +184,7 @@ def links_without_tool(subject: Subject, parameters: np.ndarray) -> np.ndarray:
 
     Args:
         subject: A serial robot of N joints.
-        parameters: Of the robot, with the tool if it belongs to the subject, shape (n,).
+        parameters: Parameters of the robot, with the tool if it belongs to the subject, shape (n,).
 
     Returns:
         Shape (N, 10).

@@ -38,7 +38,7 @@ def prior_from_bounds(names: Sequence[str], bounds: PhysicalBounds) -> np.ndarra
     bounds are NaN: nothing is assumed of them. Masses of a DELTA robot are identifiable, and NaN.
 
     Args:
-        names: Of the n parameters.
+        names: Names of the n parameters.
         bounds: What is known.
     """
     layout = Layout.of(names)
@@ -54,7 +54,7 @@ def check_prior(names: Sequence[str], prior: np.ndarray) -> np.ndarray:
     """Return a prior, such as the robot's CAD data, shape (n,).
 
     Args:
-        names: Of the n parameters.
+        names: Names of the n parameters.
         prior: Full set; NaN for what nothing is assumed of, which no link's parameter can be.
 
     Raises:
@@ -130,7 +130,7 @@ def least_squares(
     Args:
         A: Weighted so that b has the unit matrix for its covariance, shape (k, n).
         b: Shape (k,).
-        names: Of the n parameters.
+        names: Names of the n parameters.
         bounds: What is known beforehand.
         prior: ``rho_0``, see :func:`~identification.consistency.program.check_prior`; by default
             that of the bounds.

@@ -89,11 +89,13 @@ class Layout:
     """Indices of the parameters of a robot with N joints.
 
     Attributes:
-        names: Of the n parameters, see :func:`~identification.model.parameters.parameter_names`.
+        names: Names of the n parameters, see
+            :func:`~identification.model.parameters.parameter_names`.
         links: Ten indices of each link, shape (N, 10); (0, 10) for a DELTA robot.
-        rotors: Of the rotor inertias, shape (N,); empty for a DELTA robot.
-        masses: Of the slides' masses and the plate's of a DELTA robot, shape (4,); else empty.
-        friction: Of the friction, shape (2 N,) or empty.
+        rotors: Indices of the rotor inertias, shape (N,); empty for a DELTA robot.
+        masses: Indices of the slides' masses and the plate's of a DELTA robot, shape (4,); else
+            empty.
+        friction: Indices of the friction, shape (2 N,) or empty.
     """
 
     names: list[str]

@@ -132,7 +132,7 @@ def joint_table(estimates: Sequence[JointEstimate]) -> Table:
     """Return the parameters of joints with their standard deviations.
 
     Args:
-        estimates: Of the joints.
+        estimates: Estimates of the joints.
     """
     rows: list[list[str | float]] = [
         [joint, name, value, deviation, 100.0 * deviation / abs(value) if value else np.inf, unit]
@@ -146,8 +146,8 @@ def write_table(path: str | Path, estimates: Sequence[JointEstimate]) -> None:
     """Write the parameters of joints with their standard deviations as CSV.
 
     Args:
-        path: Of the file, which is replaced.
-        estimates: Of the joints.
+        path: Path of the file, which is replaced.
+        estimates: Estimates of the joints.
 
     Raises:
         InputError: If the file cannot be written.

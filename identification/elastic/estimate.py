@@ -39,11 +39,11 @@ class JointEstimate:
     """What was found of one joint, on the joint side; units of a slide in brackets.
 
     Attributes:
-        name: Of the joint.
+        name: Name of the joint.
         unit: ``rad`` or ``m``.
         locked: Whether the link was.
-        values: Of ``parameters``, shape (n,).
-        covariance: Of ``values``, shape (n, n).
+        values: Values of ``parameters``, shape (n,).
+        covariance: Covariance of ``values``, shape (n, n).
         parameters: Which were estimated: ``stiffness`` [Nm/rad (N/m)], ``damping``
             [Nm s/rad (N s/m)], ``inertia`` of the motor [kg m^2 (kg)], ``coulomb`` [Nm (N)],
             ``lag`` l [Nm s (N s)] where the motor reverses often, ``viscous`` [Nm s/rad (N s/m)]
@@ -96,8 +96,8 @@ def check_estimate(where: str, estimate: JointEstimate) -> None:
     """Refuse what no joint has, or what says next to nothing.
 
     Args:
-        where: Of the joint, for messages.
-        estimate: Of the joint.
+        where: Name of the joint, for messages.
+        estimate: Estimate of the joint.
 
     Raises:
         InputError: If the stiffness is vague, or a parameter is certainly negative.
@@ -189,7 +189,7 @@ def estimate_joint(
     off by up to some tenths of a percent.
 
     Args:
-        signals: Of the joint.
+        signals: Signals of the joint.
         locked: Whether the link was held. The motor then feels the joint's damping and its own
             viscous friction as one, so that the latter has to be known from elsewhere.
         viscous: ``f_v`` [Nm s/rad or N s/m], for a locked joint only.

@@ -65,7 +65,7 @@ def zippered_multisine(
     Args:
         rms: Root of the mean square of each joint's torque [Nm or N], shape (N,).
         period: All frequencies are multiples of its reciprocal [s].
-        random: Of the phases.
+        random: Generator of the phases.
         lowest: Frequency [Hz].
         highest: Frequency [Hz].
 
@@ -104,7 +104,7 @@ def random_steps(
         height: Largest magnitudes [Nm or N], shape (N,).
         hold: Time for which a level lasts [s].
         t: Instants [s], shape (K,).
-        random: Of the levels.
+        random: Generator of the levels.
 
     Raises:
         InputError: If a value is not positive.
@@ -145,8 +145,8 @@ def simulate_locked(
         faults: Noise of the torques, encoders and noise of the positions.
         duration: [s].
         steps: Whether torques jump between random levels, else sums of sines from 4 to 90 Hz.
-        share: Of the drives' largest torques, RMS of the sines, highest of the steps.
-        seed: Of all random numbers.
+        share: Share of the drives' largest torques, RMS of the sines, highest of the steps.
+        seed: Seed of all random numbers.
         progress: Told the fraction done and what is done.
 
     Raises:
@@ -202,9 +202,9 @@ def simulate_excited(
         trajectory: Excitation, within the limits of the robot.
         faults: Noise of the torques, encoders and noise of the positions.
         periods: How often the excitation is run.
-        share: Of the drives' largest torques, RMS of the sines.
+        share: Share of the drives' largest torques, RMS of the sines.
         servo: The controller.
-        seed: Of all random numbers.
+        seed: Seed of all random numbers.
         progress: Told the fraction done and what is done.
 
     Raises:

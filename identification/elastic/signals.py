@@ -33,7 +33,7 @@ class TestFunction:
     """A B-spline and its derivatives at the samples.
 
     Attributes:
-        kernels: Of the derivatives 0, 1, 2, shape (3, 2 H + 1).
+        kernels: Kernels of the derivatives 0, 1, 2, shape (3, 2 H + 1).
     """
 
     __test__ = False  # of the weak form, none of the tests'
@@ -126,7 +126,7 @@ class JointSignals:
     """Torque and positions of one joint at K instants, all on the joint side.
 
     Attributes:
-        name: Of the joint.
+        name: Name of the joint.
         t: Evenly spaced times [s], shape (K,).
         tau: Drive torques ``tau_d`` [Nm or N], shape (K,).
         q_motor: Positions of the motor [rad or m], shape (K,).
@@ -275,7 +275,7 @@ def motor_equation(
     not known there.
 
     Args:
-        signals: Of the joint.
+        signals: Signals of the joint.
         locked: Whether the link was held.
         function: That the equation is convolved with.
         position_noise: Standard deviations of white noise on the positions of motor and link;

@@ -97,7 +97,7 @@ def choose_friction(
     """Return the friction terms that predict a motion better that was not used.
 
     Args:
-        regressor: Of the robot, with friction.
+        regressor: Regressor of the robot, with friction.
         base: Its base parameters.
         motion: That parameters are estimated on.
         other: That they are judged on, another trajectory; need not excite all parameters.

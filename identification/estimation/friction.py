@@ -149,7 +149,7 @@ class FrictionTerms:
         """Return base parameters with those of the terms behind them.
 
         Args:
-            base: Of the robot without the terms.
+            base: Base of the robot without the terms.
             joint_units: ``rad`` or ``m`` of each joint.
         """
         size, (rank, full) = len(self.terms), base.projection.shape

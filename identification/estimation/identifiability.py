@@ -66,7 +66,7 @@ def factorize(X: np.ndarray, b: np.ndarray, names: Sequence[str], what: str) -> 
     Args:
         X: Weighted, shape (rows, n_b).
         b: Weighted torques, shape (rows,).
-        names: Of the parameters.
+        names: Names of the parameters.
         what: Whose they are, for messages.
 
     Raises:
@@ -117,7 +117,7 @@ class WeakParameter:
     """A parameter that is badly identifiable, and why.
 
     Attributes:
-        name: Of the parameter.
+        name: Name of the parameter.
         relative_deviation: Standard deviation by magnitude.
         relative_deviation_alone: The same if all others were known.
         torque_share: Largest RMS of the torques that the parameter makes, in units of the
@@ -168,11 +168,11 @@ def weak_parameters(
 
     Args:
         matrix: ``Y_b``, shape (K, N, n_b).
-        weights: Of the torques, shape (K, N).
+        weights: Weights of the torques, shape (K, N).
         noise: Standard deviation of one torque as measured, shape (N,).
-        values: Of the parameters, shape (n_b,).
-        covariance: Of the parameters, shape (n_b, n_b).
-        names: Of the parameters.
+        values: Values of the parameters, shape (n_b,).
+        covariance: Covariance of the parameters, shape (n_b, n_b).
+        names: Names of the parameters.
         joint_names: N names.
     """
     deviation = np.sqrt(np.diag(covariance))

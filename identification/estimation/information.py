@@ -22,39 +22,31 @@ class MeasuredMotion(Protocol):
     """A motion of N joints at K instants, as of Sec. 2.5.2, and its torques.
 
     :class:`~identification.measurement.periods.AveragedMotion` is one.
-
-    Attributes:
-        q: Positions [rad or m], shape (K, N).
-        v: Velocities, shape (K, N).
-        a: Accelerations, shape (K, N).
-        tau: Torques [Nm or N], shape (K, N).
-        torque_variance: Of one torque as measured, shape (N,).
-        mean_torque_variance: Of ``tau``, shape (N,); smaller if it is a mean.
     """
 
     @property
     def q(self) -> np.ndarray:
-        """See above."""
+        """Positions [rad or m], shape (K, N)."""
 
     @property
     def v(self) -> np.ndarray:
-        """See above."""
+        """Velocities [rad/s or m/s], shape (K, N)."""
 
     @property
     def a(self) -> np.ndarray:
-        """See above."""
+        """Accelerations [rad/s^2 or m/s^2], shape (K, N)."""
 
     @property
     def tau(self) -> np.ndarray:
-        """See above."""
+        """Torques [Nm or N], shape (K, N)."""
 
     @property
     def torque_variance(self) -> np.ndarray:
-        """See above."""
+        """Variance of one torque as measured, shape (N,)."""
 
     @property
     def mean_torque_variance(self) -> np.ndarray:
-        """See above."""
+        """Variance of ``tau``, shape (N,); smaller if it is a mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +58,7 @@ class Information:
             information matrix X (2.76).
         torques: ``tau_d`` at each instant (2.77) [Nm or N], shape (K, N).
         used: Which torques count, shape (K, N): those of joints that move.
-        variance: Of the torques, the diagonal of Upsilon in (2.80), shape (N,).
+        variance: Variance of the torques, the diagonal of Upsilon in (2.80), shape (N,).
         base: What the columns stand for.
         still: Whether a joint stands still throughout, shape (N,).
     """
@@ -104,7 +96,7 @@ def information(
     but for noise, is taken not to move at all.
 
     Args:
-        regressor: Of the robot.
+        regressor: Regressor of the robot.
         base: Its base parameters, of the same columns.
         motion: The motion.
         friction: Terms beside Coulomb and viscous friction.
@@ -166,7 +158,7 @@ class Products(NamedTuple):
     """What a further column adds to the normal equations.
 
     Attributes:
-        column: Of one joint, weighted, shape (K,).
+        column: Column of one joint, weighted, shape (K,).
         columns: Its products with the columns of the system, shape (n_b,).
         torques: Its product with the torques.
     """
@@ -185,7 +177,7 @@ class FurtherColumns:
         by_joint: X, shape (K, N, n_b).
         torques: b, shape (K, N).
         v: Velocities of the joints [rad/s or m/s], shape (K, N).
-        names: Of the n_b parameters.
+        names: Names of the n_b parameters.
     """
 
     def __init__(self, system: Information, v: np.ndarray) -> None:

@@ -85,7 +85,7 @@ def coloured_covariance(
     Args:
         inverse: ``(X' W X)^-1``, shape (n_b, n_b).
         system: The linear system.
-        spectrum: Of the noise.
+        spectrum: Spectrum of the noise.
     """
     samples = len(system.matrix)
     both = np.full(len(spectrum.power), 2.0)
@@ -112,7 +112,7 @@ class Estimate:
         base: What the parameters are combinations of; those of ``friction`` are the last ones.
         friction: Terms beside Coulomb and viscous friction.
         base_parameters: ``rho_b`` of (2.80), shape (n_b,), SI units.
-        covariance: Of ``base_parameters``, shape (n_b, n_b).
+        covariance: Covariance of ``base_parameters``, shape (n_b, n_b).
         coloured: In which joints the noise that the covariance stands for has the spectrum that
             was measured, shape (N,). In the others it is white; in all of them,
             ``(X' Upsilon^-1 X)^-1`` is the covariance.
@@ -228,7 +228,7 @@ def estimate(
     the same estimate under noise of the spectrum that was measured is larger.
 
     Args:
-        regressor: Of the robot.
+        regressor: Regressor of the robot.
         base: Its base parameters.
         motion: Positions, velocities, accelerations and torques.
         friction: Terms beside Coulomb and viscous friction.

@@ -83,9 +83,9 @@ def describe_negative(name: str, unit: str, value: float, deviation: float) -> s
     """Return that something is below zero that cannot be, in words.
 
     Args:
-        name: Of the parameter.
-        unit: Of the parameter.
-        value: Of the parameter.
+        name: Name of the parameter.
+        unit: Unit of the parameter.
+        value: Value of the parameter.
         deviation: Standard deviation of that.
     """
     return (

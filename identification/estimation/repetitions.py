@@ -18,10 +18,10 @@ class ParameterRow:
 
     Attributes:
         number: j, from 1.
-        name: Of the parameter that leads the combination.
+        name: Name of the parameter that leads the combination.
         combination: What it is a combination of.
-        mean: Of the runs, SI units.
-        unit: Of the mean.
+        mean: Mean of the runs, SI units.
+        unit: Unit of the mean.
         relative_deviation: Standard deviation of the runs [% of the mean]; NaN for one run.
         predicted_deviation: The same as the covariance of a run has it, RMS of the runs.
         truth: True value; NaN if unknown.
@@ -43,8 +43,8 @@ class TorqueRow:
 
     Attributes:
         joint: Name of the joint.
-        unit: Of the torques, ``Nm`` or ``N``.
-        error_rms: Of single measured torques less predicted ones, RMS of the runs.
+        unit: Unit of the torques, ``Nm`` or ``N``.
+        error_rms: RMS error of single measured torques less predicted ones, RMS of the runs.
         noise_level: Standard deviation of single measured torques, RMS of the runs.
         explained: Least share of the mean torques' variance that a run's model explains.
     """

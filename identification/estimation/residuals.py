@@ -105,7 +105,7 @@ class Excess:
 
     Attributes:
         joint_names: N names.
-        highest_hz: Of the frequencies [Hz].
+        highest_hz: Highest of the frequencies [Hz].
         freedom: Degrees of freedom of the residuals of a joint.
         ratio: Shape (N,); 1 if there is nothing but noise.
         p_value: Probability of a larger ratio of noise, shape (N,).
@@ -136,7 +136,7 @@ def excess(
     """Compare residuals with noise at low frequencies.
 
     Args:
-        residuals: Of the mean torques, shape (K, N).
+        residuals: Residuals of the mean torques, shape (K, N).
         used: Which count, shape (K, N).
         motion: Whose residuals they are.
         highest_hz: By default that of 100 harmonics of the period [Hz].
@@ -219,9 +219,9 @@ def choose_bandwidth(
     """Return the least bandwidth with which the model explains torques as well as with any.
 
     Args:
-        regressor: Of the robot.
+        regressor: Regressor of the robot.
         base: Its base parameters.
-        record: Of a periodic motion.
+        record: Record of a periodic motion.
         period: ``T_f`` [s]; by default the record's.
         skip: Periods at the start that are left out.
         progress: Told the fraction done and what is done.

@@ -81,7 +81,7 @@ def save_estimate(path: str | Path, estimate: Estimate, runs: Repetitions | None
     """Write ``identification.h5``.
 
     Args:
-        path: Of the file, which is replaced.
+        path: Path of the file, which is replaced.
         estimate: What it is to hold.
         runs: Repetitions of the experiment.
 
@@ -102,7 +102,7 @@ def load_estimate(path: str | Path) -> StoredIdentification:
     """Read ``identification.h5``.
 
     Args:
-        path: Of a file that :func:`save_estimate` wrote.
+        path: Path of a file that :func:`save_estimate` wrote.
 
     Raises:
         InputError: If the file cannot be read or is not such a file.

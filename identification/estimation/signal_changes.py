@@ -19,10 +19,10 @@ class SignalChange:
         cause: The mistake, in words; empty without.
         steps: How unlikely it is: the number of signals that are mistaken.
         order: Whose positions each joint gets, shape (N,).
-        factors: Of the positions, shape (N,).
-        rate: Of the velocities beside; that of the accelerations is its square.
+        factors: Factors of the positions, shape (N,).
+        rate: Rate of the velocities beside; that of the accelerations is its square.
         torque_order: Whose torques each joint gets, shape (N,).
-        torque_factors: Of the torques, shape (N,).
+        torque_factors: Torque factors of the torques, shape (N,).
     """
 
     cause: str
@@ -68,7 +68,7 @@ def likely_changes(names: Sequence[str], units: Sequence[str]) -> Iterator[Signa
     """Yield what undoes the mistakes that people make.
 
     Args:
-        names: Of N joints.
+        names: Names of N joints.
         units: ``rad`` or ``m`` of each.
     """
     n = len(names)

@@ -21,8 +21,8 @@ class PredictedTorque:
         measured: Mean measured torques, shape (K, N).
         predicted: Those of the model, shape (K, N).
         used: Whether a joint moves fast enough for its friction to be known, shape (K, N).
-        torque_variance: Of one measured torque, shape (N,).
-        mean_torque_variance: Of ``measured``, shape (N,).
+        torque_variance: Variance of one measured torque, shape (N,).
+        mean_torque_variance: Variance of ``measured``, shape (N,).
         uncertainty: Standard deviation of ``predicted`` from that of the parameters, RMS of each
             joint, shape (N,).
     """
@@ -78,7 +78,7 @@ def predict(
     """Return what an estimate predicts of another motion.
 
     Args:
-        estimate: Of the robot.
+        estimate: Estimate of the robot.
         regressor: That the estimate was made with, or one like it.
         motion: The motion; need not excite all parameters.
         slow: Part of a joint's largest velocity below which its torques do not count where noise
@@ -133,7 +133,7 @@ class TruthTest:
     """Errors of an estimate beside the covariance that was predicted for them.
 
     Attributes:
-        names: Of the n_b parameters that count.
+        names: Names of the n_b parameters that count.
         errors: Estimate less truth, SI units, shape (n_b,).
         standard_errors: In units of their standard deviations, shape (n_b,).
         chi_squared: ``e' C^-1 e``.

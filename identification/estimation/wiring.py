@@ -97,7 +97,7 @@ def find_mistake(
     """Return what is wrong with the signals of a motion; None if nothing is, or nothing is found.
 
     Args:
-        regressor: Of the robot, with friction.
+        regressor: Regressor of the robot, with friction.
         base: Its base parameters.
         motion: The motion.
     """
@@ -133,7 +133,7 @@ def unchecked(
     """Return what of the signals cannot be checked or is doubtful, one sentence each.
 
     Args:
-        regressor: Of the robot, with friction.
+        regressor: Regressor of the robot, with friction.
         base: Its base parameters.
         motion: The motion.
         believed: Parameters as the model has them, shape (n,); NaN where it has none.

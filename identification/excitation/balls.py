@@ -127,7 +127,7 @@ def covering_balls(
     covered; what has none, a half space, has no balls.
 
     Args:
-        inspector: Of the scene graph.
+        inspector: Inspector of the scene graph.
         geometry: The shape.
     """
     shape = inspector.GetShape(geometry)

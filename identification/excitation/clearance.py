@@ -214,7 +214,7 @@ def _nearest(gaps: np.ndarray, clearance: float) -> np.ndarray:
     they cover; there the check at the end is what matters.
 
     Args:
-        gaps: Of each posture [m], shape (K, n).
+        gaps: Distances of each posture [m], shape (K, n).
         clearance: That is asked for [m].
 
     Returns:

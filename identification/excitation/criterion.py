@@ -37,7 +37,7 @@ class InformationFigures:
 
     Attributes:
         log_determinant: ``log det(X^T X)``; minus infinity where a parameter is not excited.
-        condition_number: Of X.
+        condition_number: Condition number of X.
         base_parameters: Their number n_b.
     """
 
@@ -52,7 +52,8 @@ def information(
     """Return the figures of a motion.
 
     Args:
-        regressor: Of the robot; with the sign of the velocities itself in Coulomb friction.
+        regressor: Regressor of the robot; with the sign of the velocities itself in Coulomb
+            friction.
         base: Its base parameters.
         trajectory: The motion.
     """
@@ -87,7 +88,7 @@ class BaseRegressorKernels:
         Args:
             regressor: With a smooth sign of the velocities.
             base: The base parameters.
-            weights: Of the rows of each sample, such as inverse standard deviations of the
+            weights: Weights of the rows of each sample, such as inverse standard deviations of the
                 measured torques, shape (N,); all one by default.
         """
         n = regressor.subject.dimension
@@ -112,9 +113,9 @@ class ExcitationCost:
     of REPORTED_SAMPLES.
 
     Args:
-        kernels: Of the robot, N joints and n_b base parameters.
-        period: Of the motion [s].
-        harmonics: Of it, M of them.
+        kernels: Kernels of the robot, N joints and n_b base parameters.
+        period: Period of the motion [s].
+        harmonics: Harmonics of it, M of them.
         samples: Per period.
         criterion: ``D`` or ``condition``.
 

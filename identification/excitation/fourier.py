@@ -108,7 +108,7 @@ class FourierTrajectory:
         """Return the times of one period at a sampling rate, without its end [s], shape (K,).
 
         Args:
-            rate: Of samples [Hz].
+            rate: Rate of samples [Hz].
 
         Raises:
             InputError: If the period is no multiple of the sampling time.
@@ -126,11 +126,11 @@ class FourierTrajectory:
         """Write the coefficients as YAML.
 
         Args:
-            path: Of the file, which is replaced.
+            path: Path of the file, which is replaced.
             robot: What it is for.
             source: Where it is from.
             joints: Names of the joints.
-            figures: Of its quality, by name.
+            figures: Figures of its quality, by name.
 
         Raises:
             InputError: If the file cannot be written.
@@ -176,7 +176,7 @@ class ExcitationFile:
         q_0: ``[N]`` offsets [rad or m].
         a: ``[N, M]`` velocity amplitudes of the cosines [rad/s or m/s].
         b: ``[N, M]`` velocity amplitudes of the sines [rad/s or m/s].
-        figures: Of its quality, by name.
+        figures: Figures of its quality, by name.
     """
 
     period: float = field(default=1.0, metadata=REQUIRED)
@@ -252,7 +252,7 @@ def samples_per_period(period: float, rate: float) -> int:
 
     Args:
         period: T_f [s].
-        rate: Of samples [Hz].
+        rate: Rate of samples [Hz].
 
     Raises:
         InputError: If it is no integer.

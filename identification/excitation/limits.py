@@ -181,7 +181,7 @@ def used_shares(
     """Return the largest share of each limit that a motion takes, 1 being the limit.
 
     Args:
-        limits: Of the robot.
+        limits: Limits of the robot.
         motion: Positions, velocities and accelerations, each of shape (K, N).
         tau: Predicted torques of the drives [Nm or N], shape (K, N).
 

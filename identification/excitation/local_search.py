@@ -31,8 +31,8 @@ class LocalOptimum:
     """End of one local search.
 
     Attributes:
-        seed: Of the random motion at its start.
-        coefficients: Of the motion, shape (N, 2M + 1).
+        seed: Seed of the random motion at its start.
+        coefficients: Coefficients of the motion, shape (N, 2M + 1).
         value: The figure to be small, see :class:`ExcitationCost`.
         excess: Largest excess of a limit, relative (of the position limits' range and so on) or in
             m for clearances; not positive where all are kept.
@@ -52,7 +52,7 @@ class LocalSearch:
     """Searches of one robot's problem.
 
     Args:
-        problem: Of the robot.
+        problem: Problem of the robot.
     """
 
     def __init__(self, problem: ExcitationProblem) -> None:
@@ -76,8 +76,9 @@ class LocalSearch:
         """Return the optimum next to a random motion.
 
         Args:
-            seed: Of the random motion.
-            iterations: Of the solver, at most; a quarter of them once instants have been added.
+            seed: Seed of the random motion.
+            iterations: Iterations of the solver, at most; a quarter of them once instants have
+                been added.
             posture: That the random motion is about [rad or m], shape (N,); or random, too.
             near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
         """
@@ -96,9 +97,10 @@ class LocalSearch:
         """Return the optimum next to a motion.
 
         Args:
-            coefficients: Of the motion, shape (N, 2M + 1).
+            coefficients: Coefficients of the motion, shape (N, 2M + 1).
             seed: That it has come from.
-            iterations: Of the solver, at most; a quarter of them once instants have been added.
+            iterations: Iterations of the solver, at most; a quarter of them once instants have
+                been added.
         """
         problem = self.problem
         joint_times = _instants(problem, _COARSE_JOINTS)
@@ -153,7 +155,7 @@ def random_motion_about(
     """Return coefficients of a random motion within the joint limits, shape (N, 2M + 1).
 
     Args:
-        problem: Of the robot.
+        problem: Problem of the robot.
         random: Source of the numbers.
         posture: Its middle [rad or m], shape (N,); by default a random one that is allowed.
     """

@@ -32,8 +32,8 @@ class ExcitationProblem:
     Attributes:
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency in use.
-        limits: Of the joints.
-        kernels: Of the criterion.
+        limits: Limits of the joints.
+        kernels: Kernels of the criterion.
         torque: ``(q, v, a) -> tau``, predicted torques of the drives.
         posture: What the joint positions must keep to; None for nothing but the limits.
         criterion: ``D`` or ``condition``.
@@ -74,7 +74,7 @@ def excitation_problem(
 
     Args:
         subject: The robot.
-        limits: Of its joints.
+        limits: Limits of its joints.
         period: T_f [s].
         harmonics: Multiples of the fundamental frequency in use.
         criterion: ``D`` or ``condition``.
@@ -147,10 +147,10 @@ def tightened(
     """Return the problem with narrower limits, for what solvers leave of them.
 
     Args:
-        problem: Of a robot.
-        share: Of the joint limits that is left.
+        problem: Problem of a robot.
+        share: Share of the joint limits that is left.
         margins: Least values of posture limits by name, instead of zero [m or 1].
-        margin: Of those that are not named [m or 1].
+        margin: Margin at those that are not named [m or 1].
     """
     posture = problem.posture
     if posture is not None:

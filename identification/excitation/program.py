@@ -30,7 +30,7 @@ class Solution:
     """Where a solver ended.
 
     Attributes:
-        coefficients: Of the motion, shape (N, 2M + 1).
+        coefficients: Coefficients of the motion, shape (N, 2M + 1).
         value: The figure to be small, see :class:`ExcitationCost`.
         converged: Whether it is a local optimum, rather than the end of the iterations.
     """
@@ -44,11 +44,11 @@ class ExcitationProgram:
     """Solves one robot's problem from given starts.
 
     Args:
-        problem: Of the robot.
-        samples: Of the criterion per period.
+        problem: Problem of the robot.
+        samples: Samples of the criterion per period.
 
     Attributes:
-        problem: Of the robot.
+        problem: Problem of the robot.
         cost: To be as small as possible.
         constraints: Beside those of positions, velocities and accelerations.
     """
@@ -74,7 +74,8 @@ class ExcitationProgram:
         """Return what SNOPT makes of a motion.
 
         Args:
-            coefficients: Of the motion to start with, shape (N, 2M + 1); may violate limits.
+            coefficients: Coefficients of the motion to start with, shape (N, 2M + 1); may violate
+                limits.
             joint_times: When joint limits hold [s], shape (K,).
             posture_times: When limits of torques and postures hold [s], shape (L,).
             iterations: At most so many major ones.
@@ -129,8 +130,8 @@ class MotionConstraint:
     """Bounds of a function of the motion at one instant.
 
     Attributes:
-        function: Of some of q, v, a, each (N,), to values (size,) and their derivatives by each,
-            one after the other, (size, N * number of arguments).
+        function: Function of some of q, v, a, each (N,), to values (size,) and their derivatives
+            by each, one after the other, (size, N * number of arguments).
         orders: Which of q, v, a.
         size: Number of values.
         lower: Bound of all.
@@ -147,9 +148,9 @@ class MotionConstraint:
         """Return the function of the scaled coefficients that a solver evaluates.
 
         Args:
-            problem: Of the robot.
+            problem: Problem of the robot.
             times: When it is to hold [s], shape (K,).
-            scale: Of the coefficients, shape (N, 2M + 1).
+            scale: Scale of the coefficients, shape (N, 2M + 1).
 
         Returns:
             Function of what a solver varies, shape (N * (2M + 1),), to values, shape (K * size,).

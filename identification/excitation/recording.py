@@ -42,7 +42,7 @@ def record_excitation(
 
     Args:
         subject: The robot.
-        motion: Of its joints.
+        motion: Motion of its joints.
         path: File to write the page to, which is replaced; None for none.
         cell: What stands around a serial robot.
         frame_rate: Frames per second [1/s].

@@ -121,7 +121,7 @@ class ExcitationRun:
         """Return times and motion at a sampling rate, see :meth:`motion`.
 
         Args:
-            rate: Of samples [Hz].
+            rate: Rate of samples [Hz].
 
         Returns:
             t, shape (K,), and q, v, a, each of shape (K, N).
@@ -140,9 +140,9 @@ class ExcitationRun:
         the periods begin; the first and the last row are at rest.
 
         Args:
-            path: Of the file, which is replaced.
-            rate: Of samples [Hz].
-            units: Of the joints' positions, N of ``rad`` or ``m``; all rad by default.
+            path: Path of the file, which is replaced.
+            rate: Rate of samples [Hz].
+            units: Units of the joints' positions, N of ``rad`` or ``m``; all rad by default.
 
         Raises:
             InputError: If the period is no multiple of the sampling time, or the file cannot be
@@ -177,7 +177,7 @@ def rest_to_rest(
         velocity: Largest magnitudes of the joint velocities [rad/s or m/s], shape (N,).
         acceleration: Largest magnitudes of the joint accelerations [per s^2], shape (N,).
         periods: How often to run it in full.
-        rate: Of samples [Hz]; ramps are multiples of the sampling time.
+        rate: Rate of samples [Hz]; ramps are multiples of the sampling time.
 
     Raises:
         InputError: If there is no period, or no ramp keeps the limits.

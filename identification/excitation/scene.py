@@ -127,7 +127,7 @@ class Pair:
     Attributes:
         first: A shape of the robot.
         second: Another one, or an obstacle.
-        name: Of both, for people.
+        name: Names of both, for people.
     """
 
     first: GeometryId

@@ -104,15 +104,16 @@ def search(
         period: T_f [s].
         starts: Number of motions to start from: half of them random, the others in two rounds near
             the best ones that have been found.
-        seed: Of the first of them.
-        limits: Of the joints where not those of the model, see
+        seed: Seed of the first of them.
+        limits: Limits of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
         cell: What stands around a serial robot; None for what is shipped with it.
         posture: That random motions are about [rad or m], shape (N,); random ones by default.
         parameters: Believed ones, for the torques, shape (n,); those of the model by default.
         torque_noise: Standard deviations of the measured torques, which weight the rows of the
             regressor, shape (N,) [Nm or N]; all one by default.
-        iterations: Of the solver per start, at most; a quarter of them whenever it goes on.
+        iterations: Iterations of the solver per start, at most; a quarter of them whenever it goes
+            on.
         workers: Number of processes; one for each core by default, 1 for no others than this.
         progress: Told the fraction done and the best figure so far.
 
@@ -182,8 +183,8 @@ class _Start:
     """Where a local search starts.
 
     Attributes:
-        seed: Of the random motion.
-        iterations: Of the solver.
+        seed: Seed of the random motion.
+        iterations: Iterations of the solver.
         posture: That the motion is about, shape (N,); or None.
         near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or None.
     """

@@ -127,7 +127,7 @@ def _between(
         right: Their ends [s], shape (K,).
         at_left: Distances there [m], shape (K, pairs).
         at_right: Distances there [m], shape (K, pairs).
-        weights: See :func:`_reach_between`.
+        weights: How much each joint can change each distance [m/rad or 1], shape (pairs, N).
     """
     length = (right - left)[:, None]
     speeds = [np.abs(trajectory.motion(t)[1]) for t in (left, right)]

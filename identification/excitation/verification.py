@@ -84,7 +84,7 @@ def check_postures(subject: Subject, problem: ExcitationProblem, seed: int = 0) 
     Args:
         subject: The robot.
         problem: Its problem.
-        seed: Of random postures.
+        seed: Seed of random postures.
 
     Raises:
         InputError: If none of many random postures keeps all limits; it names what is hardest.
@@ -119,7 +119,7 @@ def check_excited(
         subject: The robot.
         problem: Its problem.
         base: Its base parameters.
-        seed: Of the random motions.
+        seed: Seed of the random motions.
 
     Raises:
         InputError: If some are not shown; it names them.
@@ -199,9 +199,10 @@ def verify(
     """Return how much of the limits a motion takes.
 
     Args:
-        regressor: Of the robot; with the sign of the velocities itself in Coulomb friction.
+        regressor: Regressor of the robot; with the sign of the velocities itself in Coulomb
+            friction.
         parameters: Believed ones, for the torques, shape (n,).
-        limits: Of the joints.
+        limits: Limits of the joints.
         trajectory: The motion.
         cell: What stands around a serial robot; None to leave that out.
         scene: The same for Drake; made anew if there is a cell alone.
@@ -259,7 +260,7 @@ def verify_excitation(
     Args:
         subject: The robot.
         trajectory: The motion.
-        limits: Of the joints where not those of the model, see
+        limits: Limits of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
         cell: What stands around a serial robot; None for what is shipped with it.
 

@@ -139,7 +139,7 @@ def make_record(
     Args:
         signals: What is in the file.
         robot: Whose signals they are.
-        period: Of the motion [s], or None.
+        period: Period of the motion [s], or None.
         reading: What the file does not say.
         source: Name of the file.
 

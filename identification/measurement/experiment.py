@@ -94,10 +94,11 @@ def run_experiment(
     Args:
         subject: The robot; its friction has to be known.
         trajectory: The excitation, within the limits of the robot.
-        imperfections: Of this run; by default the shipped noise and encoders of the robot.
+        imperfections: Imperfections of this run; by default the shipped noise and encoders of the
+            robot.
         periods: How often the excitation is run.
         servo: The controller.
-        seed: Of all random numbers; one run for each.
+        seed: Seed of all random numbers; one run for each.
         progress: Told the fraction done and what is done.
 
     Raises:
@@ -237,8 +238,8 @@ def read_motion(
     """Return what a file holds as one period, averaged and differentiated.
 
     Args:
-        path: Of the file, see :mod:`~identification.measurement.files`.
-        regressor: Of the robot whose record it is.
+        path: Path of the file, see :mod:`~identification.measurement.files`.
+        regressor: Regressor of the robot whose record it is.
         period: ``T_f`` [s], if the file does not state it.
         reading: What the file says in other words or not at all.
         skip: Periods at the start that are left out.
@@ -267,7 +268,7 @@ def prepare_motion(
 
     Args:
         record: With its period.
-        regressor: Of the robot whose record it is.
+        regressor: Regressor of the robot whose record it is.
         base: Its base parameters, if they are there already.
         skip: Periods at the start that are left out.
         bandwidth_hz: ``f_g`` [Hz]; by default ``20 / T_f``.

@@ -51,9 +51,9 @@ def read_record(
     """Read a record and check it.
 
     Args:
-        path: Of a file as described above; its suffix says of which kind it is.
+        path: Path of a file as described above; its suffix says of which kind it is.
         robot: Whose record it is.
-        period: Of the motion [s], if the file does not state it.
+        period: Period of the motion [s], if the file does not state it.
         reading: What the file says in other words or not at all.
         still: Whether the links may stand still, as those of locked joints do.
 
@@ -84,7 +84,7 @@ def write_record(path: str | Path, record: Record, robot: MeasuredRobot) -> None
     """Write a record with all its signals.
 
     Args:
-        path: Of the file; its suffix says of which kind it is to be.
+        path: Path of the file; its suffix says of which kind it is to be.
         record: The record.
         robot: Whose it is.
 

@@ -25,8 +25,8 @@ class AveragedMotion:
         v: Their derivatives, shape (K, N).
         a: Their second derivatives, shape (K, N).
         tau: Mean torques, not filtered [Nm or N], shape (K, N).
-        torque_variance: Of one measured torque, from the spread over the periods, shape (N,)
-            [(Nm)^2 or N^2]: the diagonal of the covariance of the torques in (2.80).
+        torque_variance: Variance of one measured torque, from the spread over the periods,
+            shape (N,) [(Nm)^2 or N^2]: the diagonal of the covariance of the torques in (2.80).
         position_variance: The same of one measured position, shape (N,).
         tau_periods: The torques that were averaged, shape (P, K, N).
         period: ``T_f`` [s].
@@ -193,7 +193,7 @@ class FrictionTrend:
         viscous: Change of ``f_v`` [Nm s/rad or N s/m], shape (N,).
         coulomb_deviation: Standard deviation of ``coulomb``, shape (N,).
         viscous_deviation: Standard deviation of ``viscous``, shape (N,).
-        significance: Of both changes together, in standard deviations (root of the Mahalanobis
+        significance: Size of both changes together, in standard deviations (root of the Mahalanobis
             distance from 0), shape (N,).
     """
 

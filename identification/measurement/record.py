@@ -15,40 +15,31 @@ _FEWEST_SAMPLES = 10
 
 
 class MeasuredRobot(Protocol):
-    """What records are checked against; all on the joint side, N joints.
-
-    Attributes:
-        name: Of the robot.
-        joint_names: N names.
-        joint_units: ``rad`` or ``m`` for each joint.
-        position_limits: Shape (N, 2) [rad or m]; infinite if unknown.
-        velocity_limit: Shape (N,) [rad/s or m/s]; infinite if unknown.
-        effort_limit: Shape (N,) [Nm or N]; infinite if unknown.
-    """
+    """What records are checked against; all on the joint side, N joints."""
 
     @property
     def name(self) -> str:
-        """See above."""
+        """Name of the robot."""
 
     @property
     def joint_names(self) -> Sequence[str]:
-        """See above."""
+        """Names of the N joints."""
 
     @property
     def joint_units(self) -> Sequence[str]:
-        """See above."""
+        """``rad`` or ``m`` for each joint."""
 
     @property
     def position_limits(self) -> np.ndarray:
-        """See above."""
+        """Limits of the positions [rad or m], shape (N, 2); infinite if unknown."""
 
     @property
     def velocity_limit(self) -> np.ndarray:
-        """See above."""
+        """Largest velocities [rad/s or m/s], shape (N,); infinite if unknown."""
 
     @property
     def effort_limit(self) -> np.ndarray:
-        """See above."""
+        """Largest torques [Nm or N], shape (N,); infinite if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +51,7 @@ class Record:
         q: Positions of the links, or of the joints if they are rigid [rad or m], shape (K, N).
         tau: Drive torques or forces ``tau_d`` [Nm or N], shape (K, N).
         joint_names: N names.
-        period: Of the motion [s], or None if it is not periodic.
+        period: Period of the motion [s], or None if it is not periodic.
         v: Velocities, if measured, shape (K, N).
         a: Accelerations, if measured, shape (K, N).
         q_motor: Positions of the motors on the joint side, if measured [rad or m], shape (K, N).

@@ -132,7 +132,7 @@ def add_samples(
 
     Args:
         builder: Builder of the diagram.
-        name: Of the source.
+        name: Name of the source.
         t: Evenly spaced instants [s], shape (K,).
         values: Shape (K, n).
     """
@@ -147,7 +147,7 @@ def add_curves(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.nda
 
     Args:
         builder: Builder of the diagram.
-        name: Of the source.
+        name: Name of the source.
         t: Instants [s], shape (K,).
         values: Shape (K, n).
     """
@@ -161,7 +161,7 @@ def add_lines(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndar
 
     Args:
         builder: Builder of the diagram.
-        name: Of the source.
+        name: Name of the source.
         t: Instants [s], shape (K,).
         values: Shape (K, n).
     """
@@ -176,7 +176,7 @@ def add_signs(
 
     Args:
         builder: Builder of the diagram.
-        name: Of the source.
+        name: Name of the source.
         t: Instants [s], shape (K,).
         v: Shape (K, n).
         size: Shape (n,).
@@ -206,7 +206,7 @@ def add_sines(
 
     Args:
         builder: Builder of the diagram.
-        name: Of the sum.
+        name: Name of the sum.
         amplitude: A, shape (N, M).
         frequency: w [rad/s], shape (N, M).
         phase: p [rad], shape (N, M).
@@ -226,7 +226,7 @@ def add_sum(
 
     Args:
         builder: Builder of the diagram.
-        name: Of the sum.
+        name: Name of the sum.
         first: Shape (n,).
         second: Shape (n,).
     """

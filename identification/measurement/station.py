@@ -71,7 +71,7 @@ def build_station(
         friction: ``f_c`` and ``f_v`` of this run, each (N,).
         rigid: Torques of the robot without friction at the ticks [Nm or N], shape (K, N).
         usual: ``f_c`` and ``f_v`` as the servo believes them, each (N,).
-        random: Of the disturbance.
+        random: Generator of the disturbance.
     """
     builder, n = DiagramBuilder(), subject.dimension
     t, q, v, _ = run.sample(1.0 / servo.period)

@@ -26,7 +26,7 @@ class Lag:
 
     Attributes:
         time: Positive if it is late [s].
-        standard_deviation: Of that [s].
+        standard_deviation: Standard deviation of that [s].
     """
 
     time: float
@@ -100,7 +100,7 @@ def check_torque_lag(
 
     Args:
         motion: One period.
-        regressor: See :func:`torque_lag`.
+        regressor: ``Y(q, v, a)`` along the motion, with friction, as :func:`torque_lag` takes it.
         tolerance: What is allowed [s]; by default two sampling times.
 
     Returns:

@@ -183,7 +183,7 @@ def shipped_or_own(robot: str | Path, name: str) -> Path:
 
     Args:
         robot: Name of a shipped robot, or a file.
-        name: Of the shipped file.
+        name: Name of the shipped file.
 
     Raises:
         InputError: If there is no such file with the robot.
@@ -262,7 +262,7 @@ class PrintedIdentification:
     """Tab. C.3 and C.4.
 
     Attributes:
-        name: Of the robot.
+        name: Name of the robot.
         base_parameters: What was identified.
         torque: How well it predicts.
     """

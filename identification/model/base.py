@@ -34,10 +34,10 @@ class BaseParameters:
     ``Y rho = Y_b rho_b`` with ``rho_b = K_b rho`` and the columns ``Y_b = Y[:, indices]``.
 
     Attributes:
-        indices: Of the columns that are kept, shape (n_b,).
+        indices: Indices of the columns that are kept, shape (n_b,).
         projection: ``K_b``, shape (n_b, n); has ones at ``indices``.
-        full_names: Of the n parameters.
-        full_units: Of the n parameters.
+        full_names: Names of the n parameters.
+        full_units: Units of the n parameters.
     """
 
     indices: np.ndarray
@@ -93,8 +93,8 @@ def base_parameters(regressor: Regressor, seed: int = 0) -> BaseParameters:
     friction are kept rather than masses, so that the combinations look like (B.4).
 
     Args:
-        regressor: Of the robot.
-        seed: Of the random motions.
+        regressor: Regressor of the robot.
+        seed: Seed of the random motions.
 
     Raises:
         InputError: If no parameter has an effect.
@@ -119,8 +119,8 @@ def random_motion(regressor: Regressor, seed: int = 0) -> tuple[np.ndarray, np.n
     """Return positions, velocities and accelerations that have nothing to do with each other.
 
     Args:
-        regressor: Of the robot.
-        seed: Of the random numbers.
+        regressor: Regressor of the robot.
+        seed: Seed of the random numbers.
 
     Returns:
         Arrays (K, N) with enough rows for all parameters, of the order of 1 in rad (m) and s.
@@ -139,7 +139,7 @@ def combination(row: np.ndarray, names: Sequence[str], first: int | None = None)
 
     Args:
         row: Coefficients, shape (n,).
-        names: Of the n parameters.
+        names: Names of the n parameters.
         first: The one that is to lead; by default the first with a coefficient.
     """
     used = np.flatnonzero(row).tolist()

@@ -39,8 +39,8 @@ class Regressor:
             where ``subject.mounts`` says how the rotors sit.
         sign_width: Velocity [rad/s or m/s] within which the sign of the velocity in Coulomb's
             friction passes smoothly, as ``tanh(v / sign_width)``; 0 for the sign itself.
-        names: Of the parameters.
-        units: Of the parameters.
+        names: Names of the parameters.
+        units: Units of the parameters.
         function: ``Y(q, v, a)``, CasADi function of three vectors (N,), SX inside, to (N, n).
 
     Raises:
@@ -215,7 +215,8 @@ def friction_columns(v: ca.SX, sign_width: float = 0.0) -> ca.SX:
 
     Args:
         v: Joint velocities, shape (N, 1).
-        sign_width: See :class:`Regressor`.
+        sign_width: Velocity [rad/s or m/s] within which the sign passes smoothly; 0 for the
+            sign itself.
     """
     n = v.numel()
     sign = ca.tanh(v / sign_width) if sign_width > 0.0 else ca.sign(v)

@@ -102,7 +102,7 @@ class Subject:
     Exactly one of ``chain`` and ``delta`` is not None.
 
     Attributes:
-        name: Of the robot.
+        name: Name of the robot.
         chain: A serial robot.
         delta: A DELTA robot.
         mounts: Where the rotors of a serial robot sit, N of them; None if unknown.
@@ -111,7 +111,8 @@ class Subject:
         position_limits: Lower and upper ones [rad or m], shape (N, 2); infinite if unknown.
         velocity_limit: [rad/s or m/s], shape (N,); infinite if unknown.
         acceleration_limit: [rad/s^2 or m/s^2], shape (N,); infinite if unknown.
-        effort_limit: Of the drives at the joint side [Nm or N], shape (N,); infinite if unknown.
+        effort_limit: Largest torques of the drives at the joint side [Nm or N], shape (N,);
+            infinite if unknown.
         joint_names: As in the model.
         joint_units: ``rad`` or ``m`` of each.
         coulomb: True Coulomb friction [Nm or N], shape (N,); None if unknown.
@@ -287,7 +288,7 @@ def without_tool(chain: SerialChain, parameters: ArmParameters) -> SerialChain:
 
     Args:
         chain: The robot with the tool; its tool point is that of the parameters.
-        parameters: Of the robot and its tool.
+        parameters: Parameters of the robot and its tool.
     """
     tool = parameters.tool
     p_LB = chain.p_LT - chain.R_LT @ tool.tool_point

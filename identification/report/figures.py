@@ -47,7 +47,7 @@ def fit_figure(t: np.ndarray, prediction: PredictedTorque, title: str, caption: 
 
     Args:
         t: Times [s], shape (K,).
-        prediction: Of that motion.
+        prediction: Prediction of that motion.
         title: A few words.
         caption: What to see in it.
     """
@@ -75,7 +75,7 @@ def parameter_figure(
     """Return how well each parameter is known, and by how much it misses.
 
     Args:
-        runs: Of the same excitation.
+        runs: Runs of the same excitation.
         truth: True base parameters, shape (n_b,), or None.
         consistent: The nearest consistent set, or None.
     """
@@ -138,7 +138,7 @@ def whiteness_figure(test: Whiteness) -> Figure:
     """Return the autocorrelation of the residuals.
 
     Args:
-        test: Of the residuals.
+        test: Test of the residuals.
     """
     lags = np.arange(1, len(test.autocorrelation) + 1)
     with plt.rc_context(STYLE):

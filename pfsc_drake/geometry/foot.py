@@ -226,8 +226,8 @@ class FootFinder:
         longest_step: Relative to the length of the domain.
 
     Attributes:
-        lengths: Of the domain.
-        size: Of the iteration's state.
+        lengths: Lengths of the domain.
+        size: Size of the iteration's state.
     """
 
     def __init__(
@@ -299,13 +299,13 @@ class Foot:
     """How an iteration ended.
 
     Args:
-        state: Of the iteration, see :func:`step_function`.
-        lengths: Of the domain.
+        state: State of the iteration, see :func:`step_function`.
+        lengths: Lengths of the domain.
 
     Attributes:
-        state: Of the iteration.
+        state: State of the iteration.
         theta: Parameters of the closest point, unwrapped, shape (p,).
-        distance: Of the point from there [m].
+        distance: Distance of the point from there [m].
         known: Whether point and guess are finite; nothing else means anything if not.
         alpha: Largest (d . sigma_uu) / |sigma_u|^2, d = y - sigma, over all directions u of the
             parameters, (3.9), (4.13): H is definite if and only if alpha < 1.

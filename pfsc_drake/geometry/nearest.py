@@ -20,7 +20,7 @@ def nearest_samples(
 
     Args:
         y: The point, shape (dimension,).
-        parameters: Of the samples, [n, p].
+        parameters: Parameters of the samples, [n, p].
         points: The samples, [n, dimension].
         apart: Parameters that differ by less, in all p, belong to one valley of the distance, [p].
 

@@ -53,12 +53,12 @@ class CurveOnSurface(Curve):
         surface.checked(parameters.derivatives(np.linspace(*parameters.domain, 257), 0)[:, 0])
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """Derivatives 0..order with respect to theta, for set-up and figures."""
         jet = self._composed(theta, check_order(order), [(0, 0)])[0]
         return np.stack(jet.derivatives(), axis=-2)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
+        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
         return lambda theta: self.derivatives(theta, order).ravel()
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +107,7 @@ class SurfaceNormalFrame:
     Attributes:
         turns: True.
         holonomy: Zero: where the curve closes, so does the frame.
-        breakpoints: See `Frame`.
+        breakpoints: Ends of the pieces on which it is smooth, [n].
     """
 
     turns = True

@@ -115,9 +115,10 @@ def bore_wedges(radius: float, outer_radius: float, depth: float, count: int) ->
     24 wedges. In a ring a pin is held by what is convex, which a plate with holes is not.
 
     Args:
-        radius: Of the bore [m], positive.
-        outer_radius: Of the ring [m], in the middles of its outer faces; more than ``radius``.
-        depth: Of the bore [m], positive.
+        radius: Radius of the bore [m], positive.
+        outer_radius: Outer radius of the ring [m], in the middles of its outer faces; more than
+            ``radius``.
+        depth: Depth of the bore [m], positive.
         count: Number of wedges, 8 or more.
 
     Returns:

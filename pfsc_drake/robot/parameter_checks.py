@@ -10,8 +10,8 @@ def require(condition: bool, key: str, value: object, allowed: str) -> None:
 
     Args:
         condition: Whether the value is fine.
-        key: Of the parameter, as in its file.
-        value: Of the parameter, for the message.
+        key: Key of the parameter, as in its file.
+        value: Value of the parameter, for the message.
         allowed: What it must be, for the message.
 
     Raises:
@@ -26,7 +26,7 @@ def check_vector(key: str, value: np.ndarray, size: int) -> None:
     """Refuse a vector of another size or with numbers that are not finite.
 
     Args:
-        key: Of the parameter, as in its file.
+        key: Key of the parameter, as in its file.
         value: The vector.
         size: How many numbers it must have.
 

@@ -104,7 +104,7 @@ class FourierCurve(Curve):
         return cls(constant, cosine, sine)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """Derivatives 0..order with respect to theta, for set-up and figures."""
         angles = self._checked(theta)[..., None] * np.arange(1, len(self.cosine) + 1)
         basis = np.empty((*angles.shape[:-1], 2 * len(self.cosine) + 1))
         basis[..., 0] = 1.0
@@ -113,7 +113,7 @@ class FourierCurve(Curve):
         return np.einsum("kdj,...j->...kd", self._table(order), basis)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
+        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
         harmonics = range(1, len(self.cosine) + 1)
         matrix = self._table(order).reshape(-1, 2 * len(harmonics) + 1)
         cos, sin = math.cos, math.sin

@@ -65,15 +65,15 @@ class OrientationCurve(Curve):
         return cls(PiecewisePolynomialCurve(domain, q[None], closed=True))
 
     def first_discontinuity(self, order: int) -> float | None:
-        """See the base class."""
+        """Parameter at which a derivative of at most this order first jumps."""
         return self._curve.first_discontinuity(order)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class; dimension 4."""
+        """Derivatives 0..order with respect to theta, for set-up and figures. Dimension 4."""
         return self._curve.derivatives(theta, order)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class; dimension 4."""
+        """Fast scalar form of `derivatives`, dimension 4, flattened (derivative index slow)."""
         return self._curve.flat_sampler(order)
 
     def rotation_matrix(self, theta: ArrayLike) -> np.ndarray:

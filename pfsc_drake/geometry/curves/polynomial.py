@@ -99,12 +99,12 @@ class PiecewisePolynomialCurve(Curve):
         return self.coefficients.shape[1] - 1
 
     def first_discontinuity(self, order: int) -> float | None:
-        """See the base class."""
+        """Parameter at which a derivative of at most this order first jumps."""
         thetas = [theta for theta in self._lost_at[: check_order(order) + 1] if theta is not None]
         return min(thetas, default=None)
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """Derivatives 0..order with respect to theta, for set-up and figures."""
         values = self._checked(theta)
         segment = np.searchsorted(self.breakpoints[1:-1], values, side="right")
         local = values - self.breakpoints[segment]
@@ -113,7 +113,7 @@ class PiecewisePolynomialCurve(Curve):
         return np.einsum("...kdj,...j->...kd", table[segment], powers)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
+        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
         terms = max(self.degree + 1, _FAST_TERMS)
         table = self._table(order, terms)
         matrices = list(table.reshape(len(table), -1, terms))

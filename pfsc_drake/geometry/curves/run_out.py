@@ -25,7 +25,7 @@ class RunOut(Curve):
     on with the constant derivative g in class C^k.
 
     Args:
-        derivatives: Of the curve at its end by theta, orders 0..k, [k + 1, dimension].
+        derivatives: Derivatives of the curve at its end by theta, orders 0..k, [k + 1, dimension].
         final: The derivative g by theta, [dimension].
         theta: Parameter of the end.
         length: L, positive if theta grows outwards, else negative.
@@ -51,13 +51,13 @@ class RunOut(Curve):
             row[: polynomial.degree() + 1] = polynomial.coef
 
     def derivatives(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """Derivatives 0..order with respect to theta, for set-up and figures."""
         x = (self._checked(theta) - self._theta) / self._length
         powers = x[..., None] ** np.arange(self._degree + 1)
         return np.einsum("kdj,...j->...kd", self._table(order), powers)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class."""
+        """Fast scalar form of `derivatives`, result flattened (derivative index slow)."""
         matrix = self._table(order).reshape(-1, self._degree + 1)
         exponents = np.arange(self._degree + 1)
         theta_0, length = self._theta, self._length
@@ -86,7 +86,7 @@ def straightening_length(derivatives: np.ndarray, longest: float) -> float:
     """Length in which no term of the Taylor series takes a curve far from its tangent.
 
     Args:
-        derivatives: Of the curve at its end by theta, orders 0..k, [k + 1, dimension].
+        derivatives: Derivatives of the curve at its end by theta, orders 0..k, [k + 1, dimension].
         longest: Largest length by theta.
     """
     lengths, speed = [longest], float(np.linalg.norm(derivatives[1]))

@@ -32,7 +32,7 @@ class PenalizedSpline:
         points: p_i, [n, dimension].
         end: End of the domain [0, end].
         intervals: Number of knot intervals.
-        degree: Of the polynomials.
+        degree: Degree of the polynomials.
         closed: True for a periodic spline.
     """
 
@@ -147,10 +147,10 @@ def smoothest_within(
     closely would follow the noise. Points that are still outside then get larger weights.
 
     Args:
-        parameters: Of the points, [n], within [0, end].
+        parameters: Parameters of the points, [n], within [0, end].
         points: [n, dimension].
         end: End of the domain.
-        degree: Of the polynomials; the spline is of class C^(degree - 1).
+        degree: Degree of the polynomials; the spline is of class C^(degree - 1).
         closed: True for a periodic spline.
         tolerance: Largest deviation allowed.
         noise: Root mean square of the deviations that noise makes, see `noise_level`.

@@ -122,7 +122,8 @@ def piecewise(
     """A B-spline as a curve of polynomials.
 
     Args:
-        spline: Of simple knots; defined over a whole period, wherever it begins, if `closed`.
+        spline: Spline of simple knots; defined over a whole period, wherever it begins, if
+            `closed`.
         starts: Where the pieces start, [pieces].
         end: End of the last piece; end of the period if `closed`.
         closed: True for a periodic curve.

@@ -25,7 +25,7 @@ def read_regular_file(name: str | FilePath, kind: str) -> bytes:
     """Return what a file holds.
 
     Args:
-        name: Of a regular file of at most 256 MiB.
+        name: Name of a regular file of at most 256 MiB.
         kind: What it should be, for messages, as "CSV".
 
     Raises:
@@ -81,7 +81,7 @@ def read_numbers(
     The first line that is neither empty nor a comment (#) names the columns.
 
     Args:
-        name: Of a regular file of at most 256 MiB and 1,000,000 rows.
+        name: Name of a regular file of at most 256 MiB and 1,000,000 rows.
         what: What rows are, for messages, as "waypoints".
         check_header: Refuses names of columns; told where they stand and the names.
         progress: Told the fraction read and what is done.
@@ -126,7 +126,7 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
         required: Names that must be there.
 
     Raises:
-        InputError: See above.
+        InputError: If a column is unknown, there twice, or missing.
     """
     for label in header:
         if label not in known:

@@ -210,7 +210,7 @@ class TurnedFrame:
     Attributes:
         turns: True.
         holonomy: Zero; for open curves only.
-        breakpoints: See `Frame`.
+        breakpoints: Ends of the pieces on which it is smooth, [n].
     """
 
     turns = True
@@ -221,12 +221,12 @@ class TurnedFrame:
         self.breakpoints = transported.breakpoints
 
     def normals(self, theta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """See `Frame`."""
+        """Both normal vectors e_perp and e_cross, each [..., 3]."""
         e_perp, e_cross = self._transported.normals(theta)
         angle = self._psi.derivatives(theta, 0)[..., 0, :]
         c, s = np.cos(angle), np.sin(angle)
         return c * e_perp + s * e_cross, c * e_cross - s * e_perp
 
     def turning(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See `Frame`."""
+        """Derivatives 1..order of psi by theta, rad, [..., order]."""
         return self._psi.derivatives(theta, order)[..., 1:, 0]

@@ -45,8 +45,8 @@ def pick_waypoints(
     A closed path ends where the tool comes nearest to its begin; a lap that goes on is cut there.
 
     Args:
-        positions: Of the tool point, m, [n, 3].
-        rotations: Of the tool, [n, 3, 3], or None.
+        positions: Positions of the tool point, m, [n, 3].
+        rotations: Rotations of the tool, [n, 3, 3], or None.
         picking: How densely.
 
     Returns:

@@ -22,7 +22,7 @@ class Course(Protocol):
     """One coordinate of a motion over a clock, of class C^2.
 
     Attributes:
-        largest_rate: Of its absolute rate, m/s or rad/s.
+        largest_rate: Largest absolute rate, m/s or rad/s.
     """
 
     largest_rate: float
@@ -35,11 +35,11 @@ class CurveCourse:
     """A course along a curve of dimension 1, whose parameter is the clock.
 
     Args:
-        curve: Of class C^2, at rest at its ends; before and after it rests.
+        curve: Curve of class C^2, at rest at its ends; before and after it rests.
         repeat: Whether it begins again when it has ended.
 
     Attributes:
-        largest_rate: See :class:`Course`.
+        largest_rate: Largest absolute rate, m/s or rad/s.
 
     Raises:
         InputError: The curve has another dimension, is not of class C^2, or ends elsewhere than it
@@ -73,7 +73,7 @@ class CurveCourse:
         self.largest_rate = _largest_rate(curve)
 
     def at(self, clock: ca.MX) -> ca.MX:
-        """See :class:`Course`."""
+        """Value at a time of the clock [s], m or rad, as an expression."""
         if self._repeat:
             laps = ca.floor((clock - self._begin) / self._period)
             clock = clock - laps * self._period
@@ -184,9 +184,9 @@ class MovingRegion(ABC):
         """Signed distance to the boundary where it is at a time of the clock.
 
         Args:
-            x: Of the tool point, world axes, finite, m.
-            y: See x.
-            z: See x.
+            x: Coordinate x of the tool point, world axes, finite, m.
+            y: Coordinate y, likewise.
+            z: Coordinate z, likewise.
             clock: s.
 
         Returns:
@@ -203,9 +203,9 @@ class MovingRegion(ABC):
         Of the surface that will be the nearest, which may be another one than that now.
 
         Args:
-            x: Of the tool point, which rests, world axes, finite, m.
-            y: See x.
-            z: See x.
+            x: Coordinate x of the tool point, which rests, world axes, finite, m.
+            y: Coordinate y, likewise.
+            z: Coordinate z, likewise.
             clock: s.
             clock_next: s.
 
@@ -248,7 +248,7 @@ class ShiftedRegion(MovingRegion):
     Args:
         region: Where it is while its course is zero.
         course: Way along the direction [m].
-        direction: Of any length, [3].
+        direction: Direction vector of any length, [3].
 
     Raises:
         InputError: No direction.
@@ -259,19 +259,19 @@ class ShiftedRegion(MovingRegion):
         self._direction = ca.DM(axes_along(direction)[2])
 
     def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Where a point is, as seen from what moves, while its course is zero, [3], m."""
         return point - self._course.at(clock) * self._direction
 
     def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Where a vector points that moves with the region, [3]."""
         return vector
 
     def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Way from one time of the clock to another of what moves with the region, [3], m."""
         return (self._course.at(clock_next) - self._course.at(clock)) * self._direction
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
-        """See the base class."""
+        """Largest speed of what moves with the region and is within a sphere, m/s."""
         return self._course.largest_rate
 
 
@@ -282,7 +282,7 @@ class TurningRegion(MovingRegion):
         region: Where it is while its course is zero.
         course: Angle about the axis [rad].
         point: On the axis, [3], m.
-        axis: Of any length, [3].
+        axis: Vector along the axis, of any length, [3].
 
     Raises:
         InputError: No point or no direction.
@@ -294,20 +294,20 @@ class TurningRegion(MovingRegion):
         self._axes = axes_along(axis)
 
     def at_rest(self, point: ca.MX, clock: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Where a point is, as seen from what moves, while its course is zero, [3], m."""
         return self._point + self._rotated(point - self._point, -self._course.at(clock))
 
     def turned(self, vector: ca.MX, clock: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Where a vector points that moves with the region, [3]."""
         return self._rotated(vector, self._course.at(clock))
 
     def way(self, point: ca.MX, clock: ca.MX, clock_next: ca.MX) -> ca.MX:
-        """See the base class."""
+        """Way from one time of the clock to another of what moves with the region, [3], m."""
         away, angle = point - self._point, self._course.at(clock_next) - self._course.at(clock)
         return self._rotated(away, angle) - away
 
     def largest_speed(self, centre: ArrayLike, radius: float) -> float:
-        """See the base class."""
+        """Largest speed of what moves with the region and is within a sphere, m/s."""
         away = self._axes[:2] @ (np.asarray(centre, dtype=float) - self._point)
         return self._course.largest_rate * (float(np.linalg.norm(away)) + radius)
 

@@ -27,7 +27,7 @@ class Pieces:
     Attributes:
         centre: On the boundary, [n_1, n_2, 3], m.
         normal: Unit normals of the discs, [n_1, n_2, 3].
-        radius: Of the discs, [n_1, n_2], m.
+        radius: Radius of the discs, [n_1, n_2], m.
         sag: [n_1, n_2], m.
         bends: Largest curvature of the boundary on a piece, towards its normal and away from it,
             [2, n_1, n_2], 1/m; negative where it bends the other way.

@@ -62,7 +62,7 @@ class PolyhedronRegion(FormulaRegion):
         self._edges = [_edge(points[a], points[b]) for a, b in sorted(edges)]
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class."""
+        """Signed distance and normal as expressions."""
         heights = [a * point[0] + b * point[1] + c * point[2] + d for a, b, c, d in self._planes]
         h, n = heights[0], ca.SX(self._planes[0][:3])
         for height, plane in zip(heights[1:], self._planes[1:], strict=True):

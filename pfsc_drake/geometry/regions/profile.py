@@ -28,7 +28,7 @@ class PlaneCurve:
     Both ends of an open curve go on straight along their tangents, so that it divides the plane.
 
     Args:
-        curve: Of dimension 2, m.
+        curve: Curve of dimension 2, m.
         ends_at_axis: Whether what goes on ends where the first coordinate is zero.
 
     Attributes:
@@ -227,7 +227,7 @@ class ExtrudedRegion(FormulaRegion):
 
     Args:
         profile: Curve in R^3 of class C^2, m.
-        direction: Of the line, of any length, [3].
+        direction: Direction of the line, of any length, [3].
         inside: Whether what a closed profile encloses is admissible; of an open one the side that
             the normal (4.3) of `extruded_surface` points away from.
 
@@ -252,7 +252,7 @@ class ExtrudedRegion(FormulaRegion):
         self._sign = _right_sign(self._curve, profile.closed, inside)
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class."""
+        """Signed distance and normal as expressions."""
         h, n = self._curve.signed_distance(self._axes @ point)
         return self._sign * h, self._sign * (self._axes.T @ n)
 
@@ -265,7 +265,7 @@ class RevolvedRegion(TurnedRegion):
     Args:
         profile: (rho, h), a curve in the plane of class C^2, m, that does not meet the axis.
         origin: On the axis, where h is zero, [3], m.
-        axis: Of growing h, of any length, [3].
+        axis: Axis of growing h, of any length, [3].
         inside: Whether what a closed profile encloses is admissible; of an open one the side that
             the normal (4.3) of `surface_of_revolution` points away from: that of the axis, where h
             grows along the profile.
@@ -290,7 +290,7 @@ class RevolvedRegion(TurnedRegion):
         self._sign = _right_sign(self._curve, profile.closed, inside)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """See the base class."""
+        """Distance in a half-plane that ends at the axis."""
         h, n = self._curve.signed_distance(ca.vertcat(rho, height))
         return h, n[0], n[1]
 

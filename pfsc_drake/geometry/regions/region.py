@@ -44,7 +44,7 @@ def axes_along(axis: ArrayLike) -> np.ndarray:
     """Unit vectors, the third along an axis, by rows, [3, 3].
 
     Args:
-        axis: Of any length, [3].
+        axis: Vector along the axis, of any length, [3].
 
     Raises:
         InputError: No direction.
@@ -71,9 +71,9 @@ class Region(ABC):
         """Signed distance to the boundary, positive in the admissible region.
 
         Args:
-            x: Of the tool point, world axes, finite, m.
-            y: See x.
-            z: See x.
+            x: Coordinate x of the tool point, world axes, finite, m.
+            y: Coordinate y, likewise.
+            z: Coordinate z, likewise.
 
         Returns:
             h, m, and its gradient, the unit normal n at the foot into the admissible region, as
@@ -115,7 +115,7 @@ class FormulaRegion(Region):
 
     @cached_property
     def signed_distance(self) -> ca.Function:
-        """See the base class."""
+        """The same of symbols or numbers, a function ``(point) -> (h, n)``."""
         point = self.symbol.sym("point", 3)
         h, n = self.formula(point)
         is_finite = ca.dot(point, point) < math.inf
@@ -132,7 +132,7 @@ class FormulaRegion(Region):
         return PlainFunction(self.signed_distance)
 
     def distance(self, x: float, y: float, z: float) -> Distance:
-        """See the base class."""
+        """Signed distance to the boundary, positive in the admissible region."""
         return self._distance(x, y, z)
 
 

@@ -40,7 +40,7 @@ class HalfSpace(FormulaRegion):
         self._point = ca.DM(checked_point("point", point))
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class."""
+        """Signed distance and normal as expressions."""
         return ca.dot(self._normal, point - self._point), ca.SX(self._normal)
 
 
@@ -62,7 +62,7 @@ class SphereRegion(FormulaRegion):
         self._sign = -1.0 if inside else 1.0
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class."""
+        """Signed distance and normal as expressions."""
         away, outwards = direction(point - self._centre, (1.0, 0.0, 0.0))
         return self._sign * (away - self._radius), self._sign * outwards
 
@@ -72,7 +72,7 @@ class TurnedRegion(FormulaRegion):
 
     Args:
         origin: On the axis, [3], m.
-        axis: Of any length, [3].
+        axis: Vector along the axis, of any length, [3].
         inside: Whether the side of the axis is admissible, not the other one.
 
     Raises:
@@ -98,7 +98,7 @@ class TurnedRegion(FormulaRegion):
         """
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class."""
+        """Signed distance and normal as expressions."""
         local = self._axes @ (point - self._origin)
         rho, outwards = direction(local[:2], (1.0, 0.0))
         h, radial, axial = self.meridian(rho, local[2])
@@ -110,9 +110,9 @@ class CylinderRegion(TurnedRegion):
 
     Args:
         radius: m, positive.
-        origin: See :class:`TurnedRegion`.
-        axis: See there.
-        inside: See there.
+        origin: Point on the axis, [3], m.
+        axis: Vector along the axis, of any length, [3].
+        inside: Whether the side of the axis is admissible, not the other one.
 
     Raises:
         InputError: Numbers that are no cylinder.
@@ -123,7 +123,7 @@ class CylinderRegion(TurnedRegion):
         self._radius = checked_length("radius", radius)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """See the base class."""
+        """Distance in a half-plane that ends at the axis."""
         return rho - self._radius, ca.SX(1.0), ca.SX(0.0)
 
 
@@ -134,7 +134,7 @@ class ConeRegion(TurnedRegion):
         opening_angle: Between the axis and the surface, rad, above 0 and below pi/2.
         origin: The apex, [3], m.
         axis: Into the cone, of any length, [3].
-        inside: See :class:`TurnedRegion`.
+        inside: Whether the side of the axis is admissible, not the other one.
 
     Raises:
         InputError: Numbers that are no cone.
@@ -151,7 +151,7 @@ class ConeRegion(TurnedRegion):
         self._slope = (math.sin(opening_angle), math.cos(opening_angle))
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """See the base class."""
+        """Distance in a half-plane that ends at the axis."""
         sine, cosine = self._slope
         beyond_apex = rho * sine + height * cosine <= 0.0
         from_apex, n = direction(ca.vertcat(rho, height), (0.0, -1.0))
@@ -168,8 +168,8 @@ class TorusRegion(TurnedRegion):
     Args:
         ring_radius: From the axis to the middle of the tube, m.
         tube_radius: m, positive and smaller.
-        origin: See :class:`TurnedRegion`.
-        axis: See there.
+        origin: Point on the axis, [3], m.
+        axis: Vector along the axis, of any length, [3].
         inside: Whether the tube's inside is admissible, not what surrounds it.
 
     Raises:
@@ -195,7 +195,7 @@ class TorusRegion(TurnedRegion):
         self._ring = float(ring_radius)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """See the base class."""
+        """Distance in a half-plane that ends at the axis."""
         away, n = direction(ca.vertcat(rho - self._ring, height), (1.0, 0.0))
         return away - self._tube, n[0], n[1]
 
@@ -210,7 +210,7 @@ class ParaboloidRegion(TurnedRegion):
         coefficient: c of the height c rho^2 over the vertex, 1/m, not zero.
         origin: The vertex, [3], m.
         axis: Direction of positive heights, of any length, [3].
-        inside: See :class:`TurnedRegion`.
+        inside: Whether the side of the axis is admissible, not the other one.
 
     Raises:
         InputError: Numbers that are no paraboloid.
@@ -228,7 +228,7 @@ class ParaboloidRegion(TurnedRegion):
         self._upwards = math.copysign(1.0, coefficient)
 
     def meridian(self, rho: Symbol, height: Symbol) -> Meridian:
-        """See the base class.
+        """Distance in a half-plane that ends at the axis.
 
         The foot is at the largest root of a cubic, ``u^3 + p u = q`` with u = c times its radius.
         Newton's method falls monotonically to it from above, and stays where it falls no longer.

@@ -62,11 +62,11 @@ class SurfaceRegion(FormulaRegion):
         self._nearest = NearestFoot(self._pieces, self._foot_near)
 
     def distance(self, x: float, y: float, z: float) -> Distance:
-        """See the base class."""
+        """Signed distance to the boundary, positive in the admissible region."""
         return self._nearest(x, y, z).signed
 
     def formula(self, point: Symbol) -> tuple[Symbol, Symbol]:
-        """See the base class.
+        """Signed distance and normal as expressions.
 
         Raises:
             InputError: The surface has too many pieces.

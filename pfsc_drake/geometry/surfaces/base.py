@@ -59,7 +59,7 @@ class PlaneBase:
 
     Args:
         points: [n, 3], m, not along one line.
-        normal: Of the plane, on the side wanted, of any length, [3].
+        normal: Normal of the plane, on the side wanted, of any length, [3].
         along: Direction that theta_1 leans to; by default the longer side.
 
     Raises:
@@ -79,21 +79,21 @@ class PlaneBase:
         self._axes = rotation_from_axes(normal, along)
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
         return np.asarray((points - self._origin) @ self._axes[:, :2])
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Distances of points [n, 3] from the base along its normals, m, [n]."""
         return np.asarray((points - self._origin) @ self._axes[:, 2])
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Unit normals of the base at the feet of points [n, 3], to the side wanted, [n, 3]."""
         return np.broadcast_to(self._axes[:, 2], points.shape)
 
     def coefficients(
         self, first: UniformKnots, second: UniformKnots, heights: np.ndarray
     ) -> np.ndarray:
-        """See the protocol."""
+        """Spline coefficients of a surface in space from those of its heights."""
         e_1, e_2, normal = self._axes.T
         along = first.linear[:, None, None] * e_1 + second.linear[None, :, None] * e_2
         return np.asarray(self._origin + along + heights[:, :, None] * normal)
@@ -106,7 +106,8 @@ class CylinderBase:
         points: [n, 3], m; the radius is the mean of their distances from the axis.
         origin: A point on the axis, [3], m.
         axis: Its direction, of any length, [3].
-        spacing: Of the points, m: the patch is closed if no wider gap is left round the axis.
+        spacing: Spacing of the points, m: the patch is closed if no wider gap is left round the
+            axis.
         outward: Whether normals point away from the axis.
 
     Raises:
@@ -144,18 +145,18 @@ class CylinderBase:
         self.period = 2.0 * math.pi * self.radius
 
     def parameters(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Parameters of the feet of points [n, 3] on the base, lengths in m, [n, 2]."""
         x, y, z = self._local(points)
         turn = np.mod(np.arctan2(y, x) - self._start, 2.0 * math.pi)
         return np.stack([self.radius * turn, z], axis=1)
 
     def heights(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Distances of points [n, 3] from the base along its normals, m, [n]."""
         x, y, _ = self._local(points)
         return np.asarray(self._side * (np.hypot(x, y) - self.radius))
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """See the protocol."""
+        """Unit normals of the base at the feet of points [n, 3], to the side wanted, [n, 3]."""
         x, y, _ = self._local(points)
         radial = np.stack([x, y], axis=1) / np.hypot(x, y)[:, None]
         return np.asarray(self._side * radial @ self._axes[:, :2].T)
@@ -163,7 +164,10 @@ class CylinderBase:
     def coefficients(
         self, first: UniformKnots, second: UniformKnots, heights: np.ndarray
     ) -> np.ndarray:
-        """See the protocol; a circle is none of polynomials, and missed by about step^7."""
+        """Spline coefficients of a surface in space from those of its heights.
+
+        A circle is none of polynomials, and missed by about step^7.
+        """
         sites = first.begin + first.step / _SITES * (np.arange(_SITES * first.intervals) + 0.5)
         basis = first.basis(sites).toarray()
         radii = self.radius + self._side * (basis @ heights)

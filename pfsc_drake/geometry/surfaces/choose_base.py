@@ -173,7 +173,7 @@ class Axis(NamedTuple):
 
     Attributes:
         point: On it, [3], m.
-        direction: Of any length, [3].
+        direction: Direction vector of any length, [3].
     """
 
     point: ArrayLike

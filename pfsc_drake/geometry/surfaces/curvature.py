@@ -14,12 +14,12 @@ class FundamentalForms:
 
     Attributes:
         normal: e_perp, (4.3) with the square root of E G - F^2, [..., 3].
-        E: (4.5), m^2, as F and G.
-        F: See E.
-        G: See E.
-        L: (4.8), m, as M and N.
-        M: See L.
-        N: See L.
+        E: First coefficient of the first form (4.5), m^2.
+        F: Its mixed coefficient, m^2.
+        G: Its last coefficient, m^2.
+        L: First coefficient of the second form (4.8), m.
+        M: Its mixed coefficient, m.
+        N: Its last coefficient, m.
     """
 
     normal: np.ndarray
@@ -73,12 +73,12 @@ def mean_and_spread(
     umbilics, too.
 
     Args:
-        E: First form, [...]; F and G likewise.
-        F: See E.
-        G: See E.
-        L: Second form, [...]; M and N likewise.
-        M: See L.
-        N: See L.
+        E: First coefficient of the first form, [...].
+        F: Its mixed coefficient, [...].
+        G: Its last coefficient, [...].
+        L: First coefficient of the second form, [...].
+        M: Its mixed coefficient, [...].
+        N: Its last coefficient, [...].
 
     Returns:
         Both [...]; the second is not negative.

@@ -63,14 +63,17 @@ class ExtendedSurface(Surface):
         )
 
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """All partial derivatives up to a total order, for set-up and figures."""
         values = self.checked(theta)
         sample = self.flat_sampler(order)
         flat = [sample(*pair) for pair in values.reshape(-1, 2).tolist()]
         return np.array(flat).reshape(*values.shape[:-1], -1, 3)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class; within the surface's own domain it is the surface's own."""
+        """Fast scalar form of `partials`, result flattened.
+
+        Within the surface's own domain it is the surface's own.
+        """
         inside = self.inner.flat_sampler(check_partial_order(order))
         rows = np.array(partial_orders(order))
         first, second = self._directions

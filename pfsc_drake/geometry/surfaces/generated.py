@@ -95,8 +95,8 @@ def extruded_surface(profile: Curve, direction: ArrayLike, length: float) -> Pro
 
     Args:
         profile: Curve in R^3, m.
-        direction: Of the motion, of any length, [3].
-        length: Of the motion, m, positive.
+        direction: Direction of the motion, of any length, [3].
+        length: Length of the motion, m, positive.
 
     Raises:
         InputError: No direction or length, or one along the profile.

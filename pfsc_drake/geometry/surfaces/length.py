@@ -24,7 +24,7 @@ class TangentialLength:
 
     Args:
         terms: theta -> partial derivatives up to order 2 as columns, shapes (2,) and (3, 6).
-        lengths: Of the domain in both parameters.
+        lengths: Lengths of the domain in both parameters.
     """
 
     def __init__(self, terms: Callable[[ca.MX], ca.MX], lengths: ArrayLike) -> None:

@@ -29,7 +29,7 @@ def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
     Args:
         file: A CSV file with columns x, y, z in any order, or an STL, OBJ or PLY file whose
             vertices are taken, equal ones once.
-        unit: Of the numbers in it.
+        unit: Unit of the numbers in it.
 
     Returns:
         Points, [n, 3], m.

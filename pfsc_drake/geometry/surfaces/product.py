@@ -26,7 +26,7 @@ class ProductSurface(Surface):
     has, with the products of the functions.
 
     Attributes:
-        coefficients: See below.
+        coefficients: The c_kl of all cells, as given.
         bases: Functions of either parameter.
 
     Args:
@@ -58,7 +58,7 @@ class ProductSurface(Surface):
         self.bases = (first, second)
 
     def partials(self, theta: ArrayLike, order: int) -> np.ndarray:
-        """See the base class."""
+        """All partial derivatives up to a total order, for set-up and figures."""
         rows = np.array(partial_orders(check_partial_order(order)))
         values = self.checked(theta)
         flat = values.reshape(-1, 2)
@@ -85,7 +85,10 @@ class ProductSurface(Surface):
         return both.reshape(n, order + 1, order + 1, 3).transpose(0, 2, 1, 3)
 
     def flat_sampler(self, order: int) -> Sampler:
-        """See the base class; the matrix of a cell is made when it is first entered."""
+        """Fast scalar form of `partials`, result flattened.
+
+        The matrix of a cell is made when it is first entered.
+        """
         first, second = (basis.sampler() for basis in self.bases)
         rows = partial_orders(check_partial_order(order))
         powers = [basis.derivations(order) for basis in self.bases]

@@ -28,7 +28,7 @@ class SurfaceProjection(NamedTuple):
 
     Attributes:
         theta: Parameters of the closest point, unwrapped in closed directions.
-        distance: Of the point from there, m.
+        distance: Distance of the point from there, m.
         alpha: Distance over the smallest radius of curvature towards the point; it lies in the
             feasible neighbourhood if alpha < 1, which is (4.13).
         at_border: True if the point lies beyond an end of an open direction; theta is then the

@@ -216,8 +216,8 @@ class SurfaceReport:
     Attributes:
         area: m^2.
         lengths: Longest of the lines along theta_1, and along theta_2, m.
-        lower_corner: Of the box along the world's axes that holds the samples, [3], m.
-        upper_corner: See there.
+        lower_corner: Lower corner of the box along the world's axes that holds the samples, [3], m.
+        upper_corner: Upper corner of that box, [3], m.
         radius_outside: Smallest radius of curvature on the side that e_perp points to, m: how
             far the feasible neighbourhood (4.13) reaches there; infinite where the surface does
             not bend to that side.

@@ -109,7 +109,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
 
     Args:
         points: [n, 3], m, 50 to 100,000 different ones, in any order.
-        options: See there.
+        options: How it is smoothed, and what is allowed.
 
     Returns:
         The surface and its residuals.

@@ -17,10 +17,10 @@ class UniformKnots:
     """Equally spaced simple knots of a B-spline in one direction.
 
     Attributes:
-        begin: Of the domain.
-        end: Of the domain.
+        begin: Begin of the domain.
+        end: End of the domain.
         intervals: Number of knot intervals.
-        degree: Of the polynomials.
+        degree: Degree of the polynomials.
         closed: True for a periodic spline.
     """
 
@@ -110,7 +110,7 @@ def interpolated_surface(
         parameters: theta_1 [n_1] and theta_2 [n_2] of rows and columns, strictly increasing; of
             a closed direction with the end of the period last.
         points: [n_1, n_2, 3], m; the last row or column of a closed direction is the first.
-        degree: Of the polynomials; an open direction needs more points than that.
+        degree: Degree of the polynomials; an open direction needs more points than that.
         closed: Which directions are periodic.
 
     Returns:

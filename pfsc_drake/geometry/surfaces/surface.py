@@ -57,9 +57,9 @@ class Surface(ABC):
             both ends, each [cells + 1].
 
     Args:
-        breakpoints: See above; finite and strictly increasing.
-        closed: See above.
-        smoothness: See above.
+        breakpoints: Lines between which it is analytic, finite and strictly increasing.
+        closed: Whether it is periodic in either direction.
+        smoothness: k of the class C^k.
 
     Raises:
         InputError: Breakpoints that do not increase, or are not finite.

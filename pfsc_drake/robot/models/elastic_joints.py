@@ -38,8 +38,8 @@ class ElasticJoints:
         stiffness: Diagonal of ``K_s`` [Nm/rad or N/m]; infinite where a joint stays rigid;
             empty if all do.
         damping: Diagonal of ``K_d`` [Nm s/rad or N s/m]; empty for none.
-        rotor_inertia: Of the drives, at the motor side [kg m^2; kg for slides]; empty for the
-            model's.
+        rotor_inertia: Rotor inertia of the drives, at the motor side [kg m^2; kg for slides];
+            empty for the model's.
         gear_ratio: Motor revolutions per joint revolution; empty for the model's.
     """
 

@@ -195,7 +195,7 @@ class Mimic:
 
     Attributes:
         leader: Name of the joint that it follows.
-        multiplier: Of the leader's position.
+        multiplier: Factor of the leader's position.
         offset: Where it stands when the leader is at zero [rad or m].
         place: Where the model says so, for messages.
     """
@@ -259,7 +259,7 @@ def with_followers(
     """Return the positions of fixed joints, and of what follows them.
 
     Args:
-        mimics: See :func:`mimics_of`.
+        mimics: Joints that follow others, as :func:`mimics_of` finds them.
         fixed: Positions of joints that are fixed, by name [rad or m]; those of followers, too, are
             taken as they are given.
         still: Joints that cannot move, whose position is zero.

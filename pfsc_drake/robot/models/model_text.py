@@ -117,7 +117,7 @@ class _Collector(logging.Handler):
         self._messages = messages
 
     def emit(self, record: logging.LogRecord) -> None:
-        """See :class:`logging.Handler`."""
+        """Keep a message."""
         error = record.levelno >= logging.ERROR
         kept = self._messages.errors if error else self._messages.warnings
         message = one_line(record.getMessage())

@@ -69,7 +69,7 @@ class ToolMass:
     Attributes:
         mass: [kg]; 0 where the last link is the tool.
         p_LC: Its centre of mass in the last link frame [m], shape (3,).
-        name: Of its body, for messages.
+        name: Name of its body, for messages.
     """
 
     mass: float
@@ -184,12 +184,12 @@ class ParametricChain(SerialChain):
 
     @property
     def numeric(self) -> SerialChain:
-        """See :class:`RobotModel`."""
+        """The robot with numbers for all parameters: itself, unless some are symbols."""
         return self.nominal
 
     @property
     def elastic_joints(self) -> np.ndarray:
-        """See :class:`RobotModel`."""
+        """Which joints have a finite stiffness, shape (N,) of bool."""
         return self.nominal.elastic_joints
 
     @property
@@ -204,7 +204,7 @@ class ParametricChain(SerialChain):
 
     @property
     def springs(self) -> ca.SX:
-        """See :class:`RobotModel`."""
+        """Stiffnesses of the elastic joints and zeros of the rigid ones, shape (N, 1)."""
         return ca.vertcat(
             *[
                 k if np.isfinite(n) else 0.0
@@ -213,7 +213,7 @@ class ParametricChain(SerialChain):
         )
 
     def gather(self, attribute: str) -> np.ndarray:
-        """See :class:`RobotModel`.
+        """Return one attribute of all links as an array, shape (N,) or (N, ...).
 
         Raises:
             TypeError: If that is a parameter, which has no value.

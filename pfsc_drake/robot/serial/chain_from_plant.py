@@ -67,7 +67,7 @@ class PlantCoordinates:
         """Return the matrix from drives to the plant's actuation, shape (num_actuators, N).
 
         Args:
-            num_actuators: Of the plant, which may have others besides.
+            num_actuators: Number of actuators of the plant, which may have others besides.
         """
         rows = np.zeros((num_actuators, len(self.actuators)))
         rows[self.actuators, np.arange(len(self.actuators))] = 1.0

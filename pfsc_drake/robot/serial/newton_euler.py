@@ -148,8 +148,8 @@ def points_on_links(
     Args:
         chain: The robot, N joints.
         q: Joint coordinates, N scalar jets of order r >= 1.
-        points: Of each the index of its link, 0 for the first that moves, to N - 1, and where it
-            is in that link's frame [m], shape (3,).
+        points: Points of each the index of its link, 0 for the first that moves, to N - 1, and
+            where it is in that link's frame [m], shape (3,).
         motions: Motions for these very coordinates, if known already.
 
     Returns:

@@ -52,7 +52,7 @@ def upward_direction(chain: Linkage, q: np.ndarray, joints: tuple[int, int, int]
     Args:
         chain: The arm.
         q: Joint coordinates, shape (N,).
-        joints: See :func:`swivel_angle`.
+        joints: Indices of the joints whose origins are shoulder, elbow and wrist.
     """
     still = [jets.constant(ca.SX(value), 1) for value in q]
     shoulder, _, wrist = _points(chain, still, joints)
