@@ -1,5 +1,7 @@
 """How properties are tested, without looking at the clock; what begins, and when is compiled."""
 
+import gc
+
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
@@ -20,6 +22,9 @@ settings.register_profile(
     print_blob=True,
 )
 settings.load_profile("suite")
+
+# millions of CasADi expressions are made, nearly all of them without cycles
+gc.set_threshold(100_000, 20, 20)
 
 # where machine code is the subject, or speed
 _COMPILED_AT_ONCE = {"compiled", "benchmarks", "live"}

@@ -16,7 +16,7 @@ import types
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import PurePath
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -28,6 +28,8 @@ R = TypeVar("R")
 
 # of many functions in a process, those whose digests are kept
 _MOST_FUNCTIONS = 1000
+# and frozen objects
+_MOST_REMEMBERED = 2000
 # bytes, up to which nothing is hashed
 _SHORT = 200
 
@@ -77,8 +79,8 @@ def once_per_content(most_kept: int = 100) -> Callable[[Callable[P, R]], Callabl
     return decorator
 
 
-def content(value: Any) -> tuple[bytes, tuple[Any, ...]]:
-    """Return a key that is equal for equal content, and for nothing else.
+def content(value: Any) -> bytes:
+    """Return a key that is equal for equal content, and for nothing else, in this process.
 
     Numbers, text, arrays, containers and CasADi functions are told by their values; objects by
     their type and attributes, those left out that a ``cached_property`` has found. An object that
@@ -88,14 +90,10 @@ def content(value: Any) -> tuple[bytes, tuple[Any, ...]]:
     Args:
         value: Anything.
 
-    Returns:
-        A digest, and the types and functions that it rests on.
-
     Raises:
         NoContentError: If something in it has no such content.
     """
-    walk = _Walk()
-    return walk.digest(value), tuple(walk.met)
+    return _Walk().digest(value).key
 
 
 def function_digest(function: ca.Function) -> bytes:
@@ -120,32 +118,114 @@ _digests: OrderedDict[int, tuple[ca.Function, bytes]] = OrderedDict()
 _digests_lock = threading.Lock()
 
 
+class _Digest(NamedTuple):
+    """The digest of a value.
+
+    Attributes:
+        key: The digest.
+        arrays: Arrays in what else can never change; None if more than these could.
+    """
+
+    key: bytes
+    arrays: tuple[np.ndarray, ...] | None
+
+
+class _Remembered(NamedTuple):
+    """A frozen object, its digest, and the bytes of its arrays at that time."""
+
+    value: Any
+    digest: _Digest
+    told: list[bytes]
+
+    def holds(self, value: Any) -> bool:
+        """Return whether the digest is still that of the object."""
+        arrays = self.digest.arrays or ()
+        return self.value is value and [a.tobytes() for a in arrays] == self.told
+
+
+_remembered: OrderedDict[int, _Remembered] = OrderedDict()
+_remembered_lock = threading.Lock()
+# types and code of functions, each with its number in this process
+_things: dict[Any, int] = {}
+_UNCHANGING = (
+    str,
+    bytes,
+    type,
+    enum.Enum,
+    np.generic,
+    np.ufunc,
+    PurePath,
+    slice,
+    ca.Function,
+    ca.Sparsity,
+    types.BuiltinFunctionType,
+    types.CodeType,
+)
+
+
 class _Walk:
     """A walk through a value and all that it holds, each object once."""
 
     def __init__(self) -> None:
-        self.met: dict[Any, int] = {}
         # the objects are kept, for the keys are their addresses; None of those not left yet
-        self._known: dict[int, tuple[Any, bytes | None]] = {}
+        self._known: dict[int, tuple[Any, _Digest | None]] = {}
 
-    def digest(self, value: Any) -> bytes:
+    def digest(self, value: Any) -> _Digest:
         """Return the digest of a value."""
         atom = _atom(value)
         if atom is not None:
-            return atom
+            return _Digest(atom, ())
         known = self._known.get(id(value))
         if known is None:
             self._known[id(value)] = value, None
-            tag, parts = self._parts(value)
-            found = _hash(tag, (self.digest(part) for part in parts))
+            found = self._found(value)
             self._known[id(value)] = value, found
             return found
         if known[1] is None:
             raise NoContentError(f"{type(value).__name__}: holds itself")
         return known[1]
 
+    def _found(self, value: Any) -> _Digest:
+        """Return the digest of what this walk has not met; of frozen objects it is remembered."""
+        if not _is_frozen(value):
+            return self._made(value)
+        before = _remembered.get(id(value))
+        if before is not None and before.holds(value):
+            return before.digest
+        made = self._made(value)
+        if made.arrays is not None:
+            with _remembered_lock:
+                told = [array.tobytes() for array in made.arrays]
+                _remembered[id(value)] = _Remembered(value, made, told)
+                while len(_remembered) > _MOST_REMEMBERED:
+                    _remembered.popitem(last=False)
+        return made
+
+    def _made(self, value: Any) -> _Digest:
+        tag, parts = self._parts(value)
+        digests = [self.digest(part) for part in parts]
+        key = _hash(tag, (digest.key for digest in digests))
+        if isinstance(value, np.ndarray):
+            return _Digest(key, (value,))
+        if isinstance(value, _UNCHANGING):
+            return _Digest(key, ())
+        if not (_is_frozen(value) or isinstance(value, tuple | frozenset | types.FunctionType)):
+            return _Digest(key, None)
+        if isinstance(value, types.FunctionType) and value.__closure__:
+            return _Digest(key, None)  # of cells what they hold can be another tomorrow
+        held: list[np.ndarray] = []
+        for digest in digests:
+            if digest.arrays is None:
+                return _Digest(key, None)
+            held += digest.arrays
+        return _Digest(key, tuple(held))
+
     def _met(self, thing: Any) -> bytes:
-        return b"m%d" % self.met.setdefault(thing, len(self.met))
+        number = _things.get(thing)
+        if number is None:
+            with _remembered_lock:
+                number = _things.setdefault(thing, len(_things))
+        return b"m%d" % number
 
     def _parts(self, value: Any) -> tuple[bytes, Iterable[Any]]:
         """Return what kind of object it is, and what it holds."""
@@ -154,7 +234,7 @@ class _Walk:
         if isinstance(value, type | types.BuiltinFunctionType | types.CodeType | np.ufunc):
             return self._met(value), []
         if isinstance(value, types.FunctionType):
-            held = [cell.cell_contents for cell in value.__closure__ or ()]
+            held = tuple(cell.cell_contents for cell in value.__closure__ or ())
             defaults = value.__defaults__, value.__kwdefaults__
             return self._met(value.__code__), [value.__module__, held, *defaults]
         if isinstance(value, types.MethodType):
@@ -179,7 +259,7 @@ class _Walk:
         if isinstance(value, slice):
             return kind, [value.start, value.stop, value.step]
         if isinstance(value, set | frozenset):
-            return kind, sorted(self.digest(part) for part in value)
+            return kind, sorted(self.digest(part).key for part in value)
         if isinstance(value, tuple | list):
             return kind, value
         if isinstance(value, Mapping):
@@ -238,15 +318,20 @@ def _reduced(value: Any) -> list[Any]:
     ]
 
 
+def _is_frozen(value: Any) -> bool:
+    parameters = getattr(type(value), "__dataclass_params__", None)
+    return parameters is not None and parameters.frozen and not hasattr(type(value), "__content__")
+
+
 def _attributes(kind: type, state: Any) -> Any:
     """Return an object's attributes by name, without those that follow from others."""
     if not isinstance(state, dict):
         return state
-    return [
+    return tuple(
         (name, state[name])
         for name in sorted(state)
         if not isinstance(getattr(kind, name, None), functools.cached_property)
-    ]
+    )
 
 
 def _hash(tag: bytes, parts: Iterable[bytes]) -> bytes:

@@ -113,10 +113,14 @@ MAX_DEPTH = 100
 
 
 class _Loader(yaml.SafeLoader):
-    """Keeps tags."""
+    """Keeps tags; its messages are for people."""
 
 
-class _Dumper(yaml.SafeDumper):
+class _QuickLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Reads the same from the same text, where nothing is wrong."""
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
     """Writes tags."""
 
 
@@ -136,7 +140,8 @@ def _represent_list(dumper: yaml.SafeDumper, data: list[Any]) -> yaml.Node:
     return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flow)
 
 
-_Loader.add_multi_constructor("", _construct_tagged)
+for _loader in (_Loader, _QuickLoader):
+    _loader.add_multi_constructor("", _construct_tagged)
 _Dumper.add_representer(dict, _represent_mapping)
 _Dumper.add_representer(list, _represent_list)
 
@@ -177,8 +182,7 @@ def parse_yaml(text: str, source: str) -> Any:
             aliases are copies, or holds characters that no name of a file can have; one line.
     """
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
+        loader, node = _composed(text)
         if node is not None:
             _NodeCheck(source).check(node)
         return None if node is None else _without_sharing(loader.construct_document(node))
@@ -195,6 +199,16 @@ def parse_yaml(text: str, source: str) -> Any:
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError) as error:
         # PyYAML lets the others than YAMLError out of e.g. 2020-02-31, !!bool x, !!int "".
         raise InputError(f"{source}: invalid YAML: {' '.join(str(error).split())}") from None
+
+
+def _composed(text: str) -> tuple[Any, yaml.Node | None]:
+    """Return a loader, and the only document of a text as its nodes."""
+    try:
+        quick = _QuickLoader(text)
+        return quick, quick.get_single_node()
+    except (yaml.YAMLError, ValueError):
+        loader = _Loader(text)
+        return loader, loader.get_single_node()
 
 
 def dump_yaml(data: Any) -> str:

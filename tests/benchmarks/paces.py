@@ -27,11 +27,11 @@ from diagrams.robots.drives import add_friction
 from diagrams.scenario import Scenario
 from diagrams.station import Station
 from diagrams.station_parts import belief_source, friction_options
-from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario
+from experiments.scenario_file import SCENARIO_DIRECTORY
 from experiments.simulation import configure
 from pfsc_drake.systems.plants.external_forces import LinkPushes
 from pfsc_drake.systems.plants.reactions import JointReaction
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 # shares of the replayed torque's pace that are aimed at
 GOALS = {
@@ -161,7 +161,7 @@ def machine() -> float:
 
 def compare(name: str) -> dict[str, float]:
     """Return the medians of a scenario's paces."""
-    settings = load_file(Scenario, find_scenario(name))
+    settings = shipped_scenario(name)
     stations: dict[str, Station] = {}
     for key, fused in (("systems", False), ("fused", True)):
         settings.simulation.fused = fused

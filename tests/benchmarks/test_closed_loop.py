@@ -6,10 +6,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import Scenario
 from experiments.integration import choose_integration
 from experiments.simulation import configure
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "experiments" / "scenarios"
 SPAN = 0.2
@@ -17,7 +16,7 @@ SPAN = 0.2
 
 @pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_elastic_6r"])
 def test_closed_loop(benchmark, name):
-    scenario = load_file(Scenario, SCENARIOS / f"{name}.yaml")
+    scenario = shipped_scenario(name)
     station = build_station(scenario, SCENARIOS)
     simulator = Simulator(station.diagram)
     integration = choose_integration(station, scenario.simulation, scenario.reference.dwell)

@@ -25,6 +25,7 @@ from pfsc_drake.control.fixtures.parameters import Admittance, GuidanceParameter
 from pfsc_drake.geometry.regions.shapes import HalfSpace, SphereRegion
 from pfsc_drake.yaml.typed import load_file
 from tests.control.fixtures.point_robot import Guide, point
+from tests.scenarios import shipped_scenario
 
 PERIOD, REGIONS, TICKS = 1e-3, 8, 200
 PULLS = {
@@ -67,7 +68,7 @@ def test_whole_chain(benchmark):
     """A hand presses the tool on the cylinder of `vf_forbidden_region`, six balls around it."""
     file = find_scenario("vf_forbidden_region")
     scenario = load_file(Scenario, file)
-    balls = load_file(Scenario, find_scenario("vf_many_surfaces")).fixtures.regions[3:]
+    balls = shipped_scenario("vf_many_surfaces").fixtures.regions[3:]
     start = np.array(scenario.start.position)
     clear = [b for b in balls if np.linalg.norm(start - b.shape.origin) > b.shape.radius + 0.05]
     scenario.fixtures.regions += clear[: REGIONS - len(scenario.fixtures.regions)]

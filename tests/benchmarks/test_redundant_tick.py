@@ -11,11 +11,10 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.scenario import PostureParameters, Scenario
+from diagrams.scenario import PostureParameters
 from experiments.integration import choose_integration
-from experiments.scenario_file import find_scenario
 from experiments.simulation import configure
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 POSTURES = {
     "reference": PostureParameters(),
@@ -29,7 +28,7 @@ SPAN, COUNT = 0.45, 64
 @pytest.mark.parametrize("posture", POSTURES)
 def test_tick_of_seven_elastic_axes(benchmark, posture):
     """Observers and supervision included, on the states of successive ticks at 1 m/s."""
-    scenario = load_file(Scenario, find_scenario("pfc_elastic_7r"))
+    scenario = shipped_scenario("pfc_elastic_7r")
     scenario.controller.posture = POSTURES[posture]
     scenario.reference.dwell = 0.02
     station = build_station(scenario, Path())

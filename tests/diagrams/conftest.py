@@ -10,9 +10,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters, Scenario
-from experiments.scenario_file import find_scenario
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 
 class Arm:
@@ -64,7 +63,7 @@ def load_scenario():
     """Return a fresh copy of a shipped scenario, to be changed; its systems can be looked at."""
 
     def load(name: str) -> Scenario:
-        settings = load_file(Scenario, find_scenario(name))
+        settings = shipped_scenario(name)
         settings.simulation.fused = False
         return settings
 

@@ -16,7 +16,7 @@ from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 SCENARIOS = find_scenario("pfc_compliant_6r").parent
-AFTER = 1.0
+AFTER = 0.7
 
 
 @pytest.fixture

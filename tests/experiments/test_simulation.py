@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import Scenario
 from experiments import simulation
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_signals import collect_log
-from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 
 class Listener:
@@ -30,7 +28,7 @@ class Listener:
 
 @pytest.fixture
 def settings():
-    return load_file(Scenario, find_scenario("pfc_elastic_3r"))
+    return shipped_scenario("pfc_elastic_3r")
 
 
 @pytest.fixture

@@ -67,6 +67,7 @@ class CourseFinder:
         self._pose = BoundFunction(pose_function(robot))
         self._correction = BoundFunction(_correction_function(robot, manifold, inverse, posture))
 
+    @once_per_content(30)
     def find(
         self, start: CourseStart, reference: np.ndarray, times: np.ndarray, *, still: bool = False
     ) -> np.ndarray:

@@ -6,20 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagrams.scenario import Scenario
 from diagrams.scenario.fixtures import RegionParameters, Shift, Swinging
 from diagrams.scenario.surface_shapes import Plane
 from diagrams.station_parts import make_task
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.fixtures import near_expression, scheduled_regions
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
 
 
 @pytest.fixture(name="scenario")
 def fixture_scenario():
-    return load_file(Scenario, SCENARIOS / "vf_wedge.yaml")
+    return shipped_scenario("vf_wedge")
 
 
 def test_the_start_is_turned_about_the_axes_of_the_tool(scenario):

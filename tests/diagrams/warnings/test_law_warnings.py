@@ -5,18 +5,18 @@ from pathlib import Path
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
+from diagrams.scenario import ForcePulse, GainParameters, LawGains
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.robot.robot_model import joint_resonances
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
 
 
 @pytest.fixture(name="scenario")
 def fixture_scenario():
-    return load_file(Scenario, SCENARIOS / "pfc_elastic_3r.yaml")
+    return shipped_scenario("pfc_elastic_3r")
 
 
 def warnings(scenario):
@@ -51,7 +51,7 @@ def test_joints_so_soft_that_the_law_is_unstable(scenario):
 
 def test_stiff_joints_suit_both_laws():
     """Deviations of 0.1 mm and less at 0.3 m/s; with the printed damping 0.4 mm."""
-    scenario = load_file(Scenario, SCENARIOS / "pfc_comau_6r.yaml")
+    scenario = shipped_scenario("pfc_comau_6r")
     assert warnings(scenario) == []
     tuned = scenario.controller.boundary_layer_damping
     scenario.controller.boundary_layer_damping = [0.022, 0.022, 0.0088, 0.0024, 0.0044, 0.0022]
@@ -122,7 +122,7 @@ def with_gains(scenario, **kinds):
 
 def test_gains_that_do_not_bear_an_error_of_the_model():
     """Four equal poles on six axes: unstable with masses 5 % off, by simulation as well."""
-    scenario = load_file(Scenario, SCENARIOS / "pfc_elastic_6r.yaml")
+    scenario = shipped_scenario("pfc_elastic_6r")
     assert warnings(scenario) == []
     equal = {"poles": [-55.0] * 4}
     (warning,) = warnings(with_gains(scenario, eta=equal, xi=equal, phi=equal))
@@ -139,7 +139,7 @@ def test_gains_too_fast_for_the_sampling(scenario):
 
 
 def test_chosen_poles_bear_what_they_shall_and_are_written_down():
-    scenario = load_file(Scenario, SCENARIOS / "pfc_elastic_6r.yaml")
+    scenario = shipped_scenario("pfc_elastic_6r")
     slow, quick = {"bandwidth": 40.0}, {"bandwidth": 60.0, "bears": 0.08}
     given = with_gains(scenario, eta=slow, xi=quick, phi={"poles": [-50.0, -50.0, -200.0, -300.0]})
     assert warnings(given) == []
@@ -181,7 +181,7 @@ def test_refused_ways_to_choose_poles(wrong, key):
 
 def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
     """From 3.5 % (still) to 4 % (swings at 13 Hz) on, simulated with all masses too high."""
-    scenario = load_file(Scenario, SCENARIOS / "vf_soft_circle.yaml")
+    scenario = shipped_scenario("vf_soft_circle")
     scenario.friction, scenario.controller.friction.source = type(scenario.friction)(), "none"
     scenario.model_error = type(scenario.model_error)()
     assert warnings(scenario) == []
@@ -193,7 +193,7 @@ def test_observed_forces_bear_less_than_the_masses_may_be_wrong():
 
 
 def test_free_angles_make_no_loop_unstable():
-    scenario = load_file(Scenario, SCENARIOS / "pfc_comau_6r.yaml")
+    scenario = shipped_scenario("pfc_comau_6r")
     gains = scenario.controller.gains["singular_perturbation"]
     gains.phi = GainParameters(free=True, poles=[-10.0])
     assert warnings(scenario) == []

@@ -9,7 +9,7 @@ from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.station_warnings import expected_forces
 from pfsc_drake.physics.hand_model import HandParameters
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
 
@@ -17,7 +17,7 @@ SCENARIOS = Path(__file__).resolve().parents[3] / "experiments" / "scenarios"
 @pytest.fixture(name="scenario")
 def fixture_scenario():
     """A hand leads six axes without friction, under a law for torques."""
-    scenario = load_file(Scenario, SCENARIOS / "vf_forbidden_region.yaml")
+    scenario = shipped_scenario("vf_forbidden_region")
     poles = GainParameters(poles=[-60.0, -60.0])
     scenario.controller.law = "rigid"
     scenario.controller.gains["rigid"] = LawGains(eta=poles, phi=poles)

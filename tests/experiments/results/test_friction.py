@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains, Scenario
+from diagrams.scenario import GainParameters, JointFrictionParameters, LawGains
 from experiments.results.drives import friction_metrics
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log, expected_signals
-from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.robot.models.parameters import load_parameters
-from pfsc_drake.yaml.typed import load_file
 from tests.experiments.results.registry_names import names_about
+from tests.scenarios import shipped_scenario
 
 
 def make_log():
@@ -50,7 +49,7 @@ def test_names_are_those_of_the_metrics():
 @pytest.fixture(name="settings")
 def fixture_settings():
     """Return three axes that are observed on their way to the path, masses believed 10 % low."""
-    settings = load_file(Scenario, find_scenario("pfc_elastic_3r"))
+    settings = shipped_scenario("pfc_elastic_3r")
     settings.friction = JointFrictionParameters([4.0, 9.0, 2.0], [1.0, 9.0, 3.0])
     settings.controller.friction.source = "observer"
     settings.controller.friction.observer = "kalman"

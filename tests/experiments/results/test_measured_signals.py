@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.scenario import EncoderOptions, GainParameters, LawGains, Scenario
+from diagrams.scenario import EncoderOptions, GainParameters, LawGains
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_signals import collect_log
-from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
-from pfsc_drake.yaml.typed import load_file
+from tests.scenarios import shipped_scenario
 
 DURATION = 0.3
 COARSE = 2000.0
@@ -19,7 +18,7 @@ COARSE = 2000.0
 
 @pytest.fixture
 def settings():
-    settings = load_file(Scenario, find_scenario("pfc_elastic_3r"))
+    settings = shipped_scenario("pfc_elastic_3r")
     settings.robot.model = "comau_racer_1_4_3r"
     settings.controller.law = "rigid"
     poles = GainParameters(poles=[-30.0, -30.0])

@@ -10,10 +10,10 @@ from pydrake.systems.analysis import Simulator
 from diagrams.builder import build_station
 from diagrams.scenario import Scenario
 from diagrams.station import Station
-from experiments.scenario_file import SCENARIO_DIRECTORY, find_scenario, scenario_names
+from experiments.scenario_file import SCENARIO_DIRECTORY, scenario_names
 from experiments.simulation import configure
-from pfsc_drake.yaml.typed import load_file
 from tests.deferred_code import compiled_at_once, interpreted
+from tests.scenarios import shipped_scenario
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +47,7 @@ def compare(settings: Scenario) -> Log:
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_scenario_logs_the_same(name):
-    settings = load_file(Scenario, find_scenario(name))
+    settings = shipped_scenario(name)
     if settings.controller.manifold not in ("path", "trajectory", "surface", "space"):
         pytest.skip("no controller")
     log = compare(settings)
@@ -57,7 +57,7 @@ def test_every_scenario_logs_the_same(name):
 @pytest.mark.parametrize("name", ["pfc_elastic_6r", "vf_forbidden_region"])
 def test_safe_stops_are_the_same(name):
     """A sensor fails on the way: the fault, and what the drives do then."""
-    settings = load_file(Scenario, find_scenario(name))
+    settings = shipped_scenario(name)
     settings.simulation.sensor_failure.time = 0.03
     settings.simulation.sensor_failure.component = 1
     assert compare(settings)["stopped"]

@@ -2,10 +2,13 @@
 
 import json
 
+import pytest
+
 from experiments.cli import main
 from experiments.studies.robustness import SUBJECTS, write_robustness
 
 
+@pytest.mark.slow
 def test_what_a_wrong_model_does(tmp_path):
     three = tuple(s for s in SUBJECTS if s.scenario == "pfc_elastic_3r")
     some = {"as modelled": (), "masses 10 % too low": ("model_error.mass=0.9",)}

@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 from experiments.studies.tracking import FORCES, ROBOTS, write_tracking
 
 
+@pytest.mark.slow
 def test_what_a_plain_force_does(tmp_path):
     (plain,) = (name for name in FORCES if name.startswith("a plain force"))
     (exact,) = (name for name in ROBOTS if name == "as modelled")

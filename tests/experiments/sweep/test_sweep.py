@@ -53,6 +53,7 @@ def rows_of(out):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_stopped_gone_on_with_and_done(address, tmp_path, capfd):
     out = tmp_path / "out"
     console = Console(file=Impatient("2 of 4 runs"), width=200)
