@@ -15,7 +15,7 @@ from rich.console import Console
 
 from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
-from identification.excitation.recording import information_command
+from identification.excitation.command import information_command
 from identification.options import (
     Bounds,
     Excitation,

@@ -2,14 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
 import casadi as ca
 import numpy as np
-import typer
 from pydrake.geometry import Meshcat, MeshcatParams, Rgba
 from pydrake.systems.framework import DiagramBuilder
-from rich.console import Console
 
 from diagrams.drawing.replay import add_source, arrange_scene, camera_and_target, record
 from diagrams.drawing.robot_geometry import draw_robot
@@ -19,13 +16,12 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun
 from identification.excitation.scene import Cell, left_out_tool, obstacle_shape
 from identification.model.subject import Subject, tool_frame_of
-from identification.options import Robot, Tool, write_text
+from identification.options import write_text
 from pfsc_drake import jets
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
 from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
-from reporting.terminal import interruptible
 
 _TRAIL = Rgba(0.9, 0.25, 0.1, 1.0)
 _OBSTACLE = Rgba(0.55, 0.58, 0.62, 0.4)
@@ -115,35 +111,3 @@ def _tool_points(subject: Subject, q: np.ndarray) -> np.ndarray:
     y_t, _ = robot.tool_pose(still)
     function = ca.Function("tool", [joints], [ca.densify(y_t.coefficients[0])])
     return np.array(function.map(len(q))(q.T)).T
-
-
-def information_command(
-    robot: Robot,
-    excitations: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="excitation.yaml of motions. Default: all that are shipped with the robot"
-        ),
-    ] = None,
-    tool: Tool = False,
-) -> None:
-    """Tell log det(X'X) and condition number of motions, of 1,000 samples of a period."""
-    from identification.excitation.criterion import information
-    from identification.excitation.fourier import FourierTrajectory
-    from identification.model.base import base_parameters
-    from identification.model.regressor import Regressor
-    from identification.model.subject import load_subject
-    from identification.steps import shipped_excitations
-
-    with interruptible():
-        console, subject = Console(), load_subject(robot, tool=tool)
-        regressor = Regressor(subject)
-        base = base_parameters(regressor)
-        for file in excitations or shipped_excitations(subject):
-            found = information(regressor, base, FourierTrajectory.load(file))
-            console.print(
-                f"{file.name}: log det {found.log_determinant:.1f}, condition number "
-                f"{found.condition_number:.0f}, {found.base_parameters} parameters",
-                soft_wrap=True,
-                highlight=False,
-            )
