@@ -19,6 +19,7 @@ from diagrams.robots.drives import (
     believed_friction,
 )
 from diagrams.robots.part import RobotPart
+from diagrams.robots.remote_arm import RemoteArm
 from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
@@ -49,6 +50,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 
@@ -61,6 +63,7 @@ def build_station(
     *,
     with_slope: bool = False,
     parametric: bool = False,
+    remote: bool = False,
 ) -> Station:
     """Build the station of a scenario.
 
@@ -74,6 +77,9 @@ def build_station(
             contact has there, and the plant continuous.
         parametric: Whether mass and stiffness parameters of the believed robot, a serial chain,
             are symbols: such a station is not simulated, but its blocks' networks differentiated.
+        remote: Whether the robot stands elsewhere: the station has a
+            :class:`~diagrams.robots.remote_arm.RemoteArm` for it, and the scenario must tell
+            nothing of its surroundings, see :func:`~diagrams.scenario.driven.driven`.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.
@@ -85,7 +91,8 @@ def build_station(
     task = make_task(scenario, folder, progress) if like is None else like.task
     workpiece, mounting = make_workpiece(scenario, task), choose_mounting(scenario, task)
     spring = make_spring(scenario, workpiece) if with_slope else None
-    part = add_robot(builder, scenario, folder, workpiece if spring is None else None)
+    touched = workpiece if spring is None else None
+    part = add_robot(builder, scenario, folder, touched, remote=remote)
     if parametric:
         assert isinstance(part, Arm)
         part = replace(part, belief=part.belief.with_symbols())
@@ -93,12 +100,12 @@ def build_station(
     believed = part.belief.robot
     begin = cache(
         lambda: (
-            _start(scenario, task, part, workpiece, mounting)
+            find_start(scenario, task, part, workpiece, mounting)
             if like is None
             else (like.start, like.initial_state)
         )
     )
-    rest = cache(lambda: _rest(task, part, *begin()))
+    rest = cache(lambda: find_rest(task, part, *begin()))
     law = make_law(scenario.controller, believed, task.manifold, rest, scenario.faults)
     start, initial_state = begin()
     on_motors = scenario.controller.law == "rigid" and not believed.is_rigid
@@ -120,7 +127,7 @@ def build_station(
         builder,
         true_state,
         part.robot,
-        scenario.encoders,
+        EncoderOptions() if remote else scenario.encoders,
         failures.sensor_failure,
         period,
         scenario.encoder_period,
@@ -147,10 +154,16 @@ def build_station(
     controller, made = add_law(builder, following, place, forces | requests)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    further, servo = add_drives(
-        builder, part, servo_options(scenario), period, signals | drive, initial_state
-    )
-    signals |= further
+    if isinstance(part, RemoteArm):
+        builder.Connect(
+            part.stop_request.get_output_port(), controller.GetInputPort("stop_request")
+        )
+    servo = None
+    if not remote:
+        further, servo = add_drives(
+            builder, part, servo_options(scenario), period, signals | drive, initial_state
+        )
+        signals |= further
     faults = [controller.GetOutputPort("fault")]
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
     signals |= add_friction(builder, part, true_state, rubbing, faults)
@@ -195,7 +208,7 @@ def build_station(
     )
 
 
-def _start(
+def find_start(
     scenario: Scenario,
     task: Task,
     part: RobotPart,
@@ -203,6 +216,13 @@ def _start(
     mounting: Mounting | None,
 ) -> tuple[StartPoint, np.ndarray]:
     """Return where the tool starts, and the state of the plant there, at rest.
+
+    Args:
+        scenario: The scenario.
+        task: What the tool is to do.
+        part: The robot.
+        workpiece: What the tool touches, if anything.
+        mounting: Where plates come from and go, if there are any.
 
     Raises:
         InputError: If the start or the way from there is known to be out of reach.
@@ -237,8 +257,15 @@ def _posture(scenario: Scenario, task: Task, part: RobotPart, start: StartPoint)
         raise InputError(f"{error}; {advice}") from None
 
 
-def _rest(task: Task, part: RobotPart, start: StartPoint, state: np.ndarray) -> RestPosture:
-    """Return where the robot starts, as the law sees it."""
+def find_rest(task: Task, part: RobotPart, start: StartPoint, state: np.ndarray) -> RestPosture:
+    """Return where the robot starts, as the law sees it.
+
+    Args:
+        task: What the tool is to do.
+        part: The robot.
+        start: Where the tool starts.
+        state: State of the robot's model there.
+    """
     q_J = (part.coordinates.link_rows @ state)[: part.robot.dimension]
     return RestPosture(q_J, task.point(start))
 

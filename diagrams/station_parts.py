@@ -13,6 +13,7 @@ from diagrams.robots.drives import (
 )
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
+from diagrams.robots.remote_arm import add_remote_arm
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.scenario.checks import require, require_whole_fraction
@@ -124,6 +125,8 @@ def add_robot(
     scenario: Scenario,
     folder: FilePath,
     workpiece: Workpiece | None,
+    *,
+    remote: bool = False,
 ) -> RobotPart:
     """Add the robot of a scenario, with what its controller believes of it.
 
@@ -132,11 +135,16 @@ def add_robot(
         scenario: The scenario.
         folder: Where its relative file names start.
         workpiece: What the tool may touch, if anything.
+        remote: Whether it stands elsewhere.
 
     Raises:
         InputError: If the robot cannot be read, or cannot do what the scenario asks of it.
     """
     source, controller = belief_source(scenario, folder), scenario.controller
+    if remote:
+        model = scenario.robot.model
+        require(not is_delta(model), "robot.model", model, "an arm, where it stands elsewhere")
+        return add_remote_arm(builder, source, has_sensor=scenario.needs_sensor)
     if not is_delta(scenario.robot.model):
         return add_arm(builder, source, workpiece)
     step = free_step(controller.sampling_time, scenario.simulation.max_step)

@@ -24,7 +24,7 @@ FLOORS = [
     ["diagrams.tasks"],
     ["diagrams.robots"],
     ["diagrams.scenario"],
-    ["pfsc_drake.following", "pfsc_drake.codegen"],
+    ["pfsc_drake.following", "pfsc_drake.codegen", "pfsc_drake.drivers"],
     ["pfsc_drake.systems"],
     ["pfsc_drake.physics"],
     ["pfsc_drake.control"],

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import typer
 
+from experiments.hardware_commands import drive_command, robot_command
 from experiments.run_commands import (
     compare_command,
     list_command,
@@ -41,6 +42,8 @@ app.command("teach")(teach_command)
 app.command("margins")(margins_command)
 app.command("export")(export_command)
 app.command("replay")(replay_command)
+app.command("robot")(robot_command)
+app.command("drive")(drive_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -23,6 +23,7 @@ from experiments.results.drives import (
     saturation_warnings,
 )
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
+from experiments.results.link import link_metrics
 from experiments.results.mounting import mounting_metrics
 from experiments.results.path import path_following_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
@@ -85,6 +86,8 @@ class FinishedRun:
         result: What came of it.
         analysis: What the loop bears at the start, if somebody asked.
         attributes: What else to note in the log.
+        further: Adds what the station does not know to the log.
+        simulated: Whether the robot was simulated in here, not driven elsewhere.
     """
 
     prepared: PreparedRun
@@ -92,6 +95,8 @@ class FinishedRun:
     result: SimulationResult
     analysis: MarginAnalysis | None = None
     attributes: dict[str, str] = field(default_factory=dict)
+    further: Callable[[RunLog], None] = lambda log: None
+    simulated: bool = True
 
 
 @dataclass(frozen=True)
@@ -170,6 +175,7 @@ def _measure(
     with steady_clock():
         end = float(result.root.get_time())
         log = collect_log(station, result.root)
+        run.further(log)
         log["rcond"].limits = np.array([[settings.controller.min_rcond, np.inf]])
         log.attributes = (
             standard_attributes(run.name)
@@ -210,6 +216,7 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
+    metrics.update(link_metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
     metrics.update(posture_metrics(log, station.task.lap))
     metrics.add("real_time_factor", result.real_time_factor)
@@ -280,6 +287,7 @@ def _report(
         fault=measured.fault,
         broken=measured.broken,
         interrupted=interrupted,
+        kind="Simulation run" if run.simulated else "Robot driven",
         diagram_svg=block_diagram_svg(prepared.station.diagram) if pictures else None,
     )
     return write_report(results, pictures, page)

@@ -105,7 +105,12 @@ def test_the_law_knows_no_particular_manifold():
 
 def test_only_what_builds_a_station_knows_a_scenario():
     """Robots, tasks, surroundings and warnings are given their own parameters."""
-    builders = {"diagrams.builder", "diagrams.station_parts", "diagrams.station_warnings"}
+    builders = {
+        "diagrams.builder",
+        "diagrams.robot_station",
+        "diagrams.station_parts",
+        "diagrams.station_warnings",
+    }
     scenario = {"diagrams.scenario.Scenario", "diagrams.scenario.schema.Scenario"}
     knowing = {
         module

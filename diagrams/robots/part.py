@@ -44,14 +44,16 @@ class SensorMount:
         load: Everything behind the sensor.
         believed_load: The same as the controller believes it to be.
         reaction: Reaction ``[torque, force]`` on the tool, shape (6,), or abstract, all
-            reactions of a plant.
+            reactions of a plant; None where the sensor itself is elsewhere.
         index: Index of the sensor's joint in the plant's reactions, or None.
+        reading: What a sensor elsewhere measures, its axes, shape (6,) [N, Nm].
     """
 
     load: ToolLoad
     believed_load: ToolLoad
-    reaction: OutputPort
+    reaction: OutputPort | None
     index: int | None = None
+    reading: OutputPort | None = None
 
 
 class RobotPart(ABC):

@@ -114,7 +114,7 @@ def add_sensor(
         InputError: If the sensor does not suit the robot or the sampling time.
     """
     mount = part.sensor_mount(builder, parameters.joint, ports)
-    sensor = _add_transducer(builder, mount, parameters.transducer(), period)
+    reading = _reading(builder, mount, parameters, failure, period)
     block = ToolCompensation(
         part.belief.robot,
         mount.believed_load,
@@ -123,13 +123,51 @@ def add_sensor(
         period,
     )
     compensation = builder.AddNamedSystem("tool_compensation", BlockSystem(block, period))
-    reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), failure, period)
-    reading = _delay(builder, reading, parameters.delay, period)
     builder.Connect(reading, compensation.GetInputPort("measured_wrench"))
     builder.Connect(ports["joint_state"], compensation.GetInputPort("joint_state"))
     signals = {"wrench_measured": "wrench", "tared": "tared", "sensor_fault": "fault"}
     found = {name: compensation.GetOutputPort(port) for name, port in signals.items()}
     return found | {"wrench_sensor": reading}
+
+
+def add_force_sensor(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    parameters: SensorParameters,
+    failure: SensorFailureParameters,
+    period: float,
+    ports: dict[str, OutputPort],
+) -> OutputPort:
+    """Add a force/torque sensor alone, and return what it measures, shape (6,) [N, Nm].
+
+    Args:
+        builder: Builder of the diagram.
+        part: The robot.
+        parameters: The sensor.
+        failure: How it fails, if it does.
+        period: Sampling time [s].
+        ports: ``true_joint_state``, and ``wrench_ext`` if anything acts on the tool.
+
+    Raises:
+        InputError: If the sensor does not suit the robot or the sampling time.
+    """
+    mount = part.sensor_mount(builder, parameters.joint, ports)
+    return _reading(builder, mount, parameters, failure, period)
+
+
+def _reading(
+    builder: DiagramBuilder,
+    mount: SensorMount,
+    parameters: SensorParameters,
+    failure: SensorFailureParameters,
+    period: float,
+) -> OutputPort:
+    """Return what a sensor tells, when it is told."""
+    if mount.reading is not None:
+        return mount.reading
+    sensor = _add_transducer(builder, mount, parameters.transducer(), period)
+    reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), failure, period)
+    return _delay(builder, reading, parameters.delay, period)
 
 
 def _add_transducer(
@@ -142,6 +180,7 @@ def _add_transducer(
     block = ForceTorqueSensor(parameters, period)
     sensor = builder.AddNamedSystem("force_torque_sensor", BlockSystem(block, period))
     reaction = mount.reaction
+    assert reaction is not None
     if mount.index is not None:
         joint = builder.AddNamedSystem("joint_reaction", JointReaction(mount.index))
         builder.Connect(reaction, joint.get_input_port())

@@ -286,7 +286,7 @@ class ToolCompensation(Block):
 
 
 class Alarms(Block):
-    """Turns what force sensor and compliance tell into a fault.
+    """Turns what force sensor and compliance tell, and who asks for a stop, into a fault.
 
     Ports:
         alarms (input, optional): A
@@ -294,17 +294,26 @@ class Alarms(Block):
             sensor is tared, before which its range does not matter, an
             :class:`~pfsc_drake.control.compliance.impedance.ImpedanceStatus`, and whether the
             force with which the robot presses is lost, shape (4,).
+        stop_request (input, optional): Nonzero if somebody wants the robot to stop, shape (1,).
         fault (output): A :class:`~pfsc_drake.control.law.fault.Fault`, shape (1,).
     """
 
     def __init__(self) -> None:
-        self.inputs = {"alarms": Port(4, optional=True)}
+        self.inputs = {
+            "alarms": Port(4, optional=True),
+            "stop_request": Port(1, optional=True),
+        }
         self.outputs, self.states = {"fault": Port(1)}, {}
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
+        asked = (
+            Fault.NONE
+            if u.stop_request is None
+            else where(u.stop_request, Fault.STOP_REQUESTED, Fault.NONE)
+        )
         if u.alarms is None:
-            return {"fault": ca.DM(Fault.NONE)}
+            return {"fault": ca.DM(asked) if u.stop_request is None else asked}
         sensor, tared, compliance, press_lost = ca.vertsplit(u.alarms)
         fault = first_of(
             (sensor == SensorFault.LOST, Fault.FORCE_SENSOR_LOST),
@@ -314,6 +323,6 @@ class Alarms(Block):
             ),
             (compliance, Fault.COMPLIANCE_INVALID),
             (press_lost, Fault.PRESS_FORCE_LOST),
-            otherwise=Fault.NONE,
+            otherwise=asked,
         )
         return {"fault": fault}

@@ -29,6 +29,7 @@ class Fault(enum.IntEnum):
     JOINT_SPEED = 13
     DRIVE_CHATTERS = 14
     PRESS_FORCE_LOST = 15
+    STOP_REQUESTED = 16
 
     @property
     def explanation(self) -> str:
@@ -53,6 +54,7 @@ _EXPLANATIONS = {
     Fault.JOINT_SPEED: "a joint is faster than its limit",
     Fault.DRIVE_CHATTERS: "a drive jumps between its limits",
     Fault.PRESS_FORCE_LOST: "the force on the workpiece is far from its reference",
+    Fault.STOP_REQUESTED: "a stop was asked for",
 }
 
 

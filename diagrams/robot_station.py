@@ -1,0 +1,191 @@
+"""A robot with its friction, sensors and surroundings, and nobody who controls it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantVectorSource
+
+from diagrams.builder import find_rest, find_start
+from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.part import RobotPart
+from diagrams.robots.sensors import add_force_sensor, add_joint_state
+from diagrams.scenario import Scenario
+from diagrams.scenario.checks import require
+from diagrams.station_parts import (
+    add_robot,
+    following_options,
+    friction_options,
+    make_task,
+    make_workpiece,
+    outside,
+    servo_options,
+)
+from diagrams.surroundings.forces import add_surroundings
+from diagrams.tasks.following import Following, add_place
+from pfsc_drake.drivers.messages import ControlMode
+from pfsc_drake.following.law import make_law
+from pfsc_drake.robot.robot_model import gravity_function
+from pfsc_drake.systems.block_access import BlockAccess
+from pfsc_drake.systems.fuse import fuse_blocks
+
+
+@dataclass
+class RobotStation:
+    """A robot that waits for commands.
+
+    Attributes:
+        diagram: The diagram.
+        part: The robot in it.
+        command: What its drives are told: torques, or velocities of its servos.
+        mode: Which of both.
+        measured: System and port that the measured joint state comes from, by name.
+        wrench: The same of what the force sensor measures, None without one.
+        initial_state: State of the robot's model at the start.
+        place: Place on the manifold at the start, as the projector remembers it.
+        projector: Name of the projector.
+    """
+
+    diagram: Diagram
+    part: RobotPart
+    command: ConstantVectorSource
+    mode: ControlMode
+    measured: tuple[str, str]
+    wrench: tuple[str, str] | None
+    initial_state: np.ndarray
+    place: np.ndarray
+    projector: str
+
+    @cached_property
+    def blocks(self) -> BlockAccess:
+        """What the diagram's blocks remember and put out, fused or not."""
+        return BlockAccess(self.diagram)
+
+    def set_start(self, root: Context) -> None:
+        """Put the robot at the start of the scenario, where its drives hold its weight.
+
+        Args:
+            root: Context of the diagram.
+        """
+        self.part.place(self.part.plant.GetMyMutableContextFromRoot(root), self.initial_state)
+        self.blocks.set_state(root, f"{self.projector}.place", self.place)
+        n = self.part.robot.dimension
+        if self.mode is ControlMode.TORQUE:
+            q = (self.part.coordinates.link_rows @ self.initial_state)[:n]
+            weight = gravity_function(self.part.robot)(q).full().ravel()
+            self.tell(root, weight)
+            self.blocks.set_state(root, "hold.held", weight)
+
+    def tell(self, root: Context, values: np.ndarray) -> None:
+        """Tell the drives what to do.
+
+        Args:
+            root: Context of the diagram.
+            values: Torques [Nm or N] or velocities [rad/s or m/s], shape (N,).
+        """
+        context = self.command.GetMyMutableContextFromRoot(root)
+        self.command.get_mutable_source_value(context).SetFromVector(values)
+
+    def joint_state(self, root: Context) -> np.ndarray:
+        """Return ``[q_J, v_J, q_M, v_M]`` as measured, shape (4N,).
+
+        Args:
+            root: Context of the diagram.
+        """
+        return self._read(root, self.measured)
+
+    def sensed(self, root: Context) -> np.ndarray | None:
+        """Return what the force sensor measures, shape (6,) [N, Nm], None without one.
+
+        Args:
+            root: Context of the diagram.
+        """
+        return None if self.wrench is None else self._read(root, self.wrench)
+
+    def _read(self, root: Context, source: tuple[str, str]) -> np.ndarray:
+        """Return what a block puts out, or another system of the diagram."""
+        name, port = source
+        if not self.diagram.HasSubsystemNamed(name):
+            return self.blocks.output(root, f"{name}.{port}")
+        system = self.diagram.GetSubsystemByName(name)
+        value: np.ndarray = system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(root))
+        return value
+
+
+def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
+    """Build the robot of a scenario, and what is around it, without a controller.
+
+    Args:
+        scenario: The scenario.
+        folder: Where its relative file names start.
+
+    Raises:
+        InputError: If the scenario cannot be built, or needs a controller beside the robot.
+    """
+    for key in ("plate", "operator"):
+        given = getattr(scenario, key) is not None
+        require(not given, key, "given", "null where the controller is elsewhere")
+    builder, period = DiagramBuilder(), scenario.controller.sampling_time
+    task = make_task(scenario, folder)
+    workpiece = make_workpiece(scenario, task)
+    part = add_robot(builder, scenario, folder, workpiece)
+    n = part.robot.dimension
+    task.require_joints(n)
+    start, initial_state = find_start(scenario, task, part, workpiece, None)
+    law = make_law(
+        scenario.controller,
+        part.belief.robot,
+        task.manifold,
+        lambda: find_rest(task, part, start, initial_state),
+        scenario.faults,
+    )
+    link_state = part.coordinates.link_rows @ initial_state
+    options = following_options(scenario)
+    following = Following(options, part.robot, task, law, link_state[:n])
+    true_state = part.joint_state(builder)
+    joint_state = add_joint_state(
+        builder,
+        true_state,
+        part.robot,
+        scenario.encoders,
+        scenario.simulation.sensor_failure,
+        period,
+        scenario.encoder_period,
+    )
+    place = add_place(builder, following, true_state)
+    beside = place.projector.GetOutputPort("manifold_point")
+    around = place.signals | {"joint_state": true_state, "manifold_point": beside}
+    forces = add_surroundings(builder, part, task, outside(scenario), around, start)
+    wrench = None
+    if scenario.needs_sensor:
+        ports = {"joint_state": joint_state, "true_joint_state": true_state} | forces
+        failure = scenario.simulation.force_sensor_failure
+        wrench = _name(add_force_sensor(builder, part, scenario.sensor, failure, period, ports))
+    command = builder.AddNamedSystem("command", ConstantVectorSource(np.zeros(n)))
+    drive = {"drive": command.get_output_port(), "joint_state": joint_state}
+    signals, _ = add_drives(builder, part, servo_options(scenario), period, drive, initial_state)
+    faults = [signals["servo_fault"]] if "servo_fault" in signals else []
+    add_friction(builder, part, true_state, friction_options(scenario, folder), faults)
+    measured = _name(joint_state)
+    if scenario.simulation.fused:
+        fuse_blocks(builder)
+    diagram = builder.Build()
+    diagram.set_name("robot")
+    torques = scenario.controller.law != "velocity_servo"
+    return RobotStation(
+        diagram,
+        part,
+        command,
+        ControlMode.TORQUE if torques else ControlMode.VELOCITY,
+        measured,
+        wrench,
+        initial_state,
+        start.place,
+        place.projector.get_name(),
+    )
+
+
+def _name(port: OutputPort) -> tuple[str, str]:
+    return port.get_system().get_name(), port.get_name()

@@ -1,0 +1,1 @@
+"""Robots and controllers in two processes: a simulated robot, and what drives one."""

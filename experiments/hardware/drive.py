@@ -1,0 +1,373 @@
+"""A controller that drives a robot by messages: one tick for each status that comes."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from diagrams.robots.remote_arm import RemoteArm
+from diagrams.station import Station
+from experiments.results.run_log import RunLog
+from experiments.simulation import SimulationResult
+from pfsc_drake.checks import require_positive
+from pfsc_drake.drivers.driver_rules import torque_rates
+from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
+from pfsc_drake.errors import InputError
+from pfsc_drake.robot.robot_model import gravity_function
+
+_US = 1e6
+AT_REST = 0.01  # rad/s or m/s
+AT_START = 0.02  # rad or m
+# after which a robot that is to stop is left alone, and how long it rests before [s]
+_LONGEST_STOP, _RESTED = 2.0, 0.2
+_FAULT = "a fault"
+# beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
+_TWICE, _FASTEST, _LEAST_JUMP = 2.0, 10.0, 2e-3
+
+
+@dataclass(frozen=True)
+class DriveOptions:
+    """What a controller allows itself on a robot.
+
+    Attributes:
+        silence: How long no status may come [s].
+        bridged: How many ticks may be missing in a row and are made up for.
+        torque_rate: Largest rate of commanded torques, as drivers have it [Nm/s].
+        effort_share: Largest share of a joint's effort limit.
+    """
+
+    silence: float = 0.1
+    bridged: int = 10
+    torque_rate: float = 1000.0
+    effort_share: float = 0.95
+
+    def __post_init__(self) -> None:
+        require_positive("silence", self.silence)
+        require_positive("torque_rate", self.torque_rate)
+        require_positive("effort_share", self.effort_share)
+
+
+@dataclass
+class _Tick:
+    """What is noted of one tick beside the station's own log."""
+
+    age: float
+    missed: int
+    clipped: int
+    robot_mode: int
+    sent: np.ndarray
+
+
+@dataclass
+class DriveRecord:
+    """What happened on the link.
+
+    Attributes:
+        ticks: What is noted of each tick of the controller.
+    """
+
+    ticks: list[_Tick] = field(default_factory=list)
+
+    def add_to(self, log: RunLog) -> None:
+        """Add what was noted to the log of a run.
+
+        Args:
+            log: The log.
+        """
+        noted = self.ticks[: len(log.time)]
+        if len(noted) < len(log.time):
+            noted = noted + [noted[-1]] * (len(log.time) - len(noted))
+        modes = [mode.name.lower() for mode in RobotMode]
+        log.add("status_age", [1e6 * tick.age for tick in noted])
+        log.add("missed", [tick.missed for tick in noted])
+        log.add("clipped", [tick.clipped for tick in noted])
+        log.add("sent", [tick.sent for tick in noted])
+        log.add("robot_mode", [tick.robot_mode for tick in noted], labels=modes)
+
+
+class Drive:
+    """A station's controller, advanced by what a robot tells.
+
+    Args:
+        station: A station whose robot stands elsewhere.
+        end: The link.
+        options: What it allows itself.
+
+    Attributes:
+        period: Sampling time [s].
+        record: What happened.
+        fault: Why it ended, or None.
+    """
+
+    def __init__(self, station: Station, end: ControllerEnd, options: DriveOptions) -> None:
+        assert isinstance(station.part, RemoteArm)
+        self._station, self._part, self._end, self._options = station, station.part, end, options
+        robot = station.part.belief.robot
+        self._n, self.period = robot.dimension, station.controller.period
+        self._weight = gravity_function(robot)
+        effort = robot.gather("effort_limit")
+        self._limit = options.effort_share * effort
+        speed = robot.gather("velocity_limit")
+        self._fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
+        self._lost = np.zeros(self._n, dtype=bool)
+        self._rate = torque_rates(options.torque_rate, effort)
+        self._q = station.start_posture
+        torques = station.law.linearization.relative_degree > 1
+        self.mode = ControlMode.TORQUE if torques else ControlMode.VELOCITY
+        self._simulator = Simulator(station.diagram)
+        self._first: RobotStatus | None = None
+        self._last_state = np.zeros(4 * self._n)
+        self._sent: np.ndarray | None = None
+        self._tick = 0
+        self._stopping: str | None = None
+        self._stop_time = 0.0
+        self._resting = 0
+        self.record = DriveRecord()
+        self.fault: str | None = None
+
+    @property
+    def root(self) -> Context:
+        """Context of the diagram."""
+        return self._simulator.get_mutable_context()
+
+    @property
+    def time(self) -> float:
+        """Time since the first status, as the robot counts it [s]."""
+        return self._tick * self.period
+
+    def begin(self, status: RobotStatus) -> np.ndarray:
+        """Check a robot before anything moves, and return what it would be told first, shape (N,).
+
+        Args:
+            status: Its first status.
+
+        Raises:
+            InputError: If it is not the robot of the scenario, at rest at the scenario's start.
+        """
+        self._check(status)
+        self._first = status
+        self._station.set_start(self.root)
+        self._tell(self._state(status))
+        self._simulator.Initialize()
+        return self._wanted()
+
+    def answer(self, status: RobotStatus, received: float | None = None) -> None:
+        """Go on by the tick that a status tells of, and send what the robot is to do.
+
+        Args:
+            status: The status.
+            received: When it came, by ``time.perf_counter`` [s].
+        """
+        assert self._first is not None
+        received = time.perf_counter() if received is None else received
+        number = round((status.utime - self._first.utime) / (_US * self.period))
+        missed = number - self._tick
+        if missed < 0:
+            return  # an old one
+        state = self._believed(self._state(status), missed + 1)
+        self._bridge(state, missed, status)
+        if missed > self._options.bridged:
+            self.stop(f"no status of the robot for {1e3 * missed * self.period:.0f} ms")
+        self._tell(state)
+        q = state[: self._n]
+        self._q = np.where(np.isfinite(q), q, self._q)
+        # the answer first, and what is to be remembered and logged afterwards
+        before = self.root.get_time()
+        self.root.SetTime(self.time)
+        wanted = self._wanted()
+        values, clipped = self._within_limits(wanted)
+        faulty = self._station.controller.fault(self._station.blocks, self.root)
+        if faulty and self._stopping is None:
+            self._stopping, self._stop_time = _FAULT, self.time
+        self._end.send(RobotCommand(status.utime, self.mode, values))
+        age = time.perf_counter() - received
+        self._sent = values
+        self.root.SetTime(before)
+        self._advance(_Tick(age, missed, clipped, int(status.robot_mode), values))
+        self._last_state = state
+        self._look(status, state)
+
+    def stop(self, why: str) -> None:
+        """Let the controller bring the robot to rest, and end then.
+
+        Args:
+            why: What is said of it.
+        """
+        if self._stopping is None:
+            self._stopping, self._stop_time = why, self.time
+            context = self._part.stop_request.GetMyMutableContextFromRoot(self.root)
+            self._part.stop_request.get_mutable_source_value(context).SetAtIndex(0, 1.0)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing more is to be sent: the robot's driver damps then."""
+        if self.fault is not None:
+            return True
+        if self._stopping is None:
+            return False
+        long = self.time - self._stop_time > _LONGEST_STOP
+        return long or self._resting * self.period > _RESTED
+
+    def lose(self, why: str) -> None:
+        """End at once: there is no robot that would hear.
+
+        Args:
+            why: What is said of it.
+        """
+        self.fault = why
+
+    def result(self, wall: float) -> SimulationResult:
+        """Return what came of it.
+
+        Args:
+            wall: How long it took [s].
+        """
+        found = self._station.found_fault(self.root)
+        said, since = self.fault, None
+        if found is not None:
+            said, since = found.sentence, found.time
+        if self._stopping is not None and said is not None and self._stopping != _FAULT:
+            said = self._stopping
+        if self.fault is not None:
+            said = self.fault
+        return SimulationResult(self.root, self.time / max(wall, 1e-9), said, since)
+
+    def _check(self, status: RobotStatus) -> None:
+        q_0, n = self._station.start_posture, self._n
+        if status.robot_mode is not RobotMode.MOVE:
+            raise InputError(
+                f"the robot is in mode {status.robot_mode.name}; it must be in MOVE to be driven"
+            )
+        if status.control_mode not in (ControlMode.NONE, self.mode):
+            raise InputError(
+                f"the robot's driver is in {status.control_mode.name} mode; the law needs "
+                f"{self.mode.name}: start the driver so, or choose another controller.law"
+            )
+        if len(status.q) != n:
+            raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {n}")
+        for what, values in (("positions", status.q), ("velocities", status.v)):
+            if not np.isfinite(values).all():
+                raise InputError(f"the robot's {what} are not finite: {values.tolist()}")
+        fastest = int(np.abs(status.v).argmax())
+        if abs(status.v[fastest]) > AT_REST:
+            raise InputError(
+                f"the robot moves: joint {fastest + 1} at {status.v[fastest]:.3g} rad/s; it must "
+                f"rest within {AT_REST:g}"
+            )
+        off = self._state(status)[:n] - q_0
+        farthest = int(np.abs(off).argmax())
+        if abs(off[farthest]) > AT_START:
+            raise InputError(
+                f"joint {farthest + 1} is at {np.rad2deg(status.q[farthest]):.2f} deg, "
+                f"{np.rad2deg(off[farthest]):.2f} deg from the scenario's start; move the robot "
+                f"to within {np.rad2deg(AT_START):.1f} deg of "
+                f"{np.round(np.rad2deg(q_0), 2).tolist()} deg, with its own tools"
+            )
+
+    def _state(self, status: RobotStatus) -> np.ndarray:
+        """Return ``[q_J, v_J, q_M, v_M]`` of a status, shape (4N,)."""
+        return np.concatenate([status.q, status.v, status.q, status.v])
+
+    def _believed(self, state: np.ndarray, ticks: int) -> np.ndarray:
+        """Return a state without positions that have jumped farther than joints can move.
+
+        Where one encoder stands for both sides of a joint, nothing else tells whether its position
+        or its velocity is wrong.
+        """
+        n = self._n
+        with np.errstate(invalid="ignore"):
+            step = np.abs(state[:n] - self._last_state[:n])
+            jumped = (step > self._fastest * self.period * ticks + _LEAST_JUMP) & ~self._lost
+        if self._tick > 0 and jumped.any():
+            joint = int(np.flatnonzero(jumped)[0])
+            self._lost |= jumped
+            self.stop(
+                f"joint {joint + 1} jumped by {np.rad2deg(step[joint]):.3g} deg from one status to "
+                "the next, faster than it can move"
+            )
+        return np.where(np.tile(np.repeat([1, 0], n), 2) * np.tile(self._lost, 4), np.nan, state)
+
+    def _tell(self, state: np.ndarray) -> None:
+        self._part.tell(self._part.measured.GetMyMutableContextFromRoot(self.root), state)
+        if self._part.wrench is not None and self._end.wrench is not None:
+            context = self._part.wrench.GetMyMutableContextFromRoot(self.root)
+            self._part.wrench.get_mutable_source_value(context).SetFromVector(self._end.wrench)
+
+    def _wanted(self) -> np.ndarray:
+        """Return what the robot is to be told: torques without the weight, or velocities."""
+        drive = self._station.controller.drive(self._station.blocks, self.root)
+        if self.mode is ControlMode.VELOCITY:
+            return drive
+        return drive - self._weight(self._q).full().ravel()
+
+    def _within_limits(self, wanted: np.ndarray) -> tuple[np.ndarray, int]:
+        """Return what is sent, and in how many joints that is less."""
+        if self.mode is ControlMode.VELOCITY:
+            return wanted, 0
+        values = np.clip(wanted, -self._limit, self._limit)
+        if self._sent is not None:
+            most = self._rate * self.period
+            values = self._sent + np.clip(values - self._sent, -most, most)
+        return values, int(np.count_nonzero(np.abs(values - wanted) > 1e-9))
+
+    def _bridge(self, state: np.ndarray, missed: int, status: RobotStatus) -> None:
+        """Let the controller see, tick by tick, what the robot may have done in between."""
+        for k in range(1, missed + 1):
+            share = k / (missed + 1)
+            self._tell((1.0 - share) * self._last_state + share * state)
+            held = np.zeros(self._n) if self._sent is None else self._sent
+            self._advance(_Tick(np.nan, 1, 0, int(status.robot_mode), held))
+
+    def _advance(self, tick: _Tick) -> None:
+        self.record.ticks.append(tick)
+        # beyond the tick, so that it is logged with what was measured at it
+        self._simulator.AdvanceTo((self._tick + 0.5) * self.period)
+        self._tick += 1
+
+    def _look(self, status: RobotStatus, state: np.ndarray) -> None:
+        """End where the robot does not do any more what it is told."""
+        if status.robot_mode is not RobotMode.MOVE:
+            self.lose(f"the robot went into mode {status.robot_mode.name}")
+        moving = np.abs(state[self._n : 2 * self._n]).max() > AT_REST
+        self._resting = 0 if moving else self._resting + 1
+
+
+def run_drive(
+    drive: Drive,
+    end: ControllerEnd,
+    options: DriveOptions,
+    duration: float,
+    interrupted: Callable[[], bool],
+    progress: Callable[[float, str], None],
+) -> SimulationResult:
+    """Drive a robot until the end, a fault, or an interruption, after each of which it rests.
+
+    Args:
+        drive: The controller, whose first status has been checked.
+        end: The link.
+        options: What it allows itself.
+        duration: How long [s].
+        interrupted: Whether to stop.
+        progress: Told how far it is.
+    """
+    end.receive(0.0)  # what came while nobody listened
+    begin, last = time.perf_counter(), 0.0
+    status = end.receive(options.silence)
+    if status is not None:
+        drive.begin(status)
+    while drive.time < duration + 0.5 * drive.period and not drive.has_ended:
+        if interrupted():
+            drive.stop("interrupted")
+        if status is None:
+            drive.lose(f"no status of the robot for {1e3 * options.silence:.0f} ms")
+            break
+        drive.answer(status)
+        if drive.time - last > 0.2:
+            last = drive.time
+            progress(drive.time, "driving")
+        status = end.receive(options.silence)
+    return drive.result(time.perf_counter() - begin)

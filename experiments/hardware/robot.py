@@ -1,0 +1,166 @@
+"""A simulated robot behind the messages of a driver."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from diagrams.robot_station import RobotStation
+from diagrams.scenario import Scenario
+from experiments.simulation import configure
+from pfsc_drake.checks import require_between, require_not_negative
+from pfsc_drake.drivers.driver_rules import DriverOptions, DriverRules
+from pfsc_drake.drivers.link import RobotEnd
+from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotStatus
+from pfsc_drake.physics.velocity_servo import joint_inertia
+from pfsc_drake.robot.robot_model import gravity_function
+
+_US = 1e6
+
+
+@dataclass(frozen=True)
+class Transport:
+    """What happens to commands on their way.
+
+    Attributes:
+        lose: Share of packets that are lost, in both directions.
+        delay: Ticks by which a command comes later.
+        seed: Seed of which ones are lost.
+    """
+
+    lose: float = 0.0
+    delay: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_between("--lose", self.lose, 0.0, 1.0, "")
+        require_not_negative("--delay", self.delay)
+
+
+class SimulatedRobot:
+    """A robot that moves as it is commanded, tick by tick.
+
+    At each tick it tells its status first, then hears commands, as drivers do. Its interface adds
+    the weight that its own model tells to commanded torques.
+
+    Args:
+        station: The robot.
+        settings: Its scenario.
+        end: The link.
+        options: How the driver treats commands.
+        transport: What happens to messages.
+
+    Attributes:
+        tick: Number of the tick to come.
+        heard: How many commands have been heard.
+    """
+
+    def __init__(
+        self,
+        station: RobotStation,
+        settings: Scenario,
+        end: RobotEnd,
+        options: DriverOptions,
+        transport: Transport,
+    ) -> None:
+        self.station, self._end, self._transport = station, end, transport
+        self.period = settings.controller.sampling_time
+        self._n = station.part.robot.dimension
+        self._weight = gravity_function(station.part.robot)
+        self._simulator = Simulator(station.diagram)
+        parameters = settings.simulation
+        configure(self._simulator, parameters.integrator, parameters.max_step, parameters.accuracy)
+        station.set_start(self.root)
+        self._simulator.Initialize()
+        robot = station.part.robot
+        self._limit = robot.gather("effort_limit")
+        inertia = joint_inertia(robot, np.split(station.joint_state(self.root), 4)[0])
+        self.rules = DriverRules(inertia, self._limit, station.mode, options, self.period)
+        self._late: deque[RobotCommand | None] = deque([None] * transport.delay)
+        self._random = np.random.default_rng(transport.seed)
+        self._torque = np.zeros(self._n)
+        self.tick = self.heard = 0
+
+    @property
+    def root(self) -> Context:
+        """Context of the diagram."""
+        return self._simulator.get_mutable_context()
+
+    @property
+    def utime(self) -> int:
+        """The robot's clock [us]."""
+        return round(self.tick * self.period * _US)
+
+    def status(self) -> RobotStatus:
+        """Return what it tells of itself now: its motors' positions, and torques in its joints."""
+        state, robot = self.station.joint_state(self.root), self.station.part.robot
+        q_J, v_J, q_M, v_M = np.split(state, 4)
+        torque, elastic = self._torque.copy(), robot.elastic_joints
+        springs = robot.K_s[elastic] * (q_M - q_J)[elastic]
+        torque[elastic] = springs + robot.K_d[elastic] * (v_M - v_J)[elastic]
+        return RobotStatus(self.utime, q_M, v_M, torque, self.rules.robot_mode, self.station.mode)
+
+    def tell(self) -> None:
+        """Send the status, unless it is lost on the way."""
+        status, wrench = self.status(), self.station.sensed(self.root)
+        if not self._is_lost():
+            self._end.tell(status, wrench)
+
+    def advance(self) -> None:
+        """Hear what has come, and move by one tick."""
+        command = self._end.hear()
+        if command is not None:
+            self.heard += 1
+        self._late.append(None if command is None or self._is_lost() else command)
+        arrived = self._late.popleft()
+        state = self.station.joint_state(self.root)
+        q_J, _, _, v_M = np.split(state, 4)
+        acting = self.rules.advance(self.utime, arrived, v_M)
+        if self.station.mode is ControlMode.TORQUE:
+            acting = acting + self._weight(q_J).full().ravel()
+            acting = self._torque = np.clip(acting, -self._limit, self._limit)
+        self.station.tell(self.root, acting)
+        self.tick += 1
+        self._simulator.AdvanceTo(self.tick * self.period)
+
+    def _is_lost(self) -> bool:
+        return self._transport.lose > 0.0 and self._random.random() < self._transport.lose
+
+
+def run_robot(
+    robot: SimulatedRobot,
+    interrupted: Callable[[], bool],
+    tell: Callable[[float], None],
+    duration: float = np.inf,
+) -> float:
+    """Let a robot move in real time until it is interrupted.
+
+    Args:
+        robot: The robot.
+        interrupted: Whether to end.
+        tell: Told the robot's time, ten times a second [s].
+        duration: How long it lasts at most [s].
+
+    Returns:
+        Share of the ticks that began within one period of their time.
+    """
+    begin, late, every = time.monotonic(), 0, max(1, round(0.1 / robot.period))
+    while not interrupted() and robot.tick * robot.period < duration:
+        goal = begin + robot.tick * robot.period
+        wait = goal - time.monotonic()
+        if wait > 0.0:
+            time.sleep(wait)
+        elif wait < -robot.period:
+            late += 1
+            if wait < -0.1:  # time is not caught up after a long halt
+                begin -= wait
+        robot.tell()
+        # whoever is quick answers within the same tick
+        robot.advance()
+        if robot.tick % every == 0:
+            tell(robot.tick * robot.period)
+    return 1.0 - late / max(robot.tick, 1)

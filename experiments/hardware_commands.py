@@ -1,0 +1,170 @@
+"""Commands for robots behind messages: ``robot`` is one, simulated; ``drive`` drives one."""
+
+import logging
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from experiments.command_options import Duration, Overrides, ScenarioName, read_duration
+from experiments.outcomes import judge_run, print_run
+from experiments.scenario_file import expand_home, read_scenario
+from pfsc_drake.errors import InputError
+from reporting.progress import ProgressDisplay
+from reporting.terminal import FAULT, interruptible
+
+if TYPE_CHECKING:
+    from pydrake.lcm import DrakeLcm
+
+    from experiments.hardware.check import RestCheck
+    from experiments.hardware.driven_run import FirstCommand
+
+Lcm = Annotated[
+    str,
+    typer.Option(
+        "--lcm", metavar="URL", help="LCM bus. Default: LCM_DEFAULT_URL, or LCM's own default"
+    ),
+]
+Driver = Annotated[
+    str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
+]
+
+
+def robot_command(
+    scenario: ScenarioName,
+    lcm: Lcm = "",
+    driver: Driver = "panda",
+    expire: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Age from which commands count no more.")
+    ] = 0.1,
+    low_pass: Annotated[
+        float, typer.Option(metavar="HZ", help="Low pass of commanded torques; 0 for none.")
+    ] = 30.0,
+    lose: Annotated[
+        float, typer.Option(metavar="SHARE", help="Share of packets that are lost.")
+    ] = 0.0,
+    delay: Annotated[
+        int, typer.Option(metavar="TICKS", help="Ticks by which commands come later.")
+    ] = 0,
+    overrides: Overrides = None,
+    duration: Duration = None,
+    meshcat: Annotated[
+        bool, typer.Option("--meshcat/--no-meshcat", help="Draw the robot in Meshcat.")
+    ] = True,
+) -> None:
+    """Be the robot of a scenario: plant, friction, sensors and a driver's rules, in real time."""
+    from experiments.hardware.robot import Transport
+    from experiments.hardware.robot_run import run_robot_scenario
+    from pfsc_drake.drivers.driver_rules import DriverOptions
+    from pfsc_drake.drivers.link import RobotEnd
+    from pfsc_drake.drivers.messages import dialect
+
+    seconds = math.inf if duration is None else read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        options, transport = DriverOptions(expire, low_pass), Transport(lose, delay)
+        end = RobotEnd(_open(lcm), dialect(driver))
+        console = Console()
+        run_robot_scenario(
+            loaded,
+            end,
+            options,
+            transport,
+            duration=seconds,
+            drawn=meshcat,
+            tell=lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False),
+        )
+
+
+def drive_command(
+    scenario: ScenarioName,
+    lcm: Lcm = "",
+    driver: Driver = "panda",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results. Default: out/SCENARIO_driven")
+    ] = None,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Check the robot, tell the first command, send nothing."),
+    ] = False,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Compare torques at rest with the model's, send nothing."),
+    ] = False,
+    overrides: Overrides = None,
+    duration: Duration = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
+    ] = True,
+) -> None:
+    """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
+    from experiments.hardware.driven_run import check_scenario, drive_scenario
+    from pfsc_drake.drivers.link import ControllerEnd
+    from pfsc_drake.drivers.messages import dialect
+
+    seconds = None if duration is None else read_duration(duration)
+    with interruptible():
+        loaded = read_scenario(scenario, overrides or [])
+        folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_driven"
+        logging.getLogger("drake").setLevel(logging.CRITICAL)
+        end = ControllerEnd(_open(lcm), dialect(driver))
+        console = Console()
+        if check:
+            with ProgressDisplay(console, loaded.name, None) as progress:
+                found = check_scenario(loaded, end, progress)
+            _print_check(console, found)
+            raise typer.Exit(0 if found.is_good else FAULT)
+        with ProgressDisplay(console, loaded.name, seconds) as progress:
+            outcome = drive_scenario(
+                loaded,
+                end,
+                out=folder,
+                duration=seconds,
+                figures=figures,
+                recording=recording,
+                progress=progress,
+                dry_run=(lambda first: _print_first(console, first)) if dry_run else None,
+            )
+        if outcome is None:
+            raise typer.Exit(0)
+        print_run(console, outcome)
+        raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
+
+
+def _open(url: str) -> "DrakeLcm":
+    from pydrake.lcm import DrakeLcm
+
+    try:
+        return DrakeLcm(url)
+    except RuntimeError as error:
+        raise InputError(f"--lcm {url}: {' '.join(str(error).split())}") from None
+
+
+def _print_check(console: Console, found: "RestCheck") -> None:
+    """Print what a robot measures at rest beside what it should."""
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    for title in ("Joint", "Position [deg]", "Measured [Nm]", "Model [Nm]", "Difference [Nm]"):
+        table.add_column(title, justify="right")
+    rows = zip(np.rad2deg(found.q), found.measured, found.expected, strict=True)
+    for i, (q, measured, expected) in enumerate(rows):
+        difference = f"{measured - expected:.3f}"
+        table.add_row(str(i + 1), f"{q:.2f}", f"{measured:.3f}", f"{expected:.3f}", difference)
+    console.print(table)
+    console.print(found.verdict, soft_wrap=True, highlight=False, markup=False)
+
+
+def _print_first(console: Console, first: "FirstCommand") -> None:
+    """Print what the robot would be told first."""
+    unit = "Nm, on top of its weight" if first.kind == "TORQUE" else "rad/s"
+    table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
+    table.add_column("Joint", justify="right")
+    table.add_column(f"First {first.kind.lower()} [{unit}]", justify="right")
+    for i, value in enumerate(np.asarray(first.values)):
+        table.add_row(str(i + 1), f"{value:.4f}")
+    console.print("the robot is the scenario's, at rest and at its start; nothing was sent")
+    console.print(table)

@@ -1,0 +1,73 @@
+"""A robot and its controller as a user starts them: two processes on a bus of this machine."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+# a network of its own, whose only device is the loopback, so that nothing leaves this machine
+_ALONE = """
+ip link set lo up; ip route add 224.0.0.0/4 dev lo
+env --default-signal=INT {python} -m experiments robot {robot} --no-meshcat --duration 60 \
+    > {out}/robot.txt 2>&1 &
+for _ in $(seq 200); do grep -q joints {out}/robot.txt && break; sleep 0.2; done
+{python} -m experiments drive {drive} --no-figures > {out}/drive.txt 2>&1
+STATUS=$?; kill -INT $!; wait $!; exit $STATUS
+"""
+
+
+def is_allowed():
+    if shutil.which("unshare") is None or shutil.which("ip") is None:
+        return False
+    tried = ["unshare", "-n", "sh", "-c", "ip link set lo up && ip route add 224.0.0.0/4 dev lo"]
+    return subprocess.run(tried, capture_output=True).returncode == 0
+
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not is_allowed(), reason="no network namespaces here"),
+]
+
+
+def both(tmp_path, robot, drive):
+    """Return the exit status of what drives, and what both have said."""
+    words = _ALONE.format(python=sys.executable, robot=robot, drive=drive, out=tmp_path)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        ["unshare", "-n", "bash", "-c", words], cwd=ROOT, env=environment, timeout=170
+    )
+    return ended.returncode, *((tmp_path / f"{x}.txt").read_text() for x in ("robot", "drive"))
+
+
+def test_a_panda_is_driven(tmp_path):
+    out = tmp_path / "out"
+    scenario = f"pfc_panda_7r --set start.transition=0.5 --out {out}"
+    status, robot, drive = both(tmp_path, "pfc_panda_7r --low-pass 0", f"{scenario} --duration 3")
+    assert "7 joints at" in robot
+    assert status in (0, 3), drive
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["rms_path_deviation"]["value"] < 1e-3
+    assert (out / "recording.html").stat().st_size > 100_000
+    with h5py.File(out / "log.h5") as log:
+        assert log["sent"].shape[1] == 7
+        assert "panda" in log.attrs["driven"]
+
+
+def test_a_dry_run_sends_nothing(tmp_path):
+    status, robot, drive = both(tmp_path, "pfc_panda_7r", "pfc_panda_7r --dry-run")
+    assert status == 0, drive
+    assert "nothing was sent" in drive
+    assert ", 0 of them too old" in robot
+    assert " 0 commands" in robot
+
+
+def test_another_robot_is_refused(tmp_path):
+    status, _, drive = both(tmp_path, "pfc_compliant_6r", "pfc_panda_7r")
+    assert status == 2
+    assert "the robot has 6 joints; the scenario's has 7" in drive
