@@ -20,7 +20,12 @@ from diagrams.robots.drives import (
 )
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
-from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log
+from diagrams.robots.sensors import (
+    add_joint_state,
+    add_link_state,
+    add_sensor,
+    states_to_log,
+)
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.signal_log import add_log
@@ -51,6 +56,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 
@@ -132,6 +138,17 @@ def build_station(
         period,
         scenario.encoder_period,
     )
+    weight = gravity_function(believed)(start_posture).full().ravel()
+    joint_state, told = add_link_state(
+        builder,
+        part,
+        scenario.controller,
+        scenario.encoders,
+        joint_state,
+        true_state,
+        weight,
+        friction,
+    )
     place = add_place(builder, following, joint_state)
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
@@ -154,6 +171,8 @@ def build_station(
     controller, made = add_law(builder, following, place, forces | requests)
     signals = place.signals | forces | made
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
+    if told is not None:
+        builder.Connect(drive["drive"], told)
     if isinstance(part, RemoteArm):
         builder.Connect(
             part.stop_request.get_output_port(), controller.GetInputPort("stop_request")

@@ -36,8 +36,9 @@ def study_command(
         typer.Argument(
             help="stiffness: which law when, all laws on joints of rising stiffness; robustness: "
             "all laws on robots that are not their models; tracking: path following against "
-            "trajectory tracking; fixture_rules: printed rules of forbidden regions against the "
-            "program at an acute edge; identify_comau: from robots to their models and back; "
+            "trajectory tracking; joint_sides: elastic joints of which both sides, torques, or "
+            "motors alone are measured; fixture_rules: printed rules of forbidden regions against "
+            "the program at an acute edge; identify_comau: from robots to their models and back; "
             "teach_in: a path taught by hand, and followed."
         ),
     ] = "stiffness",
@@ -46,6 +47,7 @@ def study_command(
     """Many runs on one page, on all cores: one minute (stiffness) to ten."""
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
+    from experiments.studies.joint_sides import write_joint_sides
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
     from experiments.studies.tracking import write_tracking
@@ -55,6 +57,7 @@ def study_command(
         "stiffness": write_study,
         "robustness": write_robustness,
         "tracking": write_tracking,
+        "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,

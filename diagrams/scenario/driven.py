@@ -16,9 +16,9 @@ _OF_THE_PLANT = (
     "notch",
     "workpiece",
 )
-# laws that want no more of a joint than a driver tells
+# laws that want no more of a joint than a driver tells, and bear the tick that a link costs
 _LAWS = ("rigid", "velocity_servo")
-_TOLD = "the motors' side alone"
+_LATE = "laws for elastic joints do not bear the tick that a link costs"
 _TRANSITION = 0.5  # s
 
 
@@ -40,7 +40,7 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
     law = scenario.controller.law
-    require(law in _LAWS, "controller.law", law, f"{', '.join(_LAWS)}; drivers tell {_TOLD}")
+    require(law in _LAWS, "controller.law", law, f"{', '.join(_LAWS)}; {_LATE}")
     source = scenario.controller.external_torque.source
     allowed = "none, measured or observed; forces are known in simulation only"
     require(source != "known", "controller.external_torque.source", source, allowed)

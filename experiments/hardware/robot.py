@@ -118,10 +118,10 @@ class SimulatedRobot:
         self._late.append(None if command is None or self._is_lost() else command)
         arrived = self._late.popleft()
         state = self.station.joint_state(self.root)
-        q_J, _, _, v_M = np.split(state, 4)
+        _, _, q_M, v_M = np.split(state, 4)
         acting = self.rules.advance(self.utime, arrived, v_M)
         if self.station.mode is ControlMode.TORQUE:
-            acting = acting + self._weight(q_J).full().ravel()
+            acting = acting + self._weight(q_M).full().ravel()
             acting = self._torque = np.clip(acting, -self._limit, self._limit)
         self.station.tell(self.root, acting)
         self.tick += 1

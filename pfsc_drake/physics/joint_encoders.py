@@ -8,8 +8,11 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import where
-from pfsc_drake.errors import InputError
+from pfsc_drake.errors import InputError, require
+from pfsc_drake.physics.joint_torque_sensor import TorqueSensorOptions
 from pfsc_drake.robot.robot_model import RobotModel
+
+SIDES = ("both", "motor", "motor_and_torque")
 
 
 @dataclass
@@ -27,12 +30,20 @@ class EncoderOptions:
             positions, else the true ones.
         filter_time: Time constant of a first-order filter behind the difference quotient
             [s]; 0 for none.
+        sides: Which sides of elastic joints are measured: ``both``, ``motor``, or
+            ``motor_and_torque``, the motors' and the torques of the springs.
+        torque: The torque sensors, if there are any.
     """
 
     link_increments: list[float] = field(default_factory=list)
     motor_increments: list[float] = field(default_factory=list)
     difference_quotient: bool = False
     filter_time: float = 0.0
+    sides: str = "both"
+    torque: TorqueSensorOptions = field(default_factory=TorqueSensorOptions)
+
+    def __post_init__(self) -> None:
+        require(self.sides in SIDES, "sides", self.sides, ", ".join(SIDES))
 
 
 class JointEncoders(Block):

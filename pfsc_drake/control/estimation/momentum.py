@@ -158,6 +158,29 @@ def link_momentum(robot: RobotModel) -> MomentumModel:
     )
 
 
+@once_per_content()
+def motor_momentum(robot: RobotModel, friction: tuple[np.ndarray, np.ndarray]) -> MomentumModel:
+    """Return the momenta of the motors alone; z is the torque of the springs behind them.
+
+    ``p = D_M v_M``, ``p' = tau_d - f_c tanh(v_M / w) - f_v v_M - z``, which knows nothing of the
+    links: what it does not know of friction is taken for a torque of the springs. A torque
+    ``tau_k`` is taken off z.
+
+    Args:
+        robot: The robot, N joints; z of rigid ones means nothing.
+        friction: Coefficients f_c and f_v that are believed, each (N,).
+    """
+    n, (f_c, f_v) = robot.dimension, friction
+    state = ca.SX.sym("state", 4 * n)
+    v_M = ca.vertsplit(state, n)[3]
+    rubbing = ca.DM(f_c) * ca.tanh(v_M / _SMOOTH) + ca.DM(f_v) * v_M
+    forces = -ca.DM(robot.viscous_damping) * v_M - rubbing
+    return MomentumModel(state, robot.D_M * v_M, forces, np.ones(n), -np.ones(n), -1.0)
+
+
+_SMOOTH = 0.01  # rad/s or m/s, within which Coulomb friction changes its sign
+
+
 def _links(robot: RobotModel, state: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return the links' momentum ``D_E q'`` and ``beta``, each (N, 1)."""
     q, v = ca.vertsplit(state, robot.dimension)[:2]

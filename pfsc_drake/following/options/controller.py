@@ -212,6 +212,9 @@ class ExternalTorqueParameters:
         require(possible, "bandwidth", self.bandwidth, "a positive number with source observed")
 
 
+STATES = ("measured", "from_torque", "observed")
+
+
 @dc.dataclass
 class ControllerParameters:
     """The path following controller.
@@ -237,6 +240,9 @@ class ControllerParameters:
             robot parameters; empty for the plant's own. ``model_error`` comes on top.
         friction: What it does about friction.
         posture: What joints do that the task leaves free.
+        state: Where it has the links' side of elastic joints from: ``measured``; ``from_torque``,
+            by torque sensors in the joints; ``observed``, by the motors alone.
+        state_bandwidth: Bandwidth with which torques are differentiated, and observed [rad/s].
     """
 
     law: str = "elastic"
@@ -255,8 +261,12 @@ class ControllerParameters:
         default_factory=FrictionCompensationParameters
     )
     posture: PostureParameters = dc.field(default_factory=PostureParameters)
+    state: str = "measured"
+    state_bandwidth: float = 800.0
 
     def __post_init__(self) -> None:
+        require(self.state in STATES, "state", self.state, ", ".join(STATES))
+        require_positive("state_bandwidth", self.state_bandwidth)
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
         require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
         for law in self.gains:

@@ -268,7 +268,7 @@ def test_forces_are_measured_by_the_robot_and_told():
     assert np.linalg.norm(log["wrench_measured"].values[-1, :3]) > 45.0
 
 
-def test_a_law_of_both_sides_of_elastic_joints_needs_more_than_a_driver_tells():
+def test_laws_for_elastic_joints_are_not_driven():
     settings = shipped_scenario("pfc_elastic_6r")
-    with pytest.raises(InputError, match="the motors' side alone"):
+    with pytest.raises(InputError, match="do not bear the tick that a link costs"):
         driven(settings)
