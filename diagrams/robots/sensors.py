@@ -233,7 +233,7 @@ def add_sensor(
         part.belief.robot,
         mount.believed_load,
         parameters.measurement_range,
-        parameters.compensation(),
+        parameters,
         period,
     )
     compensation = builder.AddNamedSystem("tool_compensation", BlockSystem(block, period))
@@ -279,7 +279,7 @@ def _reading(
     """Return what a sensor tells, when it is told."""
     if mount.reading is not None:
         return mount.reading
-    sensor = _add_transducer(builder, mount, parameters.transducer(), period)
+    sensor = _add_transducer(builder, mount, parameters, period)
     reading = _fail(builder, sensor.GetOutputPort("measured_wrench"), failure, period)
     return _delay(builder, reading, parameters.delay, period)
 

@@ -31,7 +31,6 @@ class ForceTorqueParameters:
         noise: Standard deviation of the white noise of one sample, shape (6,).
         bandwidth: Bandwidth of the amplifier's first-order filter [Hz].
         seed: Seed of the noise.
-        source: Where the numbers are from.
     """
 
     measurement_range: np.ndarray = field(default_factory=lambda: np.repeat([500.0, 20.0], 3))
@@ -39,7 +38,6 @@ class ForceTorqueParameters:
     noise: np.ndarray = field(default_factory=lambda: np.repeat([0.1, 0.004], 3))
     bandwidth: float = 200.0
     seed: int = 0
-    source: str = "assumed"
 
     def __post_init__(self) -> None:
         _check("measurement_range", self.measurement_range, positive=True)
