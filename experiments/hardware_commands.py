@@ -95,6 +95,10 @@ def drive_command(
         bool,
         typer.Option("--check", help="Compare torques at rest with the model's, send nothing."),
     ] = False,
+    override: Annotated[
+        float,
+        typer.Option(metavar="SHARE", help="Of the reference's speed, 0.01 to 1.5: slower first."),
+    ] = 1.0,
     overrides: Overrides = None,
     duration: Duration = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
@@ -128,6 +132,7 @@ def drive_command(
                 figures=figures,
                 recording=recording,
                 progress=progress,
+                override=override,
                 dry_run=(lambda first: _print_first(console, first)) if dry_run else None,
             )
         if outcome is None:

@@ -19,6 +19,7 @@ from experiments.hardware.drive import Drive, DriveOptions, run_drive
 from experiments.preparation import PreparedRun, check_frames, check_length, naming
 from experiments.results.promises import check_targets
 from experiments.scenario_file import ScenarioFile
+from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import check_mode
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.errors import InputError
@@ -31,6 +32,7 @@ from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
 _PRIORITY = 50
+_LEAST_OVERRIDE, _LARGEST_OVERRIDE = 0.01, 1.5
 _MEASURED = "all signals, those of the tool and the path too, follow from what the robot measured"
 
 
@@ -48,7 +50,12 @@ class FirstCommand:
 
 
 def prepare_driven(
-    scenario: ScenarioFile, duration: float | None, *, recording: bool, progress: ProgressListener
+    scenario: ScenarioFile,
+    duration: float | None,
+    *,
+    recording: bool,
+    progress: ProgressListener,
+    override: float = 1.0,
 ) -> PreparedRun:
     """Build a scenario's controller for a robot that stands elsewhere.
 
@@ -57,14 +64,22 @@ def prepare_driven(
         duration: How long it drives [s], instead of the scenario's time.
         recording: Whether the motion will be recorded.
         progress: Told what goes on.
+        override: Share of its speed that the reference has: the same motion, slower.
 
     Raises:
         InputError: If the scenario is wrong, or is nothing for a robot elsewhere.
     """
+    require_between("--override", override, _LEAST_OVERRIDE, _LARGEST_OVERRIDE, "")
     given = load_typed(Scenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
     with naming(scenario.path):
         settings, said = driven(given)
+        if override != 1.0:
+            second = settings.reference.second
+            for motion in (settings.reference, *([] if second is None else [second])):
+                motion.velocity *= override
+                motion.acceleration *= override**2
+            said.append(f"the reference has {override:.0%} of its speed")
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
         check_targets(settings, station)
@@ -116,6 +131,7 @@ def drive_scenario(
     recording: bool,
     progress: ProgressListener,
     dry_run: Callable[[FirstCommand], None] | None = None,
+    override: float = 1.0,
 ) -> RunOutcome | None:
     """Drive a robot by a scenario, and write everything that a run leaves into a folder.
 
@@ -128,6 +144,7 @@ def drive_scenario(
         recording: Whether to record the motion.
         progress: Told how far it is.
         dry_run: Told the first command in place of the robot; nothing is sent or written then.
+        override: Share of its speed that the reference has.
 
     Returns:
         What the run left; None of a dry run.
@@ -139,7 +156,9 @@ def drive_scenario(
     inputs = scenario.inputs()
     if dry_run is None:
         check_folder(out, "run", inputs)
-    prepared = prepare_driven(scenario, duration, recording=recording, progress=progress)
+    prepared = prepare_driven(
+        scenario, duration, recording=recording, progress=progress, override=override
+    )
     station, options = prepared.station, DriveOptions()
     drive = Drive(station, end, options)
     check_mode(drive.mode, end.dialect.modes, end.dialect.name)

@@ -1,0 +1,83 @@
+"""What is prepared for a robot that stands elsewhere."""
+
+import numpy as np
+import pytest
+from pydrake.lcm import DrakeLcm
+
+from experiments.hardware.driven_run import drive_scenario, prepare_driven
+from experiments.scenario_file import read_scenario
+from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.messages import dialect
+from pfsc_drake.errors import InputError
+
+
+def nothing(_time, _phase):
+    """Say nothing of the progress."""
+
+
+def prepared(name="pfc_panda_7r", *overrides, **options):
+    scenario = read_scenario(name, list(overrides))
+    return prepare_driven(scenario, None, recording=False, progress=nothing, **options)
+
+
+def test_an_override_is_the_same_motion_slower():
+    full, slow = prepared().station.task.motion, prepared(override=0.5).station.task.motion
+    wait = 0.5
+    length = full.domain[1]
+    times = np.linspace(wait, length - 0.1, 40)
+    later = wait + (times - wait) / 0.5
+    laps = np.ptp(full.derivatives(times, 0)[:, 0], axis=0).max()
+    assert laps > 1.0
+    first = times < 3.0
+    np.testing.assert_allclose(
+        slow.derivatives(later[first], 1)[:, 0],
+        full.derivatives(times[first], 1)[:, 0],
+        atol=1e-6,
+    )
+    np.testing.assert_allclose(
+        slow.derivatives(later[first], 1)[:, 1],
+        0.5 * full.derivatives(times[first], 1)[:, 1],
+        atol=1e-6,
+    )
+
+
+def test_what_is_said_of_it():
+    run = prepared(override=0.1)
+    assert "the reference has 10% of its speed" in run.warnings
+    assert run.settings.start.transition == 0.5
+    assert run.settings.faults.effort_share == 0.35
+
+
+@pytest.mark.parametrize("override", [0.0, 1.6, np.nan])
+def test_overrides_out_of_range(override):
+    with pytest.raises(InputError, match="--override = "):
+        prepared(override=override)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("plate_mounting", "plate = given"),
+        ("pfc_delta", "robot.model = .* an arm, where it stands elsewhere"),
+        ("pfc_elastic_6r", "do not bear the tick"),
+    ],
+)
+def test_what_is_not_driven(name, said):
+    with pytest.raises(InputError, match=said):
+        prepared(name)
+
+
+def test_nobody_answers(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.hardware.driven_run._FIRST_STATUS", 0.1)
+    end = ControllerEnd(DrakeLcm("memq://"), dialect("panda"))
+    with pytest.raises(InputError, match="no status of a robot on PANDA_STATUS within"):
+        drive_scenario(
+            read_scenario("pfc_panda_7r", []),
+            end,
+            out=tmp_path / "out",
+            duration=None,
+            figures=False,
+            recording=False,
+            progress=nothing,
+        )
+    assert not (tmp_path / "out").exists()
