@@ -56,7 +56,6 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.joint_encoders import EncoderOptions
-from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 
@@ -138,7 +137,6 @@ def build_station(
         period,
         scenario.encoder_period,
     )
-    weight = gravity_function(believed)(start_posture).full().ravel()
     joint_state, told = add_link_state(
         builder,
         part,
@@ -146,7 +144,7 @@ def build_station(
         scenario.encoders,
         joint_state,
         true_state,
-        weight,
+        start_posture,
         friction,
     )
     place = add_place(builder, following, joint_state)

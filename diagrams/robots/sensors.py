@@ -21,7 +21,7 @@ from pfsc_drake.physics.force_torque_sensor import (
 )
 from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
 from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
-from pfsc_drake.robot.robot_model import RobotModel
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.reactions import JointReaction
@@ -93,7 +93,7 @@ def add_link_state(
     encoders: EncoderOptions,
     measured: OutputPort,
     true_state: OutputPort,
-    weight: np.ndarray,
+    start: np.ndarray,
     friction: Coefficients | None,
 ) -> tuple[OutputPort, InputPort | None]:
     """Add what finds the links' side of elastic joints where it is not measured.
@@ -105,7 +105,7 @@ def add_link_state(
         encoders: What is measured.
         measured: ``[q_J, v_J, q_M, v_M]`` as encoders measure it.
         true_state: The same as it is.
-        weight: Torques of the joints at the start, at rest, shape (N,).
+        start: Joint coordinates at the start, at rest, shape (N,).
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
 
     Returns:
@@ -125,7 +125,7 @@ def add_link_state(
     if source == "from_torque":
         torque = _add_torque_sensor(builder, part.robot, encoders, period, true_state)
     else:
-        torque, wants = _add_torque_observer(builder, robot, controller, measured, weight, friction)
+        torque, wants = _add_torque_observer(builder, robot, controller, measured, start, friction)
     found = LinkState(robot, controller.state_bandwidth, period)
     system = builder.AddNamedSystem("link_state", BlockSystem(found, period))
     builder.Connect(measured, system.GetInputPort("joint_state"))
@@ -138,7 +138,7 @@ def _add_torque_observer(
     robot: RobotModel,
     controller: ControllerParameters,
     measured: OutputPort,
-    weight: np.ndarray,
+    start: np.ndarray,
     friction: Coefficients | None,
 ) -> tuple[OutputPort, InputPort]:
     """Add what observes springs from their motors; at the start they bear the weight."""
@@ -151,6 +151,7 @@ def _add_torque_observer(
     observer = add(
         "spring_torque_observer", MomentumObserver(model, controller.state_bandwidth, period)
     )
+    weight = gravity_function(robot.numeric)(start).full().ravel()
     borne = add("weight_at_start", Constant(weight)).GetOutputPort("value")
     total = add("spring_torque", Sum(2, robot.dimension))
     builder.Connect(measured, observer.GetInputPort("joint_state"))

@@ -75,10 +75,11 @@ def prepare_driven(
     with naming(scenario.path):
         settings, said = driven(given)
         if override != 1.0:
-            second = settings.reference.second
-            for motion in (settings.reference, *([] if second is None else [second])):
-                motion.velocity *= override
-                motion.acceleration *= override**2
+            settings.reference.velocity *= override
+            settings.reference.acceleration *= override**2
+            if settings.reference.second is not None:
+                settings.reference.second.velocity *= override
+                settings.reference.second.acceleration *= override**2
             said.append(f"the reference has {override:.0%} of its speed")
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
