@@ -1,4 +1,4 @@
-"""What a robot's torques at rest say of its signs, zeros, payload and mounting."""
+"""What is checked of a robot before anything moves, and what its torques at rest say."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from experiments.hardware.drive import AT_REST
 from pfsc_drake.drivers.link import ControllerEnd
-from pfsc_drake.drivers.messages import RobotStatus
+from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import tool_jacobian
 
+AT_REST = 0.01  # rad/s or m/s
+AT_START = 0.02  # rad or m
 _LISTENED = 0.5  # s
 # of the largest weight in a joint: differences that friction and sensors leave
 _NOTHING = 0.02
@@ -73,6 +74,48 @@ class RestCheck:
         also = f"; as well may be: {', or '.join(others)}" if others else ""
         return (
             f"most likely {best.words}: it explains {1.0 - best.left:.1%} of the difference{also}"
+        )
+
+
+def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> None:
+    """Refuse a robot that is not that of a scenario, at rest at its start.
+
+    Args:
+        status: The robot's first status.
+        mode: What the law commands.
+        start: Joint coordinates at the start, shape (N,).
+
+    Raises:
+        InputError: One line that says what is, and what must be.
+    """
+    if status.robot_mode is not RobotMode.MOVE:
+        raise InputError(
+            f"the robot is in mode {status.robot_mode.name}; it must be in MOVE to be driven"
+        )
+    if status.control_mode not in (ControlMode.NONE, mode):
+        raise InputError(
+            f"the robot's driver is in {status.control_mode.name} mode; the law needs "
+            f"{mode.name}: start the driver so, or choose another controller.law"
+        )
+    if len(status.q) != len(start):
+        raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {len(start)}")
+    for what, values in (("positions", status.q), ("velocities", status.v)):
+        if not np.isfinite(values).all():
+            raise InputError(f"the robot's {what} are not finite: {values.tolist()}")
+    fastest = int(np.abs(status.v).argmax())
+    if abs(status.v[fastest]) > AT_REST:
+        raise InputError(
+            f"the robot moves: joint {fastest + 1} at {status.v[fastest]:.3g} rad/s; it must "
+            f"rest within {AT_REST:g}"
+        )
+    off = status.q - start
+    farthest = int(np.abs(off).argmax())
+    if abs(off[farthest]) > AT_START:
+        raise InputError(
+            f"joint {farthest + 1} is at {np.rad2deg(status.q[farthest]):.2f} deg, "
+            f"{np.rad2deg(off[farthest]):.2f} deg from the scenario's start; move the robot "
+            f"to within {np.rad2deg(AT_START):.1f} deg of "
+            f"{np.round(np.rad2deg(start), 2).tolist()} deg, with its own tools"
         )
 
 

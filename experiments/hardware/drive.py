@@ -10,18 +10,16 @@ from pydrake.systems.framework import Context
 
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
+from experiments.hardware.check import AT_REST, check_first
 from experiments.results.run_log import RunLog
 from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_positive
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
-from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
-AT_REST = 0.01  # rad/s or m/s
-AT_START = 0.02  # rad or m
 # after which a robot that is to stop is left alone, and how long it rests before [s]
 _LONGEST_STOP, _RESTED = 2.0, 0.2
 _FAULT = "a fault"
@@ -148,7 +146,7 @@ class Drive:
         Raises:
             InputError: If it is not the robot of the scenario, at rest at the scenario's start.
         """
-        self._check(status)
+        check_first(status, self.mode, self._station.start_posture)
         self._first = status
         self._station.set_start(self.root)
         self._tell(self._state(status))
@@ -235,38 +233,6 @@ class Drive:
         if self.fault is not None:
             said = self.fault
         return SimulationResult(self.root, self.time / max(wall, 1e-9), said, since)
-
-    def _check(self, status: RobotStatus) -> None:
-        q_0, n = self._station.start_posture, self._n
-        if status.robot_mode is not RobotMode.MOVE:
-            raise InputError(
-                f"the robot is in mode {status.robot_mode.name}; it must be in MOVE to be driven"
-            )
-        if status.control_mode not in (ControlMode.NONE, self.mode):
-            raise InputError(
-                f"the robot's driver is in {status.control_mode.name} mode; the law needs "
-                f"{self.mode.name}: start the driver so, or choose another controller.law"
-            )
-        if len(status.q) != n:
-            raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {n}")
-        for what, values in (("positions", status.q), ("velocities", status.v)):
-            if not np.isfinite(values).all():
-                raise InputError(f"the robot's {what} are not finite: {values.tolist()}")
-        fastest = int(np.abs(status.v).argmax())
-        if abs(status.v[fastest]) > AT_REST:
-            raise InputError(
-                f"the robot moves: joint {fastest + 1} at {status.v[fastest]:.3g} rad/s; it must "
-                f"rest within {AT_REST:g}"
-            )
-        off = self._state(status)[:n] - q_0
-        farthest = int(np.abs(off).argmax())
-        if abs(off[farthest]) > AT_START:
-            raise InputError(
-                f"joint {farthest + 1} is at {np.rad2deg(status.q[farthest]):.2f} deg, "
-                f"{np.rad2deg(off[farthest]):.2f} deg from the scenario's start; move the robot "
-                f"to within {np.rad2deg(AT_START):.1f} deg of "
-                f"{np.round(np.rad2deg(q_0), 2).tolist()} deg, with its own tools"
-            )
 
     def _state(self, status: RobotStatus) -> np.ndarray:
         """Return ``[q_J, v_J, q_M, v_M]`` of a status, shape (4N,)."""

@@ -1,0 +1,125 @@
+"""Where a controller has the links' side of elastic joints from."""
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
+
+from diagrams.robots.part import RobotPart
+from diagrams.scenario.checks import require
+from pfsc_drake.blocks.block import Block
+from pfsc_drake.blocks.wiring_blocks import Constant, Sum
+from pfsc_drake.control.estimation.link_state import LinkState
+from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
+from pfsc_drake.following.law import Coefficients
+from pfsc_drake.following.options.controller import ControllerParameters
+from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
+from pfsc_drake.robot.robot_model import RobotModel, gravity_function
+from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.physics.sensor_noise import SensorNoise
+
+# laws that act on the motors of elastic joints alone
+_OF_MOTORS = ("rigid", "velocity_servo")
+# which sides must be measured where the controller has its state from
+_NEEDED = {
+    "measured": ("both",),
+    "from_torque": ("motor_and_torque",),
+    "observed": ("motor", "motor_and_torque"),
+}
+
+
+def add_link_state(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    controller: ControllerParameters,
+    encoders: EncoderOptions,
+    measured: OutputPort,
+    true_state: OutputPort,
+    start: np.ndarray,
+    friction: Coefficients | None,
+) -> tuple[OutputPort, InputPort | None]:
+    """Add what finds the links' side of elastic joints where it is not measured.
+
+    Args:
+        builder: Builder of the diagram.
+        part: The robot.
+        controller: Says where it has that from.
+        encoders: What is measured.
+        measured: ``[q_J, v_J, q_M, v_M]`` as encoders measure it.
+        true_state: The same as it is.
+        start: Joint coordinates at the start, at rest, shape (N,).
+        friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
+
+    Returns:
+        ``[q_J, v_J, q_M, v_M]`` as the controller takes it, and a port that wants to know what the
+        drives are told, if there is one.
+
+    Raises:
+        InputError: If what the controller wants is not measured.
+    """
+    robot, source, sides = part.belief.robot, controller.state, encoders.sides
+    if robot.is_rigid or (source == "measured" and controller.law in _OF_MOTORS):
+        return measured, None
+    require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
+    if source == "measured":
+        return measured, None
+    period, wants = controller.sampling_time, None
+    if source == "from_torque":
+        torque = _add_torque_sensor(builder, part.robot, encoders, period, true_state)
+    else:
+        torque, wants = _add_torque_observer(builder, robot, controller, measured, start, friction)
+    found = LinkState(robot, controller.state_bandwidth, period)
+    system = builder.AddNamedSystem("link_state", BlockSystem(found, period))
+    builder.Connect(measured, system.GetInputPort("joint_state"))
+    builder.Connect(torque, system.GetInputPort("joint_torque"))
+    return system.GetOutputPort("joint_state"), wants
+
+
+def _add_torque_observer(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    controller: ControllerParameters,
+    measured: OutputPort,
+    start: np.ndarray,
+    friction: Coefficients | None,
+) -> tuple[OutputPort, InputPort]:
+    """Add what observes springs from their motors; at the start they bear the weight."""
+    period, known = controller.sampling_time, friction or (np.zeros(robot.dimension),) * 2
+
+    def add(name: str, block: Block) -> BlockSystem:
+        return builder.AddNamedSystem(name, BlockSystem(block, period))
+
+    model = motor_momentum(robot, known)
+    observer = add(
+        "spring_torque_observer", MomentumObserver(model, controller.state_bandwidth, period)
+    )
+    weight = gravity_function(robot.numeric)(start).full().ravel()
+    borne = add("weight_at_start", Constant(weight)).GetOutputPort("value")
+    total = add("spring_torque", Sum(2, robot.dimension))
+    builder.Connect(measured, observer.GetInputPort("joint_state"))
+    builder.Connect(borne, observer.GetInputPort("known_torque"))
+    builder.Connect(borne, total.GetInputPort("term_0"))
+    builder.Connect(observer.GetOutputPort("estimate"), total.GetInputPort("term_1"))
+    return total.GetOutputPort("sum"), observer.GetInputPort("drive_torque")
+
+
+def _wanted(source: str) -> str:
+    return f"{' or '.join(_NEEDED[source])} where controller.state is {source}"
+
+
+def _add_torque_sensor(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    encoders: EncoderOptions,
+    period: float,
+    true_state: OutputPort,
+) -> OutputPort:
+    block = JointTorqueSensor(robot, encoders.torque)
+    sensor = builder.AddNamedSystem("joint_torque_sensor", BlockSystem(block, period))
+    builder.Connect(true_state, sensor.GetInputPort("joint_state"))
+    if encoders.torque.noise > 0.0:
+        effort = robot.gather("effort_limit")
+        deviation = encoders.torque.noise * np.where(robot.elastic_joints, effort, 0.0)
+        noise = SensorNoise(deviation, encoders.torque.seed, period)
+        builder.AddNamedSystem("joint_torque_noise", noise)
+        builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
+    return sensor.GetOutputPort("joint_torque")
