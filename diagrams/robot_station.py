@@ -10,6 +10,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.builder import find_rest, find_start
 from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.robots.sensors import add_force_sensor, add_joint_state
 from diagrams.scenario import Scenario
@@ -127,6 +128,8 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     for key in ("plate", "operator"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the controller is elsewhere")
+    model = scenario.robot.model
+    require(not is_delta(model), "robot.model", model, "an arm, where the controller is elsewhere")
     builder, period = DiagramBuilder(), scenario.controller.sampling_time
     task = make_task(scenario, folder)
     workpiece = make_workpiece(scenario, task)

@@ -32,6 +32,7 @@ Lcm = Annotated[
 Driver = Annotated[
     str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
 ]
+_BUSES = ("udpm", "tcpq", "memq")
 
 
 def robot_command(
@@ -144,10 +145,11 @@ def drive_command(
 def _open(url: str) -> "DrakeLcm":
     from pydrake.lcm import DrakeLcm
 
-    try:
-        return DrakeLcm(url)
-    except RuntimeError as error:
-        raise InputError(f"--lcm {url}: {' '.join(str(error).split())}") from None
+    # LCM itself would go on without a bus
+    if url and url.partition("://")[0] not in _BUSES:
+        allowed = ", ".join(f"{bus}://..." for bus in _BUSES)
+        raise InputError(f"--lcm {url}: no such bus; allowed: {allowed}")
+    return DrakeLcm(url)
 
 
 def _print_check(console: Console, found: "RestCheck") -> None:
