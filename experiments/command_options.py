@@ -26,6 +26,10 @@ Duration = Annotated[
     typer.Option(metavar="SECONDS", help="Simulated time in s, instead of the scenario's."),
 ]
 
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")]
+
+Recording = Annotated[bool, typer.Option("--recording/--no-recording", help="Record the motion.")]
+
 
 def read_duration(text: str) -> float:
     """Return the value of ``--duration`` [s].

@@ -10,7 +10,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from experiments.command_options import Duration, Overrides, ScenarioName, read_duration
+from experiments.command_options import (
+    Duration,
+    Figures,
+    Overrides,
+    Recording,
+    ScenarioName,
+    read_duration,
+)
 from experiments.outcomes import judge_run, print_run
 from experiments.scenario_file import expand_home, read_scenario
 from pfsc_drake.errors import InputError
@@ -102,10 +109,8 @@ def drive_command(
     ] = 1.0,
     overrides: Overrides = None,
     duration: Duration = None,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
-    recording: Annotated[
-        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
-    ] = True,
+    figures: Figures = True,
+    recording: Recording = True,
 ) -> None:
     """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
     from experiments.hardware.driven_run import check_scenario, drive_scenario

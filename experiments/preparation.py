@@ -75,14 +75,7 @@ def prepare(
         nobody = settings.operator is not None and not settings.operator.inputs and not live
         require(not nobody, "operator.inputs", "''", "a file that a live session has recorded")
         station = _build(settings, folder, progress)
-        check_targets(settings, station)
-        settings.name = settings.name or scenario.name
-        length = settings.duration or station.reference_duration
-        settings.duration = duration or length
-        settings.judged_after = settings.judged_after or length
-        check_length(settings, station)
-        if recording:
-            check_frames(settings.duration, settings.simulation.frame_period)
+        settle(settings, scenario.name, station, duration, recording=recording)
         progress(0.0, "choosing the integration")
         station, integration = _integrated(settings, folder, station)
         drawing = draw_station(settings, folder, station) if recording else None
@@ -90,6 +83,31 @@ def prepare(
     resolve_files(settings, folder)
     text = dump_typed(settings)
     return PreparedRun(settings, text, station, integration, drawing, warnings)
+
+
+def settle(
+    settings: Scenario, name: str, station: Station, duration: float | None, *, recording: bool
+) -> None:
+    """Give a scenario its name and its times, and check what depends on them.
+
+    Args:
+        settings: The scenario, which is changed.
+        name: Its name where it tells none.
+        station: Its station.
+        duration: How long it takes [s], instead of the scenario's time.
+        recording: Whether the motion will be recorded.
+
+    Raises:
+        InputError: If targets are wrong, or the run is too long.
+    """
+    check_targets(settings, station)
+    settings.name = settings.name or name
+    length = settings.duration or station.reference_duration
+    settings.duration = duration or length
+    settings.judged_after = settings.judged_after or length
+    check_length(settings, station)
+    if recording:
+        check_frames(settings.duration, settings.simulation.frame_period)
 
 
 def _build(settings: Scenario, folder: Path, progress: ProgressListener) -> Station:

@@ -5,7 +5,7 @@ import json
 import logging
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -16,7 +16,9 @@ from experiments.command_options import (
     IDENTIFICATION,
     TEACH_IN,
     Duration,
+    Figures,
     Overrides,
+    Recording,
     ScenarioName,
     read_duration,
 )
@@ -36,11 +38,7 @@ from reporting.progress import ProgressDisplay
 from reporting.registry import as_data, as_text
 from reporting.terminal import interruptible, show_page
 
-if TYPE_CHECKING:
-    pass
-
 _LONGEST_AFTER_FAULT = 100.0  # s
-_WIDEST_TABLE = 160  # columns, of postures
 
 
 def list_command(
@@ -77,10 +75,8 @@ def run_command(
     ] = None,
     overrides: Overrides = None,
     duration: Duration = None,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
-    recording: Annotated[
-        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
-    ] = True,
+    figures: Figures = True,
+    recording: Recording = True,
     after_fault: Annotated[
         str,
         typer.Option(
@@ -138,10 +134,8 @@ def live_command(
             metavar="SECONDS", help="Simulated time in s after which it ends. Default: 600"
         ),
     ] = None,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
-    recording: Annotated[
-        bool, typer.Option("--recording/--no-recording", help="Record the motion.")
-    ] = True,
+    figures: Figures = True,
+    recording: Recording = True,
 ) -> None:
     """Guide the robot of a scenario yourself, in real time, on a page in your browser."""
     from experiments.live.start import run_live

@@ -22,7 +22,6 @@ _NOTHING = 0.02
 _EXPLAINED = 0.9
 _ITERATIONS = 5
 _LARGEST_ZERO = 45.0  # deg
-_G = 9.81  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -97,8 +96,7 @@ def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> No
             f"the robot's driver is in {status.control_mode.name} mode; the law needs "
             f"{mode.name}: start the driver so, or choose another controller.law"
         )
-    if len(status.q) != len(start):
-        raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {len(start)}")
+    _check_joints(status, len(start))
     for what, values in (("positions", status.q), ("velocities", status.v)):
         if not np.isfinite(values).all():
             raise InputError(f"the robot's {what} are not finite: {values.tolist()}")
@@ -117,6 +115,11 @@ def check_first(status: RobotStatus, mode: ControlMode, start: np.ndarray) -> No
             f"to within {np.rad2deg(AT_START):.1f} deg of "
             f"{np.round(np.rad2deg(start), 2).tolist()} deg, with its own tools"
         )
+
+
+def _check_joints(status: RobotStatus, count: int) -> None:
+    if len(status.q) != count:
+        raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {count}")
 
 
 def listen(end: ControllerEnd, period: float) -> RobotStatus:
@@ -157,9 +160,7 @@ def check_at_rest(robot: SerialChain, status: RobotStatus) -> RestCheck:
     Raises:
         InputError: If it has another number of joints.
     """
-    n = robot.dimension
-    if len(status.q) != n:
-        raise InputError(f"the robot has {len(status.q)} joints; the scenario's has {n}")
+    _check_joints(status, robot.dimension)
     expected = gravity_function(robot)(status.q).full().ravel()
     missing = status.torque - expected
     largest = max(float(np.abs(expected).max()), 1e-9)
@@ -202,8 +203,7 @@ def _causes(
         if abs(off) < _LARGEST_ZERO:
             yield Cause(f"the zero of joint {i + 1} is off by {off:.2f} deg", float(left), 1)
     J = ca.Function("J", [q], [tool_jacobian(robot, q)])(status.q).full()[:3]
-    direction = robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-9)
-    column = -_G * J.T @ direction
+    column = -J.T @ robot.gravity
     if np.any(column):
         mass = float(column @ missing / (column @ column))
         left = np.linalg.norm(missing - mass * column) / size

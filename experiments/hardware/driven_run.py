@@ -16,8 +16,7 @@ from diagrams.scenario.driven import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import RestCheck, check_at_rest, listen
 from experiments.hardware.drive import Drive, DriveOptions, run_drive
-from experiments.preparation import PreparedRun, check_frames, check_length, naming
-from experiments.results.promises import check_targets
+from experiments.preparation import PreparedRun, naming, settle
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import check_mode
@@ -83,14 +82,7 @@ def prepare_driven(
             said.append(f"the reference has {override:.0%} of its speed")
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
-        check_targets(settings, station)
-        settings.name = settings.name or scenario.name
-        length = settings.duration or station.reference_duration
-        settings.duration = duration or length
-        settings.judged_after = settings.judged_after or length
-        check_length(settings, station)
-        if recording:
-            check_frames(settings.duration, settings.simulation.frame_period)
+        settle(settings, scenario.name, station, duration, recording=recording)
         drawing = draw_station(settings, folder, station) if recording else None
     warnings = station.warnings + (drawing.warnings if drawing else [])
     resolve_files(settings, folder)

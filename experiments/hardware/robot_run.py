@@ -9,7 +9,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from diagrams.drawing.robot_geometry import draw_robot
 from diagrams.robot_station import RobotStation, build_robot_station
 from diagrams.robots.arm import Arm
-from diagrams.scenario import Scenario
+from diagrams.scenario import RobotParameters, Scenario
 from diagrams.scenario.simulation import AUTO
 from experiments.hardware.driven_run import real_time_priority
 from experiments.hardware.robot import SimulatedRobot, Transport, run_robot
@@ -23,29 +23,6 @@ from reporting.processes import noticed_interruption
 
 # for a plant that is to keep up with the clock
 _SCHEME = "runge_kutta3"
-
-
-def make_robot(
-    scenario: ScenarioFile, end: RobotEnd, options: DriverOptions, transport: Transport
-) -> SimulatedRobot:
-    """Build a scenario's robot behind a driver's messages.
-
-    Args:
-        scenario: The scenario as read.
-        end: The link to its controller.
-        options: How the driver treats commands.
-        transport: What happens to messages.
-
-    Raises:
-        InputError: If the scenario is wrong, or needs a controller beside the robot.
-    """
-    settings = load_typed(Scenario, scenario.data, str(scenario.path))
-    with naming(scenario.path):
-        if settings.simulation.integrator == AUTO:
-            settings.simulation.integrator = _SCHEME
-        station = build_robot_station(settings, scenario.path.parent)
-    check_mode(station.mode, end.dialect.modes, end.dialect.name)
-    return SimulatedRobot(station, settings, end, options, transport)
 
 
 def run_robot_scenario(
@@ -72,10 +49,17 @@ def run_robot_scenario(
     Raises:
         InputError: If the scenario is wrong.
     """
-    robot = make_robot(scenario, end, options, transport)
-    view = _View(robot.station, scenario, tell) if drawn else None
+    settings = load_typed(Scenario, scenario.data, str(scenario.path))
+    folder = scenario.path.parent
+    with naming(scenario.path):
+        if settings.simulation.integrator == AUTO:
+            settings.simulation.integrator = _SCHEME
+        station = build_robot_station(settings, folder)
+    check_mode(station.mode, end.dialect.modes, end.dialect.name)
+    robot = SimulatedRobot(station, settings, end, options, transport)
+    view = _View(station, settings.robot, folder, tell) if drawn else None
     q = np.rad2deg(robot.status().q)
-    tell(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {robot.station.mode.name} mode")
+    tell(f"{len(q)} joints at {np.round(q, 2).tolist()} deg, {station.mode.name} mode")
     ended = None
 
     def watch(time: float) -> None:
@@ -100,13 +84,15 @@ class _View:
     """Draws the robot in Meshcat while it moves."""
 
     def __init__(
-        self, station: RobotStation, scenario: ScenarioFile, tell: Callable[[str], None]
+        self,
+        station: RobotStation,
+        parameters: RobotParameters,
+        folder: Path,
+        tell: Callable[[str], None],
     ) -> None:
         assert isinstance(station.part, Arm)
-        settings = load_typed(Scenario, scenario.data, str(scenario.path))
-        folder: Path = scenario.path.parent
         meshcat = Meshcat(MeshcatParams(host="localhost"))
-        drawing = draw_robot(station.part.model, station.part.tool, settings.robot, folder)
+        drawing = draw_robot(station.part.model, station.part.tool, parameters, folder)
         self._robot = RobotVisualizer(drawing.plant, drawing.parts, meshcat, 1.0)
         self._context = self._robot.CreateDefaultContext()
         tell(f"open {meshcat.web_url()}")

@@ -94,17 +94,19 @@ class DriverRules:
         """
         if command is not None and self.ended is None:
             self._take(utime, command)
-        last = self._last
-        fresh = last is not None and utime - last.utime <= 1e6 * self.options.expiry
-        if self.mode is not ControlMode.TORQUE:
-            wanted = last.values if fresh and last is not None and self.ended is None else 0.0 * v
+        torques, last = self.mode is ControlMode.TORQUE, self._last
+        wanted = -self._damping * v if torques else 0.0 * v
+        if self.ended is None and last is not None and self._is_fresh(utime, last):
+            wanted = last.values
+        if not torques:
             self.acting = np.array(wanted)
             return self.acting
-        damped = -self._damping * v
-        wanted = last.values if fresh and last is not None and self.ended is None else damped
         passed = self.acting + self._pass * (wanted - self.acting)
         self.acting = self.acting + np.clip(passed - self.acting, -self._step, self._step)
         return self.acting
+
+    def _is_fresh(self, utime: int, command: RobotCommand) -> bool:
+        return abs(utime - command.utime) <= 1e6 * self.options.expiry
 
     def _take(self, utime: int, command: RobotCommand) -> None:
         if command.mode != self.mode:
@@ -114,7 +116,7 @@ class DriverRules:
             self.ended = f"a command for {count} joints, the robot has {len(self.acting)}"
         elif not np.isfinite(command.values).all():
             self.ended = "a command that is not a finite number"
-        elif abs(utime - command.utime) > 1e6 * self.options.expiry:
+        elif not self._is_fresh(utime, command):
             self.rejected += 1
         else:
             self._last = command

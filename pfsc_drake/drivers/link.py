@@ -1,6 +1,7 @@
 """Both ends of the link between a robot and its controller."""
 
 import time
+from contextlib import suppress
 
 import numpy as np
 from pydrake.lcm import DrakeLcmInterface
@@ -16,6 +17,8 @@ from pfsc_drake.drivers.messages import (
 
 # a queue hands over some of what has come; more rounds are made while there is more
 _MOST_ROUNDS = 100
+# what decoding something else raises; it is as good as lost
+_UNREADABLE = (ValueError, AttributeError, IndexError)
 
 
 class _End:
@@ -23,7 +26,6 @@ class _End:
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
         self.lcm, self.dialect = lcm, dialect
-        self.broken = 0
         self._data: bytes | None = None
 
     def _listen(self, channel: str) -> None:
@@ -46,7 +48,6 @@ class ControllerEnd(_End):
         dialect: The robot's messages.
 
     Attributes:
-        broken: How many messages could not be read.
         wrench: What the force sensor told last, shape (6,) [N, Nm], or None.
     """
 
@@ -67,10 +68,8 @@ class ControllerEnd(_End):
             self._drain()
             if self._data is not None:
                 data, self._data = self._data, None
-                try:
+                with suppress(*_UNREADABLE):
                     return self.dialect.decode_status(data)
-                except (ValueError, AttributeError, IndexError):
-                    self.broken += 1
             left = end - time.monotonic()
             if left <= 0.0:
                 return None
@@ -85,10 +84,8 @@ class ControllerEnd(_End):
         self.lcm.Publish(self.dialect.command_channel, self.dialect.encode_command(command))
 
     def _keep_wrench(self, data: bytes) -> None:
-        try:
+        with suppress(ValueError):
             self.wrench = decode_wrench(data)
-        except ValueError:
-            self.broken += 1
 
 
 class RobotEnd(_End):
@@ -97,9 +94,6 @@ class RobotEnd(_End):
     Args:
         lcm: The bus.
         dialect: The robot's messages.
-
-    Attributes:
-        broken: How many messages could not be read.
     """
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
@@ -123,8 +117,6 @@ class RobotEnd(_End):
         if self._data is None:
             return None
         data, self._data = self._data, None
-        try:
+        with suppress(*_UNREADABLE):
             return self.dialect.decode_command(data)
-        except (ValueError, AttributeError, IndexError):
-            self.broken += 1
-            return None
+        return None

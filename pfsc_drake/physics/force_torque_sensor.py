@@ -104,7 +104,7 @@ class ForceTorqueSensor(Block):
         limit = ca.DM(self._parameters.measurement_range)
         load = -ca.vertcat(u.reaction[3:], u.reaction[:3])
         filtered = self._low_pass.output(self._at_rest(x, load), load)
-        reading = filtered + ca.DM(self._parameters.bias) + self._noise(u, t)
+        reading = filtered + ca.DM(self._parameters.bias) + noise_at(u.noise, 6, t)
         # unlike a minimum, a comparison lets NaN through
         reading = where(reading > limit, limit, reading)
         return {"measured_wrench": where(reading < -limit, -limit, reading), "load": load}
@@ -116,10 +116,18 @@ class ForceTorqueSensor(Block):
     def _at_rest(self, x: Values, load: Any) -> Any:
         return where(is_finite(x.filter), x.filter, self._low_pass.rest(load))
 
-    def _noise(self, u: Values, t: Any) -> Any:
-        if u.noise is None:
-            return 0.0
-        return ca.reshape(u.noise, 6, NOISE_TICKS)[:, ca.fmod(t, NOISE_TICKS)]
+
+def noise_at(noise: Any | None, size: int, t: Any) -> Any:
+    """Return the noise of a tick, shape (size,); 0 without any.
+
+    Args:
+        noise: That of NOISE_TICKS ticks, one after the other, shape (size NOISE_TICKS,), or None.
+        size: Number of components.
+        t: Number of the tick.
+    """
+    if noise is None:
+        return 0.0
+    return ca.reshape(noise, size, NOISE_TICKS)[:, ca.fmod(t, NOISE_TICKS)]
 
 
 def _check(key: str, value: np.ndarray, *, positive: bool) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.checks import require_between, require_not_negative
-from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS
+from pfsc_drake.physics.force_torque_sensor import NOISE_TICKS, noise_at
 from pfsc_drake.robot.robot_model import RobotModel
 
 
@@ -63,7 +63,4 @@ class JointTorqueSensor(Block):
         """Return all outputs, and the inner values."""
         q_J, v_J, q_M, v_M = ca.vertsplit(u.joint_state, self._n)
         torque = self._factor * (self._stiffness * (q_M - q_J) + self._damping * (v_M - v_J))
-        if u.noise is None:
-            return {"joint_torque": torque}
-        noise = ca.reshape(u.noise, self._n, NOISE_TICKS)[:, ca.fmod(t, NOISE_TICKS)]
-        return {"joint_torque": torque + noise}
+        return {"joint_torque": torque + noise_at(u.noise, self._n, t)}
