@@ -116,6 +116,37 @@ def gravity_torque(robot: RobotModel, q: ca.SX) -> ca.SX:
     return ca.vertcat(*[tau.coefficients[0] for tau in robot.inverse_dynamics(at_rest)])
 
 
+def bias_torque(robot: RobotModel, q: ca.SX, v: ca.SX) -> ca.SX:
+    """Return the torques that keep the links at their velocities, ``n_E(q, v)`` of (2.65a).
+
+    Args:
+        robot: The robot.
+        q: Joint coordinates, shape (N, 1).
+        v: Their rates, shape (N, 1).
+
+    Returns:
+        Shape (N, 1) [Nm or N].
+    """
+    steady = [Jet([q[i], v[i], ca.SX(0)]) for i in range(robot.dimension)]
+    return ca.vertcat(*[tau.coefficients[0] for tau in robot.inverse_dynamics(steady)])
+
+
+@once_per_content()
+def link_acceleration(robot: RobotModel) -> ca.Function:
+    """Return the acceleration of elastic joints' links, (2.65a), each argument (N,).
+
+    ``(q, v, tau_J) -> D_E^-1 (tau_J - n_E)``, as if rigid joints, whose torque no spring tells,
+    went on as they go; theirs is zero.
+    """
+    n, elastic = robot.dimension, robot.elastic_joints
+    q, v, tau = (ca.SX.sym(name, n) for name in ("q", "v", "tau"))
+    chosen = ca.diag(ca.DM(elastic.astype(float)))
+    D = chosen @ robot.mass_matrix(q) @ chosen + (ca.DM.eye(n) - chosen)
+    load = chosen @ (tau - bias_torque(robot, q, v))
+    a = ca.ldl_solve(load, *ca.ldl(ca.densify(D)))
+    return ca.Function("a", [q, v, tau], ca.cse([a]), ["q", "v", "tau"], ["a"], MAY_BE_PARAMETRIC)
+
+
 @once_per_content()
 def gravity_function(robot: RobotModel) -> ca.Function:
     """Return :func:`gravity_torque` as a function of numbers, (N,) to (N,)."""
