@@ -174,13 +174,19 @@ def build_station(
     servo = None
     if not remote:
         further, servo = add_drives(
-            builder, part, servo_options(scenario), period, signals | drive, initial_state
+            builder,
+            part,
+            servo_options(scenario),
+            scenario.driver,
+            period,
+            signals | drive,
+            initial_state,
         )
         signals |= further
     faults = [controller.GetOutputPort("fault")]
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
     signals |= add_friction(builder, part, true_state, rubbing, faults)
-    signals |= states_to_log(true_state, joint_state)
+    signals |= states_to_log(true_state, place.signals["joint_state"])
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
@@ -218,6 +224,7 @@ def build_station(
         operator,
         MODES if "mode" in signals else (),
         mounting,
+        0 if remote else scenario.driver.ticks(period),
     )
 
 

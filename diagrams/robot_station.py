@@ -13,7 +13,7 @@ from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
 from diagrams.robots.sensors import add_force_sensor, add_joint_state
-from diagrams.scenario import Scenario
+from diagrams.scenario import DriverParameters, Scenario
 from diagrams.scenario.checks import require
 from diagrams.station_parts import (
     add_robot,
@@ -47,6 +47,7 @@ class RobotStation:
         initial_state: State of the robot's model at the start.
         place: Place on the manifold at the start, as the projector remembers it.
         projector: Name of the projector.
+        ticks_late: After how many ticks torques act that the driver passes on.
     """
 
     diagram: Diagram
@@ -58,6 +59,7 @@ class RobotStation:
     initial_state: np.ndarray
     place: np.ndarray
     projector: str
+    ticks_late: int = 0
 
     @cached_property
     def blocks(self) -> BlockAccess:
@@ -77,7 +79,7 @@ class RobotStation:
             q = (self.part.coordinates.link_rows @ self.initial_state)[:n]
             weight = gravity_function(self.part.robot)(q).full().ravel()
             self.tell(root, weight)
-            self.blocks.set_state(root, "hold.held", weight)
+            self.blocks.set_state(root, "hold.held", np.tile(weight, 1 + self.ticks_late))
 
     def tell(self, root: Context, values: np.ndarray) -> None:
         """Tell the drives what to do.
@@ -167,8 +169,13 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         failure = scenario.simulation.force_sensor_failure
         wrench = _name(add_force_sensor(builder, part, scenario.sensor, failure, period, ports))
     command = builder.AddNamedSystem("command", ConstantVectorSource(np.zeros(n)))
+    # the link is the first tick of a delay, and the low pass the driver's
+    late = max(scenario.driver.ticks(period) - 1, 0)
+    beyond_the_link = DriverParameters(delay=late * period)
     drive = {"drive": command.get_output_port(), "joint_state": joint_state}
-    signals, _ = add_drives(builder, part, servo_options(scenario), period, drive, initial_state)
+    signals, _ = add_drives(
+        builder, part, servo_options(scenario), beyond_the_link, period, drive, initial_state
+    )
     faults = [signals["servo_fault"]] if "servo_fault" in signals else []
     add_friction(builder, part, true_state, friction_options(scenario, folder), faults)
     measured = _name(joint_state)
@@ -187,6 +194,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         initial_state,
         start.place,
         place.projector.get_name(),
+        late,
     )
 
 

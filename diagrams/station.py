@@ -64,6 +64,7 @@ class Station:
         operator: Who guides the tool while the robot moves, if anybody does.
         mode_labels: What the values of a logged signal ``mode`` are called, if there is one.
         mounting: Where plates come from and go, if there are any.
+        ticks_late: After how many ticks torques act that are told.
     """
 
     diagram: Diagram
@@ -83,6 +84,7 @@ class Station:
     operator: Operator | None = None
     mode_labels: Sequence[str] = ()
     mounting: Mounting | None = None
+    ticks_late: int = 0
 
     @property
     def robot(self) -> RobotModel:
@@ -123,16 +125,17 @@ class Station:
     def set_start(self, root: Context) -> None:
         """Put the robot at the start of the scenario, where its drives hold its weight.
 
-        A discrete plant's first step is one of what the drives did before the first tick: without
-        this the robot would fall for as long.
+        A discrete plant's first step is one of what the drives did before the first tick, and so
+        are those of drives that act late: without this the robot would fall for as long.
 
         Args:
             root: Context of the diagram.
         """
         self.place_robot(root, self.initial_state)
-        if self.part.drives.step is not None:
+        late = self.ticks_late
+        if late or self.part.drives.step is not None:
             weight = gravity_function(self.part.robot)(self.start_posture).full().ravel()
-            self.blocks.set_state(root, "hold.held", weight)
+            self.blocks.set_state(root, "hold.held", np.tile(weight, 1 + late))
         self.set_place(root, self.initial_place)
 
     def set_place(self, root: Context, place: np.ndarray) -> None:

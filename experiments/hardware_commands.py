@@ -47,11 +47,19 @@ def robot_command(
     lcm: Lcm = "",
     driver: Driver = "panda",
     expire: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Age from which commands count no more.")
-    ] = 0.1,
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help="Age from which commands count no more. Default: the driver's, 0.1 or 0.05",
+        ),
+    ] = None,
     low_pass: Annotated[
-        float, typer.Option(metavar="HZ", help="Low pass of commanded torques; 0 for none.")
-    ] = 30.0,
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Low pass of commanded torques; 0 for none. Default: driver.low_pass, or 30",
+        ),
+    ] = None,
     lose: Annotated[
         float, typer.Option(metavar="SHARE", help="Share of packets that are lost.")
     ] = 0.0,
@@ -65,17 +73,24 @@ def robot_command(
     ] = True,
 ) -> None:
     """Be the robot of a scenario: plant, friction, sensors and a driver's rules, in real time."""
+    from diagrams.scenario import Scenario
     from experiments.hardware.robot import Transport
     from experiments.hardware.robot_run import run_robot_scenario
     from pfsc_drake.drivers.driver_rules import DriverOptions
     from pfsc_drake.drivers.link import RobotEnd
     from pfsc_drake.drivers.messages import dialect
+    from pfsc_drake.yaml.typed import load_typed
 
     seconds = math.inf if duration is None else read_duration(duration)
     with interruptible():
         loaded = read_scenario(scenario, overrides or [])
-        options, transport = DriverOptions(expire, low_pass), Transport(lose, delay)
-        end = RobotEnd(_open(lcm), dialect(driver))
+        messages = dialect(driver)
+        if low_pass is None:
+            own = load_typed(Scenario, loaded.data, str(loaded.path)).driver.low_pass
+            low_pass = own or DriverOptions.low_pass
+        options = DriverOptions(messages.expiry if expire is None else expire, low_pass)
+        transport = Transport(lose, delay)
+        end = RobotEnd(_open(lcm), messages)
         console = Console()
         run_robot_scenario(
             loaded,

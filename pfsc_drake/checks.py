@@ -51,6 +51,28 @@ def require_whole_fraction(key: str, step: float, sampling_time: float) -> int:
     return round(ratio)
 
 
+def require_whole_ticks(key: str, delay: float, sampling_time: float, most: int) -> int:
+    """Refuse a delay that is no multiple of the controller's sampling time.
+
+    Args:
+        key: Key of the delay.
+        delay: The delay [s].
+        sampling_time: Sampling time of the controller [s].
+        most: Most ticks that are allowed.
+
+    Returns:
+        The delay in ticks.
+
+    Raises:
+        InputError: If it is no multiple, or longer than allowed.
+    """
+    ticks = round(delay / sampling_time)
+    whole = abs(ticks * sampling_time - delay) < _ROUNDING * sampling_time
+    allowed = f"a multiple of the sampling time {sampling_time:g} s, at most {most:,} of it"
+    require(whole and 0 <= ticks <= most, key, delay, allowed)
+    return ticks
+
+
 def checked_vector(
     subject: str, name: str, value: np.ndarray, size: int, *, positive: bool
 ) -> np.ndarray:

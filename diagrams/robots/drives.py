@@ -12,6 +12,7 @@ from diagrams.robots.belief import believed_robot
 from diagrams.robots.part import Drives, RobotPart
 from diagrams.scenario import (
     BrakeParameters,
+    DriverParameters,
     JointFrictionParameters,
     ServoParameters,
     SimulationParameters,
@@ -23,6 +24,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import safe_state, supervision
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.physics.driver import DriveLowPass
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
 from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains
@@ -81,6 +83,7 @@ def add_drives(
     builder: DiagramBuilder,
     part: RobotPart,
     servos: ServoOptions | None,
+    driver: DriverParameters,
     period: float,
     ports: dict[str, OutputPort],
     initial_state: np.ndarray,
@@ -91,6 +94,7 @@ def add_drives(
         builder: Builder of the diagram.
         part: The robot.
         servos: Servos of a law that commands velocities; None where it commands torques.
+        driver: How late torques act, and through which low pass.
         period: Sampling time of the controller [s].
         ports: ``drive`` of the law, torques or reference velocities, and ``joint_state``.
         initial_state: State of the plant at the start, for which servos are designed.
@@ -100,16 +104,24 @@ def add_drives(
         shape (N,), and ``servo_fault``, shape (1,); the servos, if there are any.
 
     Raises:
-        InputError: If the servos do not suit the robot or the controller.
+        InputError: If the servos or the driver do not suit the robot or the controller.
     """
     torque, chain, signals, access = ports["drive"], part.belief.robot, {}, None
+    ticks = driver.ticks(period)
     if servos is not None:
+        plain = "none with the law 'velocity_servo', whose way to the drives is servo.bus_delay"
+        require(driver == DriverParameters(), "driver", driver, plain)
         q_J = (part.coordinates.link_rows @ initial_state)[: chain.dimension]
         servo = _add_servo(builder, chain, servos, ports, q_J)
         access, period = ServoAccess(servo), servo.period
         torque = servo.GetOutputPort("drive_torque")
         signals = {"drive_torque": torque, "servo_fault": servo.GetOutputPort("fault")}
-    hold = builder.AddNamedSystem("hold", BlockSystem(Hold(chain.dimension), period))
+    if driver.low_pass > 0.0:
+        filtering = DriveLowPass(chain.dimension, driver.low_pass, period)
+        low_pass = builder.AddNamedSystem("drive_low_pass", BlockSystem(filtering, period))
+        builder.Connect(torque, low_pass.GetInputPort("told"))
+        torque = low_pass.GetOutputPort("passed")
+    hold = builder.AddNamedSystem("hold", BlockSystem(Hold(chain.dimension, 1 + ticks), period))
     builder.Connect(torque, hold.GetInputPort("value"))
     part.connect_drives(builder, hold.GetOutputPort("held"))
     return signals, access

@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart, SensorMount
 from diagrams.scenario import SensorFailureParameters, SensorParameters
-from diagrams.scenario.checks import require
+from diagrams.scenario.checks import require_whole_ticks
 from pfsc_drake.blocks.wiring_blocks import Hold
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensation
 from pfsc_drake.errors import InputError
@@ -83,8 +83,7 @@ def states_to_log(joint_state: OutputPort, measured: OutputPort) -> dict[str, Ou
     return {"joint_state": joint_state, "joint_state_measured": measured}
 
 
-# of a sampling interval
-_ROUNDING = 1e-6
+_MOST_TICKS = 10_000  # by which a force is late
 
 
 def add_sensor(
@@ -221,9 +220,7 @@ def _fail(
 
 def _delay(builder: DiagramBuilder, reading: OutputPort, delay: float, period: float) -> OutputPort:
     """Return a sensor's reading when the controller has it."""
-    ticks = round(delay / period)
-    whole = abs(ticks * period - delay) < _ROUNDING * period
-    require(whole, "sensor.delay", delay, f"a multiple of the sampling time {period:g} s")
+    ticks = require_whole_ticks("sensor.delay", delay, period, _MOST_TICKS)
     if ticks == 0:
         return reading
     late = builder.AddNamedSystem(

@@ -13,7 +13,12 @@ from diagrams.scenario.path import (
     PathParameters,
     Waypoints,
 )
-from diagrams.scenario.robot import RobotParameters, SensorParameters, ServoParameters
+from diagrams.scenario.robot import (
+    DriverParameters,
+    RobotParameters,
+    SensorParameters,
+    ServoParameters,
+)
 from diagrams.scenario.schema import Scenario, Target
 from diagrams.scenario.simulation import (
     HoldBackParameters,
@@ -41,6 +46,7 @@ __all__ = [
     "Circle",
     "ComplianceParameters",
     "ControllerParameters",
+    "DriverParameters",
     "EncoderOptions",
     "FaultParameters",
     "ForcePulse",

@@ -9,6 +9,7 @@ from pfsc_drake.checks import require_not_negative as require_not_negative
 from pfsc_drake.checks import require_numbers as require_numbers
 from pfsc_drake.checks import require_positive as require_positive
 from pfsc_drake.checks import require_whole_fraction as require_whole_fraction
+from pfsc_drake.checks import require_whole_ticks as require_whole_ticks
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 
 

@@ -12,6 +12,7 @@ from diagrams.scenario.checks import (
     require_not_negative,
     require_numbers,
     require_positive,
+    require_whole_ticks,
 )
 from pfsc_drake.control.compliance.taring import STILL_TIME
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
@@ -211,6 +212,38 @@ class ServoParameters:
         require_not_negative("watchdog", self.watchdog)
         loses = self.lost.end > self.lost.begin
         require(not loses or self.bus_delay > 0.0, "lost", self.lost, "only with a bus_delay")
+
+
+_LONGEST_DELAY = 1000  # ticks
+
+
+@dc.dataclass
+class DriverParameters:
+    """What is between a law that commands torques and the robot's drives.
+
+    Attributes:
+        delay: Until a torque acts that is told [s], a multiple of the controller's sampling time,
+            at most 1,000 of it. A link to a robot costs one.
+        low_pass: Cut-off frequency of the low pass that torques go through [Hz]; 0 for none.
+    """
+
+    delay: float = 0.0
+    low_pass: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_not_negative("delay", self.delay)
+        require_not_negative("low_pass", self.low_pass)
+
+    def ticks(self, period: float) -> int:
+        """Return the delay in ticks.
+
+        Args:
+            period: Sampling time of the controller [s].
+
+        Raises:
+            InputError: If it is no multiple of that.
+        """
+        return require_whole_ticks("driver.delay", self.delay, period, _LONGEST_DELAY)
 
 
 @dc.dataclass

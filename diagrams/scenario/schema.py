@@ -15,7 +15,12 @@ from diagrams.scenario.model_error import ModelErrorParameters
 from diagrams.scenario.motion import ReferenceParameters, StartParameters
 from diagrams.scenario.path import PathParameters
 from diagrams.scenario.plate import PlateParameters
-from diagrams.scenario.robot import RobotParameters, SensorParameters, ServoParameters
+from diagrams.scenario.robot import (
+    DriverParameters,
+    RobotParameters,
+    SensorParameters,
+    ServoParameters,
+)
 from diagrams.scenario.simulation import (
     HoldBackParameters,
     OperatorParameters,
@@ -72,6 +77,7 @@ class Scenario:
             recorded in one. None without the block.
         hold_back: A wrench that only slows the robot down.
         servo: Velocity controllers of the joints, for the law ``velocity_servo``.
+        driver: What is between a law that commands torques and the drives.
         friction: Friction of the joints.
         drive_friction: Whether the drives have the friction that the robot's own parameters
             tell, as those of DELTA robots do; null if they do and ``friction`` is empty.
@@ -110,6 +116,7 @@ class Scenario:
     operator: OperatorParameters | None = None
     hold_back: HoldBackParameters = dc.field(default_factory=HoldBackParameters)
     servo: ServoParameters = dc.field(default_factory=ServoParameters)
+    driver: DriverParameters = dc.field(default_factory=DriverParameters)
     friction: JointFrictionParameters = dc.field(default_factory=JointFrictionParameters)
     drive_friction: bool | None = None
     encoders: EncoderOptions = dc.field(default_factory=EncoderOptions)

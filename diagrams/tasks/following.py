@@ -20,10 +20,11 @@ from pfsc_drake.following.compliance import reference_order
 from pfsc_drake.following.controller import add_controller, add_reference
 from pfsc_drake.following.fixtures import add_fixture_guidance
 from pfsc_drake.following.followed import Wanted
-from pfsc_drake.following.law import Coefficients
+from pfsc_drake.following.law import Believed, Coefficients
 from pfsc_drake.following.options.compliance import ComplianceParameters
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
+from pfsc_drake.following.prediction import add_prediction
 from pfsc_drake.physics.joint_encoders import EncoderOptions
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
@@ -87,11 +88,15 @@ class ToolOnManifold:
         projector: What finds it.
         desired_reference: Reference of the virtual output, before it yields to forces; None where
             forces alone lead the tool.
+        believed: What is believed of the robot and of how well its motion is known.
+        predictor: What foretells ``joint_state``, if anything does.
         signals: ``joint_state``, ``tool_pose``, ``manifold_point``.
     """
 
     projector: BlockSystem
     desired_reference: OutputPort | None
+    believed: Believed
+    predictor: BlockSystem | None
     signals: dict[str, OutputPort]
 
 
@@ -109,14 +114,18 @@ def add_place(
         InputError: If compliance and law do not go together.
     """
     task, linearization = following.task, following.law.linearization
-    period = following.options.controller.sampling_time
+    options, period = following.options, following.options.controller.sampling_time
+    believed = believed_robot(following.robot, options.encoders, period, following.friction)
+    joint_state, believed, predictor = add_prediction(
+        builder, believed, options.controller, joint_state
+    )
     kinematics = builder.AddNamedSystem(
         "tool_kinematics",
         BlockSystem(ToolKinematics(following.robot, following.on_motors), period),
     )
     tool_pose, desired = kinematics.GetOutputPort("tool_pose"), None
     if not isinstance(task, SpaceTask):
-        order = reference_order(following.options.compliance, linearization)
+        order = reference_order(options.compliance, linearization)
         timed = TimedReference(task.motion, order, linearization.num_outputs, period)
         generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
@@ -127,7 +136,7 @@ def add_place(
         "tool_pose": tool_pose,
         "manifold_point": place.manifold_point,
     }
-    return ToolOnManifold(place.projector, desired, signals)
+    return ToolOnManifold(place.projector, desired, believed, predictor, signals)
 
 
 def _swung(
@@ -178,16 +187,17 @@ def add_law(
         InputError: If compliance, external torques or friction do not suit the law.
     """
     options, law = following.options, following.law
-    compliance, period = options.compliance, options.controller.sampling_time
+    compliance = options.compliance
     yields = compliance.is_given and compliance.source == "observed"
     controller, signals, made = add_controller(
         builder,
         law,
-        believed_robot(following.robot, options.encoders, period, following.friction),
+        place.believed,
         options.controller,
         options.faults,
         place.signals | forces,
         compliance.observed if yields else None,
+        place.predictor,
     )
     made |= {"law": controller.GetOutputPort("law")}
     desired = place.desired_reference

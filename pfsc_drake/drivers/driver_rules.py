@@ -7,6 +7,7 @@ import numpy as np
 from pfsc_drake.checks import require_not_negative, require_positive
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode
 from pfsc_drake.errors import InputError
+from pfsc_drake.physics.driver import low_pass_share
 
 _OF_EFFORT = 10.0  # 1/s
 
@@ -76,8 +77,7 @@ class DriverRules:
         self.ended: str | None = None
         self.rejected = 0
         self._last: RobotCommand | None = None
-        w = 2.0 * np.pi * options.low_pass * period
-        self._pass = w / (1.0 + w) if options.low_pass > 0.0 else 1.0
+        self._pass = low_pass_share(options.low_pass, period)
 
     @property
     def robot_mode(self) -> RobotMode:

@@ -83,12 +83,14 @@ class Dialect(ABC):
         status_channel: LCM channel on which the robot tells its status.
         command_channel: LCM channel on which it is commanded.
         modes: What it can be commanded by.
+        expiry: Age from which its commands count no more [s].
     """
 
     name: str
     status_channel: str
     command_channel: str
     modes: ControlMode
+    expiry: float
 
     @abstractmethod
     def encode_status(self, status: RobotStatus) -> bytes:
@@ -121,6 +123,7 @@ class PandaDialect(Dialect):
     name = "panda"
     status_channel, command_channel = "PANDA_STATUS", "PANDA_COMMAND"
     modes = ControlMode.POSITION | ControlMode.VELOCITY | ControlMode.TORQUE
+    expiry = 0.1
 
     def encode_status(self, status: RobotStatus) -> bytes:
         """Return a status as a message."""
@@ -190,6 +193,7 @@ class IiwaDialect(Dialect):
     name = "iiwa"
     status_channel, command_channel = "IIWA_STATUS", "IIWA_COMMAND"
     modes = ControlMode.TORQUE
+    expiry = 0.05
 
     def encode_status(self, status: RobotStatus) -> bytes:
         """Return a status as a message."""

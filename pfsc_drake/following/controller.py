@@ -15,6 +15,7 @@ from pfsc_drake.following.options.compliance import ComplianceParameters, Observ
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.following.posture import add_posture_reference
+from pfsc_drake.following.prediction import connect_predictor
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import FollowingController
@@ -105,6 +106,7 @@ def add_controller(
     faults: FaultParameters,
     ports: dict[str, OutputPort],
     tool: ObservedForceParameters | None = None,
+    predictor: BlockSystem | None = None,
 ) -> tuple[FollowingController, dict[str, OutputPort], dict[str, OutputPort]]:
     """Add a law and connect all of its inputs but ``reference`` and ``alarms``.
 
@@ -117,6 +119,7 @@ def add_controller(
         ports: ``joint_state``, ``manifold_point``, and what there is of ``wrench_ext``,
             ``wrench_measured``, ``push_torque``.
         tool: How forces on the tool are observed for compliance, if they are.
+        predictor: What foretells ``joint_state``, if anything does.
 
     Returns:
         The controller; the ports given with all that was added (see the functions that add it);
@@ -135,6 +138,8 @@ def add_controller(
     friction, logged = add_friction_compensation(builder, believed, options, controller, signals)
     if friction is not None:
         signals["friction"] = friction
+    if predictor is not None:
+        connect_predictor(builder, predictor, controller, friction)
     signals |= add_observed_forces(builder, believed, options, tool, controller, signals)
     logged |= {name: signals[name] for name in _OBSERVED if name in signals}
     logged |= add_posture_reference(builder, robot, options, law, controller, signals)

@@ -28,6 +28,7 @@ from pfsc_drake.following.options.controller import (
     LawGains,
 )
 from pfsc_drake.following.options.follower import FollowerOptions
+from pfsc_drake.following.prediction import add_prediction
 from pfsc_drake.robot.inverse_kinematics import middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant, state_at_rest
@@ -162,7 +163,9 @@ class Follower(Diagram):
         builder, law = self._builder, self.law
         linearization = law.linearization
         on_motors = chosen.law == "rigid" and not self.robot.is_rigid
-        joint_state = self._measured(options)
+        joint_state, believed, predictor = add_prediction(
+            builder, Believed(self.robot, options.friction), chosen, self._measured(options)
+        )
         kinematics = self._add("tool_kinematics", ToolKinematics(self.robot, on_motors))
         builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
         projector = self._add("projector", self.followed.projector)
@@ -172,11 +175,11 @@ class Follower(Diagram):
             "manifold_point": projector.GetOutputPort("manifold_point"),
         }
         ports |= self._forces(chosen, options)
-        compliance, believed = options.compliance, Believed(self.robot, options.friction)
+        compliance = options.compliance
         yields = compliance.is_given and compliance.source == "observed"
         observed = compliance.observed if yields else None
         controller, signals, _ = add_controller(
-            builder, law, believed, chosen, options.faults, ports, observed
+            builder, law, believed, chosen, options.faults, ports, observed, predictor
         )
         desired, made = self._motion(options, signals)
         followed, robot = self.followed, self.robot

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.compiled.content import once_per_content
+from pfsc_drake.control.estimation.state_predictor import MOST_TICKS
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (
@@ -35,6 +37,20 @@ from pfsc_drake.following.posture import make_posture
 from pfsc_drake.robot.robot_model import RobotModel
 
 _DIGITS = 3
+
+
+def ticks_of(options: ControllerParameters) -> int:
+    """Return by how many ticks the law believes its torques to be late.
+
+    Args:
+        options: What is chosen of the controller.
+
+    Raises:
+        InputError: If that is no whole number, or too many.
+    """
+    return require_whole_ticks(
+        "controller.delay", options.delay or 0.0, options.sampling_time, MOST_TICKS
+    )
 
 
 def gains_of(
@@ -135,7 +151,7 @@ def sampled_robot(
         posture: What joints beyond the number of outputs do, if there are any.
     """
     period = parameters.sampling_time
-    loop = LoopAtRest(robot, linearization, rest, period, posture)
+    loop = LoopAtRest(robot, linearization, rest, period, posture, ticks_of(parameters))
     return SampledRobot(loop, period, not robot.is_rigid)
 
 

@@ -249,7 +249,8 @@ class StationLoop:
         if "bus_delay.samples" in states:  # the newest
             return states["bus_delay.samples"][:N], True
         is_servo = "velocity_hold.held" in states
-        return states["velocity_hold.held" if is_servo else "hold.held"], is_servo
+        # the newest of those that are on their way
+        return states["velocity_hold.held" if is_servo else "hold.held"][-N:], is_servo
 
 
 def _only(diagram: Diagram, kind: type[Kind]) -> Kind | None:

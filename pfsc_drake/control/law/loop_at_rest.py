@@ -55,6 +55,8 @@ class LoopAtRest:
         rest: Where it rests.
         period: Sampling time ``T_s`` [s].
         posture: What joints beyond the number of outputs do, if there are any.
+        ticks: After how many ticks torques act that are told, which the law knows: it answers to
+            the state that the believed robot has then.
     """
 
     def __init__(
@@ -64,7 +66,9 @@ class LoopAtRest:
         rest: RestPosture,
         period: float,
         posture: Posture | None = None,
+        ticks: int = 0,
     ) -> None:
+        self._ticks = ticks
         n = robot.dimension
         self._robot, self._n, self._period = robot, n, period
         self._elastic = robot.elastic_joints
@@ -154,7 +158,7 @@ class LoopAtRest:
             stiffness: The same of joint stiffnesses.
 
         Returns:
-            Shape (k, k); the last N variables are the held drive inputs.
+            Shape (k, k); the last N variables are the newest drive inputs.
         """
         interval, answer, _ = self._parts(gains, mass, stiffness)
         return np.asarray(answer @ interval)
@@ -178,12 +182,9 @@ class LoopAtRest:
         self, gains: LoopGains, mass: float, stiffness: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return what an interval does, how the law answers then, and what torques do meanwhile."""
-        n, period = self._n, self._period
-        F, B, B_ext, C = self._plant(mass, stiffness)
-        size = len(F)
-        inputs = np.hstack([B, B_ext])
-        exponential = expm(np.block([[F, inputs], [np.zeros((2 * n, size + 2 * n))]]) * period)
-        Phi, Gamma, Gamma_ext = np.split(exponential[:size], [size, size + n], axis=1)
+        n, period, ticks = self._n, self._period, self._ticks
+        Phi, Gamma, Gamma_ext, C = self._interval(mass, stiffness)
+        size = len(Phi)
         error = self._Y[:, 0].T @ C
         v = -np.einsum("km,ikm->mi", gains.outputs.proportional, self._Y) @ C
         held = self._per_output @ v + self._drift @ C
@@ -191,15 +192,38 @@ class LoopAtRest:
             held = held + self._posture_answer(gains.posture) @ C
         drive = held + self._offset @ C
         summed = -self._per_output * gains.outputs.integral
-        # variables: motion, held part of the last tick, summed error, drive input
+        # variables: motion, held part of the last tick, summed error, drive inputs, oldest first
         m = len(error)
-        count = size + n + m + n
+        inputs = size + n + m
+        count = inputs + (ticks + 1) * n
         interval, pushed = np.eye(count), np.zeros((count, n))
-        interval[:size, :size], interval[:size, -n:], pushed[:size] = Phi, Gamma, Gamma_ext
-        motion, last, sums, _ = np.split(np.eye(count), [size, size + n, size + n + m])
-        now_held = held @ motion + summed @ sums
-        told = drive @ motion + summed @ sums + self._lead * (now_held - last)
-        return interval, np.vstack([motion, now_held, sums + period * error @ motion, told]), pushed
+        interval[:size, :size], pushed[:size] = Phi, Gamma_ext
+        interval[:size, inputs : inputs + n] = Gamma
+        motion, last, sums, sent = np.split(np.eye(count), [size, size + n, inputs])
+        # what is on its way acts on the robot as it is believed
+        seen = motion
+        if ticks:
+            Phi, Gamma, _, _ = self._interval(1.0, 1.0)
+        on_its_way = sent[n:]
+        for told_then in np.split(on_its_way, ticks) if ticks else []:
+            seen = Phi @ seen + Gamma @ told_then
+        now_held = held @ seen + summed @ sums
+        told = drive @ seen + summed @ sums + self._lead * (now_held - last)
+        answer = [motion, now_held, sums + period * error @ seen, on_its_way, told]
+        return interval, np.vstack(answer), pushed
+
+    def _interval(
+        self, mass: float, stiffness: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return what a robot does from tick to tick: ``Phi``, ``Gamma``, ``Gamma_ext``, ``C``."""
+        n = self._n
+        F, B, B_ext, C = self._plant(mass, stiffness)
+        size = len(F)
+        inputs = np.hstack([B, B_ext])
+        block = np.block([[F, inputs], [np.zeros((2 * n, size + 2 * n))]])
+        exponential = expm(block * self._period)
+        Phi, Gamma, Gamma_ext = np.split(exponential[:size], [size, size + n], axis=1)
+        return Phi, Gamma, Gamma_ext, C
 
     def _plant(
         self, mass: float, stiffness: float

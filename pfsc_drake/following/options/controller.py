@@ -242,7 +242,10 @@ class ControllerParameters:
         posture: What joints do that the task leaves free.
         state: Where it has the links' side of elastic joints from: ``measured``; ``from_torque``,
             by torque sensors in the joints; ``observed``, by the motors alone.
-        state_bandwidth: Bandwidth with which torques are differentiated, and observed [rad/s].
+        state_bandwidth: Bandwidth with which the links' motion and torques are observed [rad/s].
+        delay: Until a torque acts that the law commands [s], a multiple of its sampling time, at
+            most 10 of it: it then acts on the state that its model foretells for that moment, with
+            velocities of the age of positions. Null for a law that takes what is measured.
     """
 
     law: str = "elastic"
@@ -263,10 +266,12 @@ class ControllerParameters:
     posture: PostureParameters = dc.field(default_factory=PostureParameters)
     state: str = "measured"
     state_bandwidth: float = 800.0
+    delay: float | None = None
 
     def __post_init__(self) -> None:
         require(self.state in STATES, "state", self.state, ", ".join(STATES))
         require_positive("state_bandwidth", self.state_bandwidth)
+        require_not_negative("delay", self.delay or 0.0)
         require(self.law in RELATIVE_DEGREE, "law", self.law, ", ".join(RELATIVE_DEGREE))
         require(self.manifold in MANIFOLDS, "manifold", self.manifold, ", ".join(MANIFOLDS))
         for law in self.gains:
