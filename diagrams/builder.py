@@ -186,7 +186,8 @@ def build_station(
     faults = [controller.GetOutputPort("fault")]
     faults += [signals["servo_fault"]] if "servo_fault" in signals else []
     signals |= add_friction(builder, part, true_state, rubbing, faults)
-    signals |= states_to_log(true_state, place.signals["joint_state"])
+    known = joint_state if remote else true_state
+    signals |= states_to_log(known, place.signals["joint_state"])
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)

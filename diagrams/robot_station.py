@@ -12,7 +12,7 @@ from diagrams.builder import find_rest, find_start
 from diagrams.robots.drives import add_drives, add_friction
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import add_force_sensor, add_joint_state
+from diagrams.robots.sensors import add_force_sensor, add_joint_state, add_torque_sensor
 from diagrams.scenario import DriverParameters, Scenario
 from diagrams.scenario.checks import require
 from diagrams.station_parts import (
@@ -43,6 +43,7 @@ class RobotStation:
         command: What its drives are told: torques, or velocities of its servos.
         mode: Which of both.
         measured: System and port that the measured joint state comes from, by name.
+        torque: The same of the torques in its elastic joints, None of a rigid robot.
         wrench: The same of what the force sensor measures, None without one.
         initial_state: State of the robot's model at the start.
         place: Place on the manifold at the start, as the projector remembers it.
@@ -55,6 +56,7 @@ class RobotStation:
     command: ConstantVectorSource
     mode: ControlMode
     measured: tuple[str, str]
+    torque: tuple[str, str] | None
     wrench: tuple[str, str] | None
     initial_state: np.ndarray
     place: np.ndarray
@@ -98,6 +100,16 @@ class RobotStation:
             root: Context of the diagram.
         """
         return self._read(root, self.measured)
+
+    def joint_torque(self, root: Context) -> np.ndarray:
+        """Return the torques in elastic joints as measured, zero in rigid ones, shape (N,).
+
+        Args:
+            root: Context of the diagram.
+        """
+        if self.torque is None:
+            return np.zeros(self.part.robot.dimension)
+        return self._read(root, self.torque)
 
     def sensed(self, root: Context) -> np.ndarray | None:
         """Return what the force sensor measures, shape (6,) [N, Nm], None without one.
@@ -163,7 +175,11 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}
     forces = add_surroundings(builder, part, task, outside(scenario), around, start)
-    wrench = None
+    torque = wrench = None
+    if not part.robot.is_rigid:
+        torque = _name(
+            add_torque_sensor(builder, part.robot, scenario.encoders, period, true_state)
+        )
     if scenario.needs_sensor:
         ports = {"joint_state": joint_state, "true_joint_state": true_state} | forces
         failure = scenario.simulation.force_sensor_failure
@@ -190,6 +206,7 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         command,
         ControlMode.TORQUE if torques else ControlMode.VELOCITY,
         measured,
+        torque,
         wrench,
         initial_state,
         start.place,

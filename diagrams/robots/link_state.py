@@ -4,6 +4,8 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from diagrams.robots.part import RobotPart
+from diagrams.robots.remote_arm import RemoteArm
+from diagrams.robots.sensors import add_torque_sensor
 from diagrams.scenario.checks import require
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant, Sum
@@ -12,10 +14,8 @@ from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momen
 from pfsc_drake.following.law import Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.physics.joint_encoders import EncoderOptions
-from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 
 # laws that act on the motors of elastic joints alone
 _OF_MOTORS = ("rigid", "velocity_servo")
@@ -59,12 +59,13 @@ def add_link_state(
     robot, source, sides = part.belief.robot, controller.state, encoders.sides
     if robot.is_rigid or (source == "measured" and controller.law in _OF_MOTORS):
         return measured, None
-    require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
+    if not isinstance(part, RemoteArm):  # else the robot knows what it measures
+        require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
     if source == "measured":
         return measured, None
     period, wants = controller.sampling_time, None
     if source == "from_torque":
-        torque = _add_torque_sensor(builder, part.robot, encoders, period, true_state)
+        torque = _measured_torque(builder, part, encoders, period, true_state)
     else:
         torque, wants = _add_torque_observer(builder, robot, controller, measured, start, friction)
     found = LinkState(robot, controller.state_bandwidth, period)
@@ -102,24 +103,18 @@ def _add_torque_observer(
     return total.GetOutputPort("sum"), observer.GetInputPort("drive_torque")
 
 
-def _wanted(source: str) -> str:
-    return f"{' or '.join(_NEEDED[source])} where controller.state is {source}"
-
-
-def _add_torque_sensor(
+def _measured_torque(
     builder: DiagramBuilder,
-    robot: RobotModel,
+    part: RobotPart,
     encoders: EncoderOptions,
     period: float,
     true_state: OutputPort,
 ) -> OutputPort:
-    block = JointTorqueSensor(robot, encoders.torque)
-    sensor = builder.AddNamedSystem("joint_torque_sensor", BlockSystem(block, period))
-    builder.Connect(true_state, sensor.GetInputPort("joint_state"))
-    if encoders.torque.noise > 0.0:
-        effort = robot.gather("effort_limit")
-        deviation = encoders.torque.noise * np.where(robot.elastic_joints, effort, 0.0)
-        noise = SensorNoise(deviation, encoders.torque.seed, period)
-        builder.AddNamedSystem("joint_torque_noise", noise)
-        builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
-    return sensor.GetOutputPort("joint_torque")
+    """Return what torque sensors in the joints tell, shape (N,)."""
+    if isinstance(part, RemoteArm):
+        return part.torque.get_output_port()
+    return add_torque_sensor(builder, part.robot, encoders, period, true_state)
+
+
+def _wanted(source: str) -> str:
+    return f"{' or '.join(_NEEDED[source])} where controller.state is {source}"

@@ -20,11 +20,13 @@ class RemoteArm(Arm):
 
     Attributes:
         measured: What it measures of its joints, ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+        torque: What it measures of the torques in its joints, shape (N,) [Nm or N].
         stop_request: Nonzero from when on the controller is to stop it, shape (1,).
         wrench: What its force sensor measures, the sensor's axes, shape (6,) [N, Nm].
     """
 
     measured: ConstantVectorSource
+    torque: ConstantVectorSource
     stop_request: ConstantVectorSource
     wrench: ConstantVectorSource | None = None
 
@@ -48,16 +50,19 @@ class RemoteArm(Arm):
 
     def place(self, context: Context, state: np.ndarray) -> None:
         """Let the robot have measured a state of its model, ``[q, v]``."""
-        self.tell(context, self.coordinates.rows @ state)
+        self.measured.get_mutable_source_value(context).SetFromVector(self.coordinates.rows @ state)
 
-    def tell(self, context: Context, joint_state: np.ndarray) -> None:
+    def tell(self, root: Context, joint_state: np.ndarray, torque: np.ndarray) -> None:
         """Let the robot have measured its joints.
 
         Args:
-            context: Context of :attr:`measured`.
+            root: Context of the diagram.
             joint_state: ``[q_J, v_J, q_M, v_M]``, shape (4N,).
+            torque: Torques in the joints, the weight among them, shape (N,) [Nm or N].
         """
-        self.measured.get_mutable_source_value(context).SetFromVector(joint_state)
+        for source, values in ((self.measured, joint_state), (self.torque, torque)):
+            context = source.GetMyMutableContextFromRoot(root)
+            source.get_mutable_source_value(context).SetFromVector(values)
 
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """Return where its force/torque sensor sits, with what that measures as it came."""
@@ -86,6 +91,6 @@ def add_remote_arm(builder: DiagramBuilder, source: BeliefSource, *, has_sensor:
         return builder.AddNamedSystem(name, ConstantVectorSource(np.zeros(size)))
 
     measured = constant("robot", 4 * true.chain.dimension)
-    stop = constant("stop_request", 1)
+    torque, stop = constant("joint_torques", true.chain.dimension), constant("stop_request", 1)
     wrench = constant("force_torque_sensor", 6) if has_sensor else None
-    return RemoteArm(true, *believe_arm(true, source), measured, stop, wrench)
+    return RemoteArm(true, *believe_arm(true, source), measured, torque, stop, wrench)

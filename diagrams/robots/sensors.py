@@ -1,5 +1,6 @@
 """What a controller measures: joints by encoders, forces at the flange."""
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart, SensorMount
@@ -14,6 +15,7 @@ from pfsc_drake.physics.force_torque_sensor import (
     SensorFailure,
 )
 from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
@@ -81,6 +83,34 @@ def states_to_log(joint_state: OutputPort, measured: OutputPort) -> dict[str, Ou
     if measured is joint_state:
         return {"joint_state": measured}
     return {"joint_state": joint_state, "joint_state_measured": measured}
+
+
+def add_torque_sensor(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    encoders: EncoderOptions,
+    period: float,
+    true_state: OutputPort,
+) -> OutputPort:
+    """Add torque sensors in elastic joints, and return what they measure, shape (N,) [Nm or N].
+
+    Args:
+        builder: Builder of the diagram.
+        robot: The robot as it is.
+        encoders: What the sensors do.
+        period: Sampling time [s].
+        true_state: The true ``[q_J, v_J, q_M, v_M]``.
+    """
+    block = JointTorqueSensor(robot, encoders.torque)
+    sensor = builder.AddNamedSystem("joint_torque_sensor", BlockSystem(block, period))
+    builder.Connect(true_state, sensor.GetInputPort("joint_state"))
+    if encoders.torque.noise > 0.0:
+        effort = robot.gather("effort_limit")
+        deviation = encoders.torque.noise * np.where(robot.elastic_joints, effort, 0.0)
+        noise = SensorNoise(deviation, encoders.torque.seed, period)
+        builder.AddNamedSystem("joint_torque_noise", noise)
+        builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
+    return sensor.GetOutputPort("joint_torque")
 
 
 _MOST_TICKS = 10_000  # by which a force is late

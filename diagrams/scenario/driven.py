@@ -16,9 +16,9 @@ _OF_THE_PLANT = (
     "notch",
     "workpiece",
 )
-# laws that want no more of a joint than a driver tells, and bear the tick that a link costs
-_LAWS = ("rigid", "velocity_servo")
-_LATE = "laws for elastic joints do not bear the tick that a link costs"
+# laws that want no more of a joint than a driver tells
+_OF_ONE_SIDE = ("rigid", "velocity_servo")
+_ONE_SIDE = "from_torque or observed: a robot tells one side of its joints"
 _TRANSITION = 0.5  # s
 
 
@@ -39,8 +39,9 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
     for key in ("plate", "operator"):
         given = getattr(scenario, key) is not None
         require(not given, key, "given", "null where the robot stands elsewhere")
-    law = scenario.controller.law
-    require(law in _LAWS, "controller.law", law, f"{', '.join(_LAWS)}; {_LATE}")
+    controller = scenario.controller
+    finds_links = controller.law in _OF_ONE_SIDE or controller.state != "measured"
+    require(finds_links, "controller.state", controller.state, _ONE_SIDE)
     source = scenario.controller.external_torque.source
     allowed = "none, measured or observed; forces are known in simulation only"
     require(source != "known", "controller.external_torque.source", source, allowed)
@@ -62,6 +63,11 @@ def driven(scenario: Scenario) -> tuple[Scenario, list[str]]:
             f"faults.effort_share = {faults.effort_share:g}, faults.hold_bandwidth = "
             f"{faults.hold_bandwidth:g} rad/s: a robot's torques change no faster than its driver "
             "lets them"
+        )
+    if controller.law not in _OF_ONE_SIDE and controller.delay is None:
+        left.controller.delay = controller.sampling_time
+        said.append(
+            f"controller.delay = {controller.sampling_time:g} s: a link to a robot costs a tick"
         )
     if left.start.transition == 0.0 and left.controller.manifold != "space":
         left.start.transition = _TRANSITION

@@ -118,7 +118,7 @@ class Drive:
         self.mode = ControlMode.TORQUE if torques else ControlMode.VELOCITY
         self._simulator = Simulator(station.diagram)
         self._first: RobotStatus | None = None
-        self._last_state = np.zeros(4 * self._n)
+        self._last_state, self._last_torque = np.zeros(4 * self._n), np.zeros(self._n)
         self._sent: np.ndarray | None = None
         self._tick = 0
         self._stopping: str | None = None
@@ -149,7 +149,7 @@ class Drive:
         check_first(status, self.mode, self._station.start_posture)
         self._first = status
         self._station.set_start(self.root)
-        self._tell(self._state(status))
+        self._tell(self._state(status), status.torque)
         self._simulator.Initialize()
         return self._wanted()
 
@@ -170,7 +170,7 @@ class Drive:
         self._bridge(state, missed, status)
         if missed > self._options.bridged:
             self.stop(f"no status of the robot for {1e3 * missed * self.period:.0f} ms")
-        self._tell(state)
+        self._tell(state, status.torque)
         q = state[: self._n]
         self._q = np.where(np.isfinite(q), q, self._q)
         # the answer first, and what is to be remembered and logged afterwards
@@ -186,7 +186,7 @@ class Drive:
         self._sent = values
         self.root.SetTime(before)
         self._advance(_Tick(age, missed, clipped, int(status.robot_mode), values))
-        self._last_state = state
+        self._last_state, self._last_torque = state, status.torque
         self._look(status, state)
 
     def stop(self, why: str) -> None:
@@ -257,8 +257,8 @@ class Drive:
             )
         return np.where(np.tile(np.repeat([1, 0], n), 2) * np.tile(self._lost, 4), np.nan, state)
 
-    def _tell(self, state: np.ndarray) -> None:
-        self._part.tell(self._part.measured.GetMyMutableContextFromRoot(self.root), state)
+    def _tell(self, state: np.ndarray, torque: np.ndarray) -> None:
+        self._part.tell(self.root, state, torque)
         if self._part.wrench is not None and self._end.wrench is not None:
             context = self._part.wrench.GetMyMutableContextFromRoot(self.root)
             self._part.wrench.get_mutable_source_value(context).SetFromVector(self._end.wrench)
@@ -284,7 +284,10 @@ class Drive:
         """Let the controller see, tick by tick, what the robot may have done in between."""
         for k in range(1, missed + 1):
             share = k / (missed + 1)
-            self._tell((1.0 - share) * self._last_state + share * state)
+            self._tell(
+                (1.0 - share) * self._last_state + share * state,
+                (1.0 - share) * self._last_torque + share * status.torque,
+            )
             held = np.zeros(self._n) if self._sent is None else self._sent
             self._advance(_Tick(np.nan, 1, 0, int(status.robot_mode), held))
 

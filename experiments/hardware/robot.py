@@ -97,11 +97,9 @@ class SimulatedRobot:
 
     def status(self) -> RobotStatus:
         """Return what it tells of itself now: its motors' positions, and torques in its joints."""
-        state, robot = self.station.joint_state(self.root), self.station.part.robot
-        q_J, v_J, q_M, v_M = np.split(state, 4)
-        torque, elastic = self._torque.copy(), robot.elastic_joints
-        springs = robot.K_s[elastic] * (q_M - q_J)[elastic]
-        torque[elastic] = springs + robot.K_d[elastic] * (v_M - v_J)[elastic]
+        _, _, q_M, v_M = np.split(self.station.joint_state(self.root), 4)
+        springs = self.station.joint_torque(self.root)
+        torque = np.where(self.station.part.robot.elastic_joints, springs, self._torque)
         return RobotStatus(self.utime, q_M, v_M, torque, self.rules.robot_mode, self.station.mode)
 
     def tell(self) -> None:
