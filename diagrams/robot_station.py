@@ -1,6 +1,6 @@
 """A robot with its friction, sensors and surroundings, and nobody who controls it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 
@@ -159,7 +159,9 @@ def build_robot_station(scenario: Scenario, folder: FilePath) -> RobotStation:
         scenario.faults,
     )
     link_state = part.coordinates.link_rows @ initial_state
-    options = following_options(scenario)
+    # where its tool is, not where a controller expects it
+    seen = replace(scenario.controller, delay=None)
+    options = replace(following_options(scenario), controller=seen)
     following = Following(options, part.robot, task, law, link_state[:n])
     true_state = part.joint_state(builder)
     joint_state = add_joint_state(

@@ -187,8 +187,11 @@ def choose_poles(
             raise InputError(f"controller.gains.{law}: poles: auto needs a start of the robot")
 
         def tried(fast: float) -> LoopGains:
+            # an integral part is slower than the bandwidth that is to be kept
             chosen = {
-                kind: dc.replace(gains, poles=rule_of_poles(gains.bandwidth, fast, r))
+                kind: dc.replace(
+                    gains, poles=rule_of_poles(gains.bandwidth, fast, r), integral_pole=0.0
+                )
                 for kind, gains in automatic.items()
             }
             return loop_gains(dc.replace(by_kind, **chosen), law, linearization)

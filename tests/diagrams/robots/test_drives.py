@@ -12,6 +12,7 @@ from diagrams.scenario import ForcePulse, GainParameters, LawGains, Scenario
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import models_directory, resolve_model
 from pfsc_drake.robot.models.parameters import load_parameters
+from pfsc_drake.robot.robot_model import gravity_function
 
 KNOWN = load_parameters("comau_racer_1_4").friction
 TICK = 1e-3
@@ -121,6 +122,55 @@ def test_servos_keep_the_scaled_limits(settings, load_arm):
     station, _, signals = run(settings, 0.02)
     used = np.abs(signals["drive_torque"]) / station.robot.gather("effort_limit")
     assert used.max() == pytest.approx(scale, rel=1e-12)
+
+
+def test_torques_act_late_and_through_a_low_pass(settings):
+    """Until the first one comes, the drives hold the weight."""
+    settings.driver.delay, settings.driver.low_pass = 2 * TICK, 50.0
+    settings.controller.delay = 3 * TICK
+    station = build(settings)
+    simulator = Simulator(station.diagram)
+    root = simulator.get_mutable_context()
+    station.set_start(root)
+    weight = gravity_function(station.robot)(station.start_posture).full().ravel()
+    acting = []
+    for k in range(60):
+        simulator.AdvanceTo((k + 0.5) * TICK)
+        acting.append(station.blocks.output(root, "hold.held"))
+    _, signals = station.log.read(root)
+    told = signals["law"][:, station.law.layout.drive]
+    assert np.abs(np.diff(told[-20:], axis=0)).max() > 0.1
+    w = 2.0 * np.pi * 50.0 * TICK
+    passed = [told[0]]
+    for torque in told[1:]:
+        passed.append(passed[-1] + w / (1.0 + w) * (torque - passed[-1]))
+    np.testing.assert_allclose(acting[:2], [weight, weight], rtol=1e-9)
+    np.testing.assert_allclose(acting[2:], passed[:58], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("delay", 1.5 * TICK, "driver.delay = 0.0015; allowed: a multiple of the sampling time"),
+        ("delay", 2.0, "driver.delay = 2.0; allowed: .* at most 1,000 of it"),
+    ],
+)
+def test_delays_that_cannot_be(settings, key, value, said):
+    setattr(settings.driver, key, value)
+    with pytest.raises(InputError, match=said):
+        build(settings)
+
+
+def test_a_law_knows_of_ten_ticks_at_most(settings):
+    settings.controller.delay = 11 * TICK
+    with pytest.raises(InputError, match=r"controller.delay = 0.011; allowed: .* at most 10"):
+        build(settings)
+
+
+def test_servos_have_a_bus_instead(settings):
+    settings.controller.law, settings.driver.delay = "velocity_servo", TICK
+    with pytest.raises(InputError, match=r"driver = .*; allowed: none with the law 'velocity_s"):
+        build(settings)
 
 
 def test_a_bus_delays_by_its_time(settings):

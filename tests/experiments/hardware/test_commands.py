@@ -17,7 +17,10 @@ from experiments.cli import main
         ("robot vf_wedge --driver iiwa --lcm memq://", "driver iiwa: takes no VELOCITY"),
         ("drive pfc_panda_7r --driver ur5 --lcm memq://", "driver ur5: allowed: panda, iiwa"),
         ("drive pfc_panda_7r --override 3 --lcm memq://", "--override = 3.0; allowed: 0.01 to"),
-        ("drive pfc_elastic_6r --lcm memq://", "controller.law = elastic; allowed: rigid, vel"),
+        (
+            "drive pfc_elastic_6r --lcm memq://",
+            "controller.state = measured; allowed: from_t",
+        ),
     ],
 )
 def test_what_is_refused(words, said, capfd, tmp_path):

@@ -268,7 +268,40 @@ def test_forces_are_measured_by_the_robot_and_told():
     assert np.linalg.norm(log["wrench_measured"].values[-1, :3]) > 45.0
 
 
-def test_laws_for_elastic_joints_are_not_driven():
+def elastic(**controller):
+    """Six elastic joints whose motors and torques are measured."""
     settings = shipped_scenario("pfc_elastic_6r")
-    with pytest.raises(InputError, match="do not bear the tick that a link costs"):
-        driven(settings)
+    settings.reference.velocity, settings.start.transition = 0.5, 0.3
+    settings.encoders.sides, settings.controller.state = "motor_and_torque", "from_torque"
+    for name, value in controller.items():
+        setattr(settings.controller, name, value)
+    return settings
+
+
+def test_a_law_for_elastic_joints_needs_both_sides_of_them():
+    with pytest.raises(InputError, match=r"controller.state = measured; allowed: from_torque or"):
+        driven(elastic(state="measured"))
+
+
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_elastic_joints_whose_torques_act_late(ticks):
+    """The law knows of the delay, a tick of which is the link's; the other is the driver's."""
+    settings = elastic(delay=ticks * 1e-3 if ticks > 1 else None)
+    settings.driver.delay = ticks * 1e-3
+    loop = Loop(settings, delay=1).begin().run(1.2)
+    log = loop.log()
+    assert loop.fault is None
+    settled = log.time > 0.8
+    assert np.abs(log["xi"].values[settled]).max() < 1e-4
+    assert np.abs(log["eta_dot"].values[settled]).max() > 0.4
+    # the links' side as it was found, not the motors' again
+    bent = np.abs(log["q_M"].values - log["q_J"].values).max()
+    assert bent > 3e-4
+
+
+def test_a_delay_that_the_law_does_not_know_is_a_fault_that_ends_at_rest():
+    settings = elastic()
+    settings.driver.delay = 3e-3
+    loop = Loop(settings, delay=1).begin().run(2.0)
+    assert loop.fault is not None
+    assert loop.speed() < 0.05

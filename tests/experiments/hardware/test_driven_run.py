@@ -59,7 +59,7 @@ def test_overrides_out_of_range(override):
     [
         ("plate_mounting", "plate = given"),
         ("pfc_delta", "robot.model = .* an arm, where it stands elsewhere"),
-        ("pfc_elastic_6r", "do not bear the tick"),
+        ("pfc_elastic_6r", "controller.state = measured; allowed: from_torque"),
     ],
 )
 def test_what_is_not_driven(name, said):

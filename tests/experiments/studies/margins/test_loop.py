@@ -92,9 +92,23 @@ def differences(loop, section, chosen):
     return np.column_stack(columns)
 
 
-@pytest.mark.parametrize("name", ["pfc_elastic_3r", "pfc_delta"])
-def test_the_derivative_is_that_of_the_whole_station_in_motion(name):
-    loop = StationLoop(settings_of(name), folder())
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("pfc_elastic_3r", []),
+        ("pfc_delta", []),
+        (
+            "pfc_elastic_3r",
+            ["driver={delay: 0.002, low_pass: 100}", "controller.delay=0.002"],
+        ),
+        (
+            "pfc_elastic_3r",
+            ["encoders.sides=motor_and_torque", "controller.state=from_torque"],
+        ),
+    ],
+)
+def test_the_derivative_is_that_of_the_whole_station_in_motion(name, overrides):
+    loop = StationLoop(settings_of(name, *overrides), folder())
     simulator = Simulator(loop.station.diagram)
     loop.configure(simulator)
     root = simulator.get_mutable_context()
@@ -109,7 +123,9 @@ def test_the_derivative_is_that_of_the_whole_station_in_motion(name):
     np.testing.assert_allclose(A / scale, expected / scale, atol=2e-5)
     found, rates = modes(A, loop.map.period).rate, modes(expected, loop.map.period).rate
     slow = rates > -400.0
-    np.testing.assert_allclose(found[: slow.sum()], rates[slow], rtol=1e-3, atol=1e-3)
+    # poles that are close together part at the least difference: compare what they are together
+    np.testing.assert_allclose(found[: slow.sum()], rates[slow], rtol=5e-3, atol=1e-3)
+    assert np.mean(found[: slow.sum()]) == pytest.approx(np.mean(rates[slow]), rel=1e-3)
 
 
 CASES = [
@@ -119,6 +135,8 @@ CASES = [
     ("pfc_viscoelastic_3r", []),
     # bodies get their drives' forces a step late
     ("pfc_delta", ["encoders.difference_quotient=false", "robot.plant=analytic"]),
+    ("pfc_elastic_3r", ["driver.delay=0.002", "controller.delay=0.002"]),
+    ("pfc_elastic_3r", ["driver.delay=0.003", "controller.delay=0.003", "controller.law=rigid"]),
 ]
 
 
@@ -132,7 +150,8 @@ def test_the_loop_at_rest_is_that_of_the_whole_station(name, overrides):
     linear = linearize(loop, section, loop.variables_in_loop([section]))
     station, period = loop.station, loop.map.period
     rest = RestPosture(station.start_posture, station.task.point(station.task.start(np.zeros(3))))
-    at_start = LoopAtRest(station.part.belief.robot, station.law.linearization, rest, period)
+    robot, ticks = station.part.belief.robot, wrong.driver.ticks(period)
+    at_start = LoopAtRest(robot, station.law.linearization, rest, period, ticks=ticks)
     expected = modes(linear.A, period)
     found = modes(at_start.closed(station.law.gains, mass=1.0 / factor), period)
     slow = np.sum(expected.rate > -400.0)
