@@ -143,7 +143,8 @@ def build_station(
         start_posture,
         friction,
     )
-    place = add_place(builder, following, joint_state)
+    override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
+    place = add_place(builder, following, joint_state, override)
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
     around = place.signals | {"joint_state": true_state, "manifold_point": beside}

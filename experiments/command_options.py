@@ -1,12 +1,15 @@
 """Arguments and options that several commands take, and how their text is read."""
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.schema_check import is_number
+
+if TYPE_CHECKING:
+    from pydrake.lcm import DrakeLcm
 
 # studies that run by their names, as a scenario does
 IDENTIFICATION, TEACH_IN = "identify_comau", "teach_in"
@@ -30,6 +33,18 @@ Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figu
 
 Recording = Annotated[bool, typer.Option("--recording/--no-recording", help="Record the motion.")]
 
+Lcm = Annotated[
+    str,
+    typer.Option(
+        "--lcm", metavar="URL", help="LCM bus. Default: LCM_DEFAULT_URL, or LCM's own default"
+    ),
+]
+Driver = Annotated[
+    str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
+]
+
+_BUSES = ("udpm", "tcpq", "memq")
+
 
 def read_duration(text: str) -> float:
     """Return the value of ``--duration`` [s].
@@ -44,3 +59,21 @@ def read_duration(text: str) -> float:
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"--duration {shortened(text)}: allowed: a positive number of seconds")
     return seconds
+
+
+def open_bus(url: str) -> "DrakeLcm":
+    """Return the LCM bus of ``--lcm``.
+
+    Args:
+        url: As it was written; empty for LCM's default.
+
+    Raises:
+        InputError: If there is no such kind of bus.
+    """
+    from pydrake.lcm import DrakeLcm
+
+    # LCM itself would go on without a bus
+    if url and url.partition("://")[0] not in _BUSES:
+        allowed = ", ".join(f"{bus}://..." for bus in _BUSES)
+        raise InputError(f"--lcm {url}: no such bus; allowed: {allowed}")
+    return DrakeLcm(url)

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,35 +12,24 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.command_options import (
+    Driver,
     Duration,
     Figures,
+    Lcm,
     Overrides,
     Recording,
     ScenarioName,
+    open_bus,
     read_duration,
 )
 from experiments.outcomes import judge_run, print_run
 from experiments.scenario_file import expand_home, read_scenario
-from pfsc_drake.errors import InputError
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible
 
 if TYPE_CHECKING:
-    from pydrake.lcm import DrakeLcm
-
     from experiments.hardware.check import RestCheck
     from experiments.hardware.driven_run import FirstCommand
-
-Lcm = Annotated[
-    str,
-    typer.Option(
-        "--lcm", metavar="URL", help="LCM bus. Default: LCM_DEFAULT_URL, or LCM's own default"
-    ),
-]
-Driver = Annotated[
-    str, typer.Option(help="Whose messages: panda (drake-franka-driver) or iiwa (torques alone).")
-]
-_BUSES = ("udpm", "tcpq", "memq")
 
 
 def robot_command(
@@ -90,7 +80,7 @@ def robot_command(
             low_pass = own or DriverOptions.low_pass
         options = DriverOptions(messages.expiry if expire is None else expire, low_pass)
         transport = Transport(lose, delay)
-        end = RobotEnd(_open(lcm), messages)
+        end = RobotEnd(open_bus(lcm), messages)
         console = Console()
         run_robot_scenario(
             loaded,
@@ -120,7 +110,7 @@ def drive_command(
     ] = False,
     override: Annotated[
         float,
-        typer.Option(metavar="SHARE", help="Of the reference's speed, 0.01 to 1.5: slower first."),
+        typer.Option(metavar="SHARE", help="Of the reference's speed at first, 0.01 to 1.5."),
     ] = 1.0,
     overrides: Overrides = None,
     duration: Duration = None,
@@ -129,6 +119,7 @@ def drive_command(
 ) -> None:
     """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
     from experiments.hardware.driven_run import check_scenario, drive_scenario
+    from experiments.hardware.keys import KEYS, DriveKeys, pressed_keys
     from pfsc_drake.drivers.link import ControllerEnd
     from pfsc_drake.drivers.messages import dialect
 
@@ -137,14 +128,20 @@ def drive_command(
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_driven"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        end = ControllerEnd(_open(lcm), dialect(driver))
+        end = ControllerEnd(open_bus(lcm), dialect(driver))
         console = Console()
         if check:
             with ProgressDisplay(console, loaded.name, None) as progress:
                 found = check_scenario(loaded, end, progress)
             _print_check(console, found)
             raise typer.Exit(0 if found.is_good else FAULT)
-        with ProgressDisplay(console, loaded.name, seconds) as progress:
+        keys = DriveKeys()
+        with (
+            pressed_keys() as pressed,
+            ProgressDisplay(console, loaded.name, seconds) as progress,
+        ):
+            if sys.stdin.isatty():
+                console.print(KEYS, style="dim")
             outcome = drive_scenario(
                 loaded,
                 end,
@@ -154,22 +151,13 @@ def drive_command(
                 recording=recording,
                 progress=progress,
                 override=override,
+                asked=lambda share: keys.requests(pressed(), share),
                 dry_run=(lambda first: _print_first(console, first)) if dry_run else None,
             )
         if outcome is None:
             raise typer.Exit(0)
         print_run(console, outcome)
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
-
-
-def _open(url: str) -> "DrakeLcm":
-    from pydrake.lcm import DrakeLcm
-
-    # LCM itself would go on without a bus
-    if url and url.partition("://")[0] not in _BUSES:
-        allowed = ", ".join(f"{bus}://..." for bus in _BUSES)
-        raise InputError(f"--lcm {url}: no such bus; allowed: {allowed}")
-    return DrakeLcm(url)
 
 
 def _print_check(console: Console, found: "RestCheck") -> None:

@@ -15,11 +15,14 @@ from rich.table import Table
 from experiments.command_options import (
     IDENTIFICATION,
     TEACH_IN,
+    Driver,
     Duration,
     Figures,
+    Lcm,
     Overrides,
     Recording,
     ScenarioName,
+    open_bus,
     read_duration,
 )
 from experiments.outcomes import (
@@ -128,6 +131,12 @@ def live_command(
     port: Annotated[
         int, typer.Option(help="Of the page, on this machine alone; 0 for any that is free.")
     ] = 0,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Watch a robot that `drive` drives: pause, speed, stop."),
+    ] = False,
+    lcm: Lcm = "",
+    driver: Driver = "panda",
     duration: Annotated[
         str | None,
         typer.Option(
@@ -152,6 +161,13 @@ def live_command(
             text = f"{loaded.name}: {line}"
             console.print(text, highlight=False, markup=False, soft_wrap=True)
 
+        if watch:
+            from experiments.live.watch import run_watch
+            from pfsc_drake.drivers.link import WatchingEnd
+            from pfsc_drake.drivers.messages import dialect
+
+            run_watch(loaded, WatchingEnd(open_bus(lcm), dialect(driver)), port=port, tell=tell)
+            return
         outcome = run_live(
             loaded,
             out=folder,

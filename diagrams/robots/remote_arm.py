@@ -22,12 +22,14 @@ class RemoteArm(Arm):
         measured: What it measures of its joints, ``[q_J, v_J, q_M, v_M]``, shape (4N,).
         torque: What it measures of the torques in its joints, shape (N,) [Nm or N].
         stop_request: Nonzero from when on the controller is to stop it, shape (1,).
+        override: Share of its planned pace at which the reference moves, shape (1,).
         wrench: What its force sensor measures, the sensor's axes, shape (6,) [N, Nm].
     """
 
     measured: ConstantVectorSource
     torque: ConstantVectorSource
     stop_request: ConstantVectorSource
+    override: ConstantVectorSource
     wrench: ConstantVectorSource | None = None
 
     @property
@@ -64,6 +66,25 @@ class RemoteArm(Arm):
             context = source.GetMyMutableContextFromRoot(root)
             source.get_mutable_source_value(context).SetFromVector(values)
 
+    def set_override(self, root: Context, share: float) -> None:
+        """Let the reference move at another pace.
+
+        Args:
+            root: Context of the diagram.
+            share: Of the planned pace, 0 to 1.5; 0 is a pause.
+        """
+        context = self.override.GetMyMutableContextFromRoot(root)
+        self.override.get_mutable_source_value(context).SetAtIndex(0, share)
+
+    def request_stop(self, root: Context) -> None:
+        """Let the controller bring the robot to rest.
+
+        Args:
+            root: Context of the diagram.
+        """
+        context = self.stop_request.GetMyMutableContextFromRoot(root)
+        self.stop_request.get_mutable_source_value(context).SetAtIndex(0, 1.0)
+
     def sensor_mount(self, builder: DiagramBuilder, joint: str, ports: Ports) -> SensorMount:
         """Return where its force/torque sensor sits, with what that measures as it came."""
         assert self.wrench is not None
@@ -92,5 +113,6 @@ def add_remote_arm(builder: DiagramBuilder, source: BeliefSource, *, has_sensor:
 
     measured = constant("robot", 4 * true.chain.dimension)
     torque, stop = constant("joint_torques", true.chain.dimension), constant("stop_request", 1)
+    override = builder.AddNamedSystem("override", ConstantVectorSource(np.ones(1)))
     wrench = constant("force_torque_sensor", 6) if has_sensor else None
-    return RemoteArm(true, *believe_arm(true, source), measured, torque, stop, wrench)
+    return RemoteArm(true, *believe_arm(true, source), measured, torque, stop, override, wrench)

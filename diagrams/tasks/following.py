@@ -101,7 +101,10 @@ class ToolOnManifold:
 
 
 def add_place(
-    builder: DiagramBuilder, following: Following, joint_state: OutputPort
+    builder: DiagramBuilder,
+    following: Following,
+    joint_state: OutputPort,
+    override: OutputPort | None = None,
 ) -> ToolOnManifold:
     """Add what finds the tool's place on the manifold.
 
@@ -109,6 +112,7 @@ def add_place(
         builder: Builder of the diagram.
         following: What the robot is to do.
         joint_state: ``[q_J, v_J, q_M, v_M]`` as measured.
+        override: Share of its planned pace at which the reference moves, if that may change.
 
     Raises:
         InputError: If compliance and law do not go together.
@@ -128,6 +132,8 @@ def add_place(
         order = reference_order(options.compliance, linearization)
         timed = TimedReference(task.motion, order, linearization.num_outputs, period)
         generator = builder.AddNamedSystem("reference_generator", BlockSystem(timed, period))
+        if override is not None:
+            builder.Connect(override, generator.GetInputPort("override"))
         desired = _swung(builder, following, generator.GetOutputPort("reference"), order)
     builder.Connect(joint_state, kinematics.GetInputPort("joint_state"))
     place = task.add_place(builder, tool_pose, desired, period)

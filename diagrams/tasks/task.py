@@ -43,6 +43,10 @@ class ManifoldProjector:
     manifold_point: OutputPort
 
 
+# of what drives can do, the largest share that a faster motion may ask for
+_USED = 0.95
+
+
 @dataclass(frozen=True)
 class DrivePlan:
     """What a reference asks of the drives, as it is believed.
@@ -64,6 +68,23 @@ class DrivePlan:
     pace: np.ndarray
     motion: PiecewisePolynomialCurve
     said: list[str]
+
+    def fastest_pace(self, relative_degree: int) -> float:
+        """Return how many times as fast the motion may be made, at least 1.
+
+        Speeds grow with the pace, torques with its square at most, those of elastic joints with its
+        power r.
+
+        Args:
+            relative_degree: r of the law.
+        """
+        if not len(self.demand):
+            return 1.0
+        most = np.abs(self.demand).max(axis=0)
+        room = np.where(most > 0.0, _USED * self.limits / np.maximum(most, 1e-12), np.inf)
+        torques, speeds = np.split(room, 2)
+        power = 1.0 / max(relative_degree, 2)
+        return float(max(1.0, min((torques**power).min(), speeds.min())))
 
     @property
     def waiting_time(self) -> float:

@@ -1,8 +1,7 @@
 """A controller that drives a robot by messages: one tick for each status that comes."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -10,21 +9,26 @@ from pydrake.systems.framework import Context
 
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
+from diagrams.tasks.space_guidance import SpaceTask
 from experiments.hardware.check import AT_REST, check_first
-from experiments.results.run_log import RunLog
+from experiments.hardware.drive_record import DrivenTick, DriveRecord
 from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_positive
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
+from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
 # after which a robot that is to stop is left alone, and how long it rests before [s]
 _LONGEST_STOP, _RESTED = 2.0, 0.2
 _FAULT = "a fault"
+# a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
+_FASTER, _LEAST_SPEED = 1.5, 0.2
 # beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
 _TWICE, _FASTEST, _LEAST_JUMP = 2.0, 10.0, 2e-3
+_PACE, _SECOND = "reference_generator.pace", 1000
 
 
 @dataclass(frozen=True)
@@ -49,44 +53,6 @@ class DriveOptions:
         require_positive("effort_share", self.effort_share)
 
 
-@dataclass
-class _Tick:
-    """What is noted of one tick beside the station's own log."""
-
-    age: float
-    missed: int
-    clipped: int
-    robot_mode: int
-    sent: np.ndarray
-
-
-@dataclass
-class DriveRecord:
-    """What happened on the link.
-
-    Attributes:
-        ticks: What is noted of each tick of the controller.
-    """
-
-    ticks: list[_Tick] = field(default_factory=list)
-
-    def add_to(self, log: RunLog) -> None:
-        """Add what was noted to the log of a run.
-
-        Args:
-            log: The log.
-        """
-        noted = self.ticks[: len(log.time)]
-        if len(noted) < len(log.time):
-            noted = noted + [noted[-1]] * (len(log.time) - len(noted))
-        modes = [mode.name.lower() for mode in RobotMode]
-        log.add("status_age", [1e6 * tick.age for tick in noted])
-        log.add("missed", [tick.missed for tick in noted])
-        log.add("clipped", [tick.clipped for tick in noted])
-        log.add("sent", [tick.sent for tick in noted])
-        log.add("robot_mode", [tick.robot_mode for tick in noted], labels=modes)
-
-
 class Drive:
     """A station's controller, advanced by what a robot tells.
 
@@ -94,14 +60,23 @@ class Drive:
         station: A station whose robot stands elsewhere.
         end: The link.
         options: What it allows itself.
+        override: Share of its planned pace at which the reference moves at first.
 
     Attributes:
         period: Sampling time [s].
         record: What happened.
         fault: Why it ended, or None.
+        override: Share of its planned pace at which the reference is to move.
+        motion_time: How far it is in the time of the motion as planned [s].
     """
 
-    def __init__(self, station: Station, end: ControllerEnd, options: DriveOptions) -> None:
+    def __init__(
+        self,
+        station: Station,
+        end: ControllerEnd,
+        options: DriveOptions,
+        override: float = 1.0,
+    ) -> None:
         assert isinstance(station.part, RemoteArm)
         self._station, self._part, self._end, self._options = station, station.part, end, options
         robot = station.part.belief.robot
@@ -122,10 +97,17 @@ class Drive:
         self._sent: np.ndarray | None = None
         self._tick = 0
         self._stopping: str | None = None
-        self._stop_time = 0.0
+        self._stop_time, self._stop_speed = 0.0, np.inf
         self._resting = 0
         self.record = DriveRecord()
         self.fault: str | None = None
+        self._fastest_pace, plan = LARGEST_OVERRIDE, station.task.drive_plan
+        if plan is not None:
+            r = station.law.linearization.relative_degree
+            self._fastest_pace = min(LARGEST_OVERRIDE, plan.fastest_pace(r))
+        self.override, self.motion_time = min(override, self._fastest_pace), 0.0
+        # a tool that is led by hand has no motion of its own
+        self._has_motion = not isinstance(station.task, SpaceTask)
 
     @property
     def root(self) -> Context:
@@ -150,6 +132,7 @@ class Drive:
         self._first = status
         self._station.set_start(self.root)
         self._tell(self._state(status), status.torque)
+        self._part.set_override(self.root, self.override)
         self._simulator.Initialize()
         return self._wanted()
 
@@ -180,14 +163,47 @@ class Drive:
         values, clipped = self._within_limits(wanted)
         faulty = self._station.controller.fault(self._station.blocks, self.root)
         if faulty and self._stopping is None:
-            self._stopping, self._stop_time = _FAULT, self.time
+            self._begin_stop(_FAULT)
         self._end.send(RobotCommand(status.utime, self.mode, values))
         age = time.perf_counter() - received
         self._sent = values
         self.root.SetTime(before)
-        self._advance(_Tick(age, missed, clipped, int(status.robot_mode), values))
+        self._advance(
+            DrivenTick(age, missed, clipped, int(status.robot_mode), values, self.override)
+        )
         self._last_state, self._last_torque = state, status.torque
         self._look(status, state)
+
+    def heed(self, request: Request) -> None:
+        """Do what somebody asks for, from the next tick on.
+
+        Args:
+            request: What.
+        """
+        if request.override is not None:
+            self.override = min(request.override, self._fastest_pace)
+            self._part.set_override(self.root, self.override)
+        if request.stop:
+            self.stop("asked to stop")
+
+    def progress(self) -> dict[str, float]:
+        """Return how far it is and how well it goes, numbers by name for who watches."""
+        last = self.record.ticks[-1]
+        layout, law = self._station.law.layout, self._station.law.linearization
+        names = [coordinate.name for coordinate in law.manifold.coordinates]
+        row = self._station.log.now(self._station.blocks, self.root)["law"]
+        values = row[layout.manifold_state][: len(names)].tolist()
+        return {
+            "time": self.time,
+            "motion_time": self.motion_time,
+            "override": self.override,
+            "stopping": float(self._stopping is not None),
+            "ended": float(self.has_ended),
+            "missed": float(sum(tick.missed for tick in self.record.ticks[-_SECOND:])),
+            "clipped": float(last.clipped),
+            "status_age": last.age,
+            **dict(zip(names, values, strict=True)),
+        }
 
     def stop(self, why: str) -> None:
         """Let the controller bring the robot to rest, and end then.
@@ -196,9 +212,13 @@ class Drive:
             why: What is said of it.
         """
         if self._stopping is None:
-            self._stopping, self._stop_time = why, self.time
-            context = self._part.stop_request.GetMyMutableContextFromRoot(self.root)
-            self._part.stop_request.get_mutable_source_value(context).SetAtIndex(0, 1.0)
+            self._begin_stop(why)
+            self._part.request_stop(self.root)
+
+    def _begin_stop(self, why: str) -> None:
+        n = self._n
+        self._stopping, self._stop_time = why, self.time
+        self._stop_speed = _FASTER * np.nanmax(np.abs(self._last_state[n : 2 * n])) + _LEAST_SPEED
 
     @property
     def has_ended(self) -> bool:
@@ -289,54 +309,28 @@ class Drive:
                 (1.0 - share) * self._last_torque + share * status.torque,
             )
             held = np.zeros(self._n) if self._sent is None else self._sent
-            self._advance(_Tick(np.nan, 1, 0, int(status.robot_mode), held))
+            self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held, self.override))
 
-    def _advance(self, tick: _Tick) -> None:
+    def _advance(self, tick: DrivenTick) -> None:
         self.record.ticks.append(tick)
         # beyond the tick, so that it is logged with what was measured at it
         self._simulator.AdvanceTo((self._tick + 0.5) * self.period)
         self._tick += 1
+        self.motion_time += self.period * self._pace()
+
+    def _pace(self) -> float:
+        """Return the pace of the reference, as its filter has it."""
+        if not self._has_motion:
+            return 1.0
+        return float(self._station.blocks.state(self.root, _PACE)[1])
 
     def _look(self, status: RobotStatus, state: np.ndarray) -> None:
         """End where the robot does not do any more what it is told."""
         if status.robot_mode is not RobotMode.MOVE:
             self.lose(f"the robot went into mode {status.robot_mode.name}")
-        moving = np.abs(state[self._n : 2 * self._n]).max() > AT_REST
-        self._resting = 0 if moving else self._resting + 1
-
-
-def run_drive(
-    drive: Drive,
-    end: ControllerEnd,
-    options: DriveOptions,
-    duration: float,
-    interrupted: Callable[[], bool],
-    progress: Callable[[float, str], None],
-) -> SimulationResult:
-    """Drive a robot until the end, a fault, or an interruption, after each of which it rests.
-
-    Args:
-        drive: The controller, whose first status has been checked.
-        end: The link.
-        options: What it allows itself.
-        duration: How long [s].
-        interrupted: Whether to stop.
-        progress: Told how far it is.
-    """
-    end.receive(0.0)  # what came while nobody listened
-    begin, last = time.perf_counter(), 0.0
-    status = end.receive(options.silence)
-    if status is not None:
-        drive.begin(status)
-    while drive.time < duration + 0.5 * drive.period and not drive.has_ended:
-        if interrupted():
-            drive.stop("interrupted")
-        if status is None:
-            drive.lose(f"no status of the robot for {1e3 * options.silence:.0f} ms")
-            break
-        drive.answer(status)
-        if drive.time - last > 0.2:
-            last = drive.time
-            progress(drive.time, "driving")
-        status = end.receive(options.silence)
-    return drive.result(time.perf_counter() - begin)
+        speed = np.abs(state[self._n : 2 * self._n]).max()
+        if speed > self._stop_speed:
+            why = self._stopping if self._stopping != _FAULT else self.result(1.0).fault
+            self.lose(f"{why}; the stop made the robot faster, and was left to its driver")
+            self._end.send(RobotCommand(status.utime, self.mode, np.zeros(self._n)))
+        self._resting = 0 if speed > AT_REST else self._resting + 1

@@ -1,6 +1,7 @@
 """From a scenario to a robot that is driven by it, and to the page of the run."""
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -15,12 +16,14 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.driven import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import RestCheck, check_at_rest, listen
-from experiments.hardware.drive import Drive, DriveOptions, run_drive
+from experiments.hardware.drive import Drive, DriveOptions
 from experiments.preparation import PreparedRun, naming, settle
 from experiments.scenario_file import ScenarioFile
+from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import check_mode
 from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.yaml.reading import resolve_files
@@ -31,7 +34,9 @@ from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
 _PRIORITY = 50
-_LEAST_OVERRIDE, _LARGEST_OVERRIDE = 0.01, 1.5
+_LEAST_OVERRIDE = 0.01
+# how often who watches is told [s]
+_TOLD = 0.05
 _MEASURED = "all signals, those of the tool and the path too, follow from what the robot measured"
 
 
@@ -54,7 +59,6 @@ def prepare_driven(
     *,
     recording: bool,
     progress: ProgressListener,
-    override: float = 1.0,
 ) -> PreparedRun:
     """Build a scenario's controller for a robot that stands elsewhere.
 
@@ -63,23 +67,14 @@ def prepare_driven(
         duration: How long it drives [s], instead of the scenario's time.
         recording: Whether the motion will be recorded.
         progress: Told what goes on.
-        override: Share of its speed that the reference has: the same motion, slower.
 
     Raises:
         InputError: If the scenario is wrong, or is nothing for a robot elsewhere.
     """
-    require_between("--override", override, _LEAST_OVERRIDE, _LARGEST_OVERRIDE, "")
     given = load_typed(Scenario, scenario.data, str(scenario.path))
     folder = scenario.path.parent
     with naming(scenario.path):
         settings, said = driven(given)
-        if override != 1.0:
-            settings.reference.velocity *= override
-            settings.reference.acceleration *= override**2
-            if settings.reference.second is not None:
-                settings.reference.second.velocity *= override
-                settings.reference.second.acceleration *= override**2
-            said.append(f"the reference has {override:.0%} of its speed")
         progress(0.0, "building the controller")
         station = build_station(settings, folder, remote=True)
         settle(settings, scenario.name, station, duration, recording=recording)
@@ -125,6 +120,7 @@ def drive_scenario(
     progress: ProgressListener,
     dry_run: Callable[[FirstCommand], None] | None = None,
     override: float = 1.0,
+    asked: Callable[[float], list[Request]] = lambda _: [],
 ) -> RunOutcome | None:
     """Drive a robot by a scenario, and write everything that a run leaves into a folder.
 
@@ -137,7 +133,8 @@ def drive_scenario(
         recording: Whether to record the motion.
         progress: Told how far it is.
         dry_run: Told the first command in place of the robot; nothing is sent or written then.
-        override: Share of its speed that the reference has.
+        override: Share of its planned pace at which the reference moves at first.
+        asked: Returns what a person has asked for since the last time, given the override.
 
     Returns:
         What the run left; None of a dry run.
@@ -145,15 +142,18 @@ def drive_scenario(
     Raises:
         InputError: If the scenario or the robot is wrong; nothing has been sent then.
     """
+    require_between("--override", override, _LEAST_OVERRIDE, LARGEST_OVERRIDE, "")
     progress(0.0, "preparing")
     inputs = scenario.inputs()
     if dry_run is None:
         check_folder(out, "run", inputs)
-    prepared = prepare_driven(
-        scenario, duration, recording=recording, progress=progress, override=override
-    )
+    prepared = prepare_driven(scenario, duration, recording=recording, progress=progress)
     station, options = prepared.station, DriveOptions()
-    drive = Drive(station, end, options)
+    drive = Drive(station, end, options, override)
+    if drive.override != override:
+        prepared.warnings.append(
+            f"the override is {drive.override:.0%}, not {override:.0%}: the drives can do no more"
+        )
     check_mode(drive.mode, end.dialect.modes, end.dialect.name)
     progress(0.0, "waiting for the robot")
     status = end.receive(_FIRST_STATUS)
@@ -171,7 +171,7 @@ def drive_scenario(
         progress.expect(prepared.settings.duration)
         with steady_clock(), real_time_priority():
             result = run_drive(
-                drive, end, options, prepared.settings.duration, interrupted, progress
+                drive, end, options, prepared.settings.duration, interrupted, progress, asked
             )
         attributes = {"driven": f"over LCM, {end.dialect.name}"}
         run = FinishedRun(
@@ -185,6 +185,49 @@ def drive_scenario(
         return write_outcome(
             run, results, progress, interrupted, figures=figures, recording=recording
         )
+
+
+def run_drive(
+    drive: Drive,
+    end: ControllerEnd,
+    options: DriveOptions,
+    duration: float,
+    interrupted: Callable[[], bool],
+    progress: Callable[[float, str], None],
+    asked: Callable[[float], list[Request]] = lambda _: [],
+) -> SimulationResult:
+    """Drive a robot until the end, a fault, or an interruption, after each of which it rests.
+
+    Args:
+        drive: The controller, whose first status has been checked.
+        end: The link.
+        options: What it allows itself.
+        duration: How long, in the time of the motion as planned [s]: a pause makes it longer.
+        interrupted: Whether to stop.
+        progress: Told how far it is.
+        asked: Returns what a person has asked for since the last time, given the override.
+    """
+    end.receive(0.0)  # what came while nobody listened
+    begin, last = time.perf_counter(), 0.0
+    status = end.receive(options.silence)
+    if status is not None:
+        drive.begin(status)
+    while drive.motion_time < duration + 0.5 * drive.period and not drive.has_ended:
+        for request in [*end.requests(), *asked(drive.override)]:
+            drive.heed(request)
+        if interrupted():
+            drive.stop("interrupted")
+        if status is None:
+            drive.lose(f"no status of the robot for {1e3 * options.silence:.0f} ms")
+            break
+        drive.answer(status)
+        if drive.time - last > _TOLD:
+            last = drive.time
+            end.tell(status.utime, drive.progress())
+            progress(drive.motion_time, f"driving at {drive.override:.0%}")
+        status = end.receive(options.silence)
+    end.tell(0, drive.progress() | {"ended": 1.0})
+    return drive.result(time.perf_counter() - begin)
 
 
 @contextmanager

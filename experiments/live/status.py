@@ -33,7 +33,8 @@ class LiveStatus:
     Attributes:
         scenario: Its name.
         scene: Where it is drawn.
-        phase: ``running``, ``fault``, ``saving``, ``ended``.
+        phase: ``running``, ``fault``, ``saving``, ``ended``; of a robot that is watched
+            ``driving``, ``paused``, ``stopping``, ``ended``, ``no controller``.
         time: Simulated time [s].
         factor: Simulated over real time.
         mode: Which mode the law is in, if it has several.
@@ -51,6 +52,7 @@ class LiveStatus:
         recording: Since when a recording runs [s], or null.
         kept: What was kept so far, by name of its folder.
         message: What else there is to say: why it stopped, or what comes next.
+        override: Of a robot that is watched: share of the planned pace; else null.
         controls: What can be set and how it is, see :class:`Panel`.
     """
 
@@ -73,6 +75,7 @@ class LiveStatus:
     recording: float | None = None
     kept: list[str] = field(default_factory=list)
     message: str = ""
+    override: float | None = None
     controls: dict[str, object] = field(default_factory=dict)
 
     @property

@@ -1,6 +1,9 @@
 """Both ends of the link between a robot and its controller."""
 
+import math
+import struct
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 
 import numpy as np
@@ -14,11 +17,18 @@ from pfsc_drake.drivers.messages import (
     decode_wrench,
     encode_wrench,
 )
+from pfsc_drake.drivers.remote_values import (
+    PROGRESS_CHANNEL,
+    REQUEST_CHANNEL,
+    Request,
+    decode_values,
+    encode_values,
+)
 
 # a queue hands over some of what has come; more rounds are made while there is more
 _MOST_ROUNDS = 100
 # what decoding something else raises; it is as good as lost
-_UNREADABLE = (ValueError, AttributeError, IndexError)
+_UNREADABLE = (ValueError, AttributeError, IndexError, struct.error)
 
 
 class _End:
@@ -54,8 +64,10 @@ class ControllerEnd(_End):
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
         super().__init__(lcm, dialect)
         self.wrench: np.ndarray | None = None
+        self._requests: list[Request] = []
         self._listen(dialect.status_channel)
         lcm.Subscribe(FORCE_TORQUE_CHANNEL, self._keep_wrench)
+        lcm.Subscribe(REQUEST_CHANNEL, self._keep_request)
 
     def receive(self, timeout: float) -> RobotStatus | None:
         """Return the newest status that has not been returned, or None if none comes in time.
@@ -83,9 +95,72 @@ class ControllerEnd(_End):
         """
         self.lcm.Publish(self.dialect.command_channel, self.dialect.encode_command(command))
 
+    def requests(self) -> list[Request]:
+        """Return what has been asked for since the last time, the oldest first."""
+        asked, self._requests = self._requests, []
+        return asked
+
+    def tell(self, utime: int, values: Mapping[str, float]) -> None:
+        """Tell whoever watches how far it is.
+
+        Args:
+            utime: The robot's clock [us].
+            values: Numbers by name.
+        """
+        self.lcm.Publish(PROGRESS_CHANNEL, encode_values(utime, values))
+
     def _keep_wrench(self, data: bytes) -> None:
-        with suppress(ValueError):
+        with suppress(*_UNREADABLE):
             self.wrench = decode_wrench(data)
+
+    def _keep_request(self, data: bytes) -> None:
+        with suppress(*_UNREADABLE):
+            self._requests.append(Request.of(decode_values(data)))
+
+
+class WatchingEnd(_End):
+    """The end of who looks on: it hears status and progress, and asks the controller.
+
+    Args:
+        lcm: The bus.
+        dialect: The robot's messages.
+
+    Attributes:
+        progress: What the controller told last, by name; empty before it has told anything.
+        told: When that was, by ``time.monotonic`` [s].
+    """
+
+    def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
+        super().__init__(lcm, dialect)
+        self.progress: dict[str, float] = {}
+        self.told = -math.inf
+        self._listen(dialect.status_channel)
+        lcm.Subscribe(PROGRESS_CHANNEL, self._keep_progress)
+
+    def look(self, timeout: float) -> RobotStatus | None:
+        """Return the newest status after waiting, None if none has come since the last look.
+
+        Args:
+            timeout: How long to wait for messages [s].
+        """
+        self.lcm.HandleSubscriptions(round(1e3 * timeout))
+        self._drain()
+        data, self._data = self._data, None
+        with suppress(*_UNREADABLE):
+            return None if data is None else self.dialect.decode_status(data)
+        return None
+
+    def ask(self, request: Request) -> None:
+        """Ask the controller for something.
+
+        Args:
+            request: What.
+        """
+        self.lcm.Publish(REQUEST_CHANNEL, encode_values(0, request.values()))
+
+    def _keep_progress(self, data: bytes) -> None:
+        with suppress(*_UNREADABLE):
+            self.progress, self.told = decode_values(data), time.monotonic()
 
 
 class RobotEnd(_End):

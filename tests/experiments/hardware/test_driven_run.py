@@ -15,43 +15,32 @@ def nothing(_time, _phase):
     """Say nothing of the progress."""
 
 
-def prepared(name="pfc_panda_7r", *overrides, **options):
+def prepared(name="pfc_panda_7r", *overrides):
     scenario = read_scenario(name, list(overrides))
-    return prepare_driven(scenario, None, recording=False, progress=nothing, **options)
-
-
-def test_an_override_is_the_same_motion_slower():
-    full, slow = prepared().station.task.motion, prepared(override=0.5).station.task.motion
-    wait = 0.5
-    length = full.domain[1]
-    times = np.linspace(wait, length - 0.1, 40)
-    later = wait + (times - wait) / 0.5
-    laps = np.ptp(full.derivatives(times, 0)[:, 0], axis=0).max()
-    assert laps > 1.0
-    first = times < 3.0
-    np.testing.assert_allclose(
-        slow.derivatives(later[first], 1)[:, 0],
-        full.derivatives(times[first], 1)[:, 0],
-        atol=1e-6,
-    )
-    np.testing.assert_allclose(
-        slow.derivatives(later[first], 1)[:, 1],
-        0.5 * full.derivatives(times[first], 1)[:, 1],
-        atol=1e-6,
-    )
+    return prepare_driven(scenario, None, recording=False, progress=nothing)
 
 
 def test_what_is_said_of_it():
-    run = prepared(override=0.1)
-    assert "the reference has 10% of its speed" in run.warnings
+    run = prepared()
     assert run.settings.start.transition == 0.5
     assert run.settings.faults.effort_share == 0.35
 
 
 @pytest.mark.parametrize("override", [0.0, 1.6, np.nan])
-def test_overrides_out_of_range(override):
+def test_overrides_out_of_range(override, tmp_path):
+    end = ControllerEnd(DrakeLcm("memq://"), dialect("panda"))
+    scenario = read_scenario("pfc_panda_7r", [])
     with pytest.raises(InputError, match="--override = "):
-        prepared(override=override)
+        drive_scenario(
+            scenario,
+            end,
+            out=tmp_path / "out",
+            duration=None,
+            figures=False,
+            recording=False,
+            progress=nothing,
+            override=override,
+        )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,74 @@
+"""What people and pages tell a controller that drives a robot, and what it tells them."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from drake import lcmt_drake_signal
+
+# channels of LCM
+REQUEST_CHANNEL, PROGRESS_CHANNEL = "PFSC_REQUEST", "PFSC_PROGRESS"
+LARGEST_OVERRIDE = 1.5
+_OVERRIDE, _STOP = "override", "stop"
+_MOST = 1000  # of values in a message
+
+
+def encode_values(utime: int, values: Mapping[str, float]) -> bytes:
+    """Return named numbers as a message of Drake's type ``lcmt_drake_signal``.
+
+    Args:
+        utime: Clock of the robot [us].
+        values: The numbers by name.
+    """
+    message = lcmt_drake_signal()
+    message.timestamp, message.dim = utime, len(values)
+    message.coord, message.val = list(values), [float(value) for value in values.values()]
+    encoded: bytes = message.encode()
+    return encoded
+
+
+def decode_values(data: bytes) -> dict[str, float]:
+    """Return the named numbers in a message.
+
+    Args:
+        data: The message.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    message = lcmt_drake_signal.decode(data)
+    if not 0 <= message.dim <= _MOST:
+        raise ValueError(f"dim = {message.dim}")
+    return dict(zip(message.coord, message.val, strict=True))
+
+
+@dataclass(frozen=True)
+class Request:
+    """What somebody asks a controller for.
+
+    Attributes:
+        override: Share of its planned pace at which the reference is to move, 0 to 1.5; 0 is a
+            pause; None leaves it as it is.
+        stop: Whether the robot is to be brought to rest, and the run to end.
+    """
+
+    override: float | None = None
+    stop: bool = False
+
+    def values(self) -> dict[str, float]:
+        """Return it as named numbers."""
+        given = {} if self.override is None else {_OVERRIDE: self.override}
+        return given | ({_STOP: 1.0} if self.stop else {})
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> "Request":
+        """Return what named numbers ask for; an override that is no number is a pause.
+
+        Args:
+            values: The numbers by name.
+        """
+        override = values.get(_OVERRIDE)
+        if override is not None:
+            finite = override if math.isfinite(override) else 0.0
+            override = min(max(finite, 0.0), LARGEST_OVERRIDE)
+        return cls(override, values.get(_STOP, 0.0) != 0.0)
