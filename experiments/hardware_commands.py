@@ -24,12 +24,13 @@ from experiments.command_options import (
 )
 from experiments.outcomes import judge_run, print_run
 from experiments.scenario_file import expand_home, read_scenario
+from pfsc_drake.errors import InputError
 from reporting.progress import ProgressDisplay
 from reporting.terminal import FAULT, interruptible
 
 if TYPE_CHECKING:
-    from experiments.hardware.check import RestCheck
     from experiments.hardware.driven_run import FirstCommand
+    from experiments.hardware.statics import StaticCheck
 
 
 def robot_command(
@@ -106,8 +107,14 @@ def drive_command(
     ] = False,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Compare torques at rest with the model's, send nothing."),
+        typer.Option("--check", help="Compare torques with the model's; send nothing by itself."),
     ] = False,
+    move: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG", help="With --check: moves each joint so far, slowly; 0.5 to 20."
+        ),
+    ] = 0.0,
     override: Annotated[
         float,
         typer.Option(metavar="SHARE", help="Of the reference's speed at first, 0.01 to 1.5."),
@@ -130,9 +137,11 @@ def drive_command(
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         end = ControllerEnd(open_bus(lcm), dialect(driver))
         console = Console()
+        if move and not check:
+            raise InputError(f"--move {move:g}: without --check; allowed: together with it")
         if check:
             with ProgressDisplay(console, loaded.name, None) as progress:
-                found = check_scenario(loaded, end, progress)
+                found = check_scenario(loaded, end, progress, move)
             _print_check(console, found)
             raise typer.Exit(0 if found.is_good else FAULT)
         keys = DriveKeys()
@@ -160,15 +169,18 @@ def drive_command(
         raise typer.Exit(judge_run(outcome, folder, progress.simulated_time))
 
 
-def _print_check(console: Console, found: "RestCheck") -> None:
-    """Print what a robot measures at rest beside what it should."""
+def _print_check(console: Console, found: "StaticCheck") -> None:
+    """Print what a robot measures at rest beside what it should, and how far off it is at most."""
     table = Table(box=None, header_style="bold", padding=(0, 2, 0, 0))
-    for title in ("Joint", "Position [deg]", "Measured [Nm]", "Model [Nm]", "Difference [Nm]"):
+    along = ("Largest along the motion [Nm]",) if len(found.q) > 1 else ()
+    titles = ("Joint", "Position [deg]", "Measured [Nm]", "Model [Nm]", "Difference [Nm]", *along)
+    for title in titles:
         table.add_column(title, justify="right")
-    rows = zip(np.rad2deg(found.q), found.measured, found.expected, strict=True)
-    for i, (q, measured, expected) in enumerate(rows):
-        difference = f"{measured - expected:.3f}"
-        table.add_row(str(i + 1), f"{q:.2f}", f"{measured:.3f}", f"{expected:.3f}", difference)
+    off = found.measured - found.expected
+    columns = [np.rad2deg(found.q[0]), found.measured[0], found.expected[0], off[0]]
+    columns += [np.nanmax(np.abs(off[1:]), axis=0)] if along else []
+    for i, values in enumerate(np.column_stack(columns)):
+        table.add_row(str(i + 1), f"{values[0]:.2f}", *(f"{value:.3f}" for value in values[1:]))
     console.print(table)
     console.print(found.verdict, soft_wrap=True, highlight=False, markup=False)
 

@@ -53,6 +53,16 @@ class DriveOptions:
         require_positive("effort_share", self.effort_share)
 
 
+def command_mode(station: Station) -> ControlMode:
+    """Return what a station's law commands a robot by.
+
+    Args:
+        station: The station.
+    """
+    torques = station.law.linearization.relative_degree > 1
+    return ControlMode.TORQUE if torques else ControlMode.VELOCITY
+
+
 class Drive:
     """A station's controller, advanced by what a robot tells.
 
@@ -89,8 +99,7 @@ class Drive:
         self._lost = np.zeros(self._n, dtype=bool)
         self._rate = torque_rates(options.torque_rate, effort)
         self._q = station.start_posture
-        torques = station.law.linearization.relative_degree > 1
-        self.mode = ControlMode.TORQUE if torques else ControlMode.VELOCITY
+        self.mode = command_mode(station)
         self._simulator = Simulator(station.diagram)
         self._first: RobotStatus | None = None
         self._last_state, self._last_torque = np.zeros(4 * self._n), np.zeros(self._n)

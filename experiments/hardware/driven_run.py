@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,10 @@ from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
 from diagrams.scenario.driven import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
-from experiments.hardware.check import RestCheck, check_at_rest, listen
-from experiments.hardware.drive import Drive, DriveOptions
+from experiments.hardware.check import check_ready, listen
+from experiments.hardware.drive import Drive, DriveOptions, command_mode
+from experiments.hardware.slow_motion import move_slowly
+from experiments.hardware.statics import StaticCheck, check_statics
 from experiments.preparation import PreparedRun, naming, settle
 from experiments.scenario_file import ScenarioFile
 from experiments.simulation import SimulationResult
@@ -87,14 +89,15 @@ def prepare_driven(
 
 
 def check_scenario(
-    scenario: ScenarioFile, end: ControllerEnd, progress: ProgressListener
-) -> RestCheck:
-    """Compare the torques of a robot at rest with those of a scenario's model; send nothing.
+    scenario: ScenarioFile, end: ControllerEnd, progress: ProgressListener, degrees: float = 0.0
+) -> StaticCheck:
+    """Compare a robot's torques with those of a scenario's model, at rest and in slow motion.
 
     Args:
         scenario: The scenario as read.
         end: The link to the robot.
         progress: Told what goes on.
+        degrees: How far each joint is moved [deg]; if 0, nothing is sent.
 
     Raises:
         InputError: If the scenario is wrong, or the robot is another one, silent, or moves.
@@ -104,9 +107,22 @@ def check_scenario(
     station = prepared.station
     assert isinstance(station.part, RemoteArm)
     progress(0.0, "listening")
-    believed = station.part.belief.robot
+    believed, period = station.part.belief.robot, station.controller.period
     assert isinstance(believed, SerialChain)
-    return check_at_rest(believed, listen(end, station.controller.period))
+    status = listen(end, period)
+    if not degrees:
+        return check_statics(believed, status.q[None], status.torque[None])
+    mode = command_mode(station)
+    check_mode(mode, end.dialect.modes, end.dialect.name)
+    check_ready(status, mode, believed.dimension)
+    with noticed_interruption() as interrupted, real_time_priority():
+        moved = move_slowly(end, believed, status, degrees, mode, period, interrupted, progress)
+    # friction bears what it likes of a load at rest, where something moved instead
+    at_rest = status.torque * (np.nan if len(moved.q) else 1.0)
+    q, torque = np.vstack([status.q, moved.q]), np.vstack([at_rest, moved.torque])
+    found = check_statics(believed, q, torque)
+    measured = np.vstack([status.torque, moved.torque])
+    return replace(found, measured=measured, complaint=moved.complaint)
 
 
 def drive_scenario(

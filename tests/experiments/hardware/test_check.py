@@ -9,7 +9,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 
 from diagrams.robots.model import read_robot, tool_frame
 from diagrams.scenario import RobotParameters
-from experiments.hardware.check import check_at_rest, listen
+from experiments.hardware.check import listen
+from experiments.hardware.statics import check_statics
 from experiments.scenario_file import find_scenario
 from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
 from pfsc_drake.drivers.messages import RobotStatus, dialect
@@ -18,6 +19,10 @@ from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 
 Q = np.deg2rad([20.0, -30.0, 25.0, -110.0, 15.0, 80.0, 40.0])
 RANDOM = np.random.default_rng(1)
+
+
+def check_at_rest(robot, told):
+    return check_statics(robot, told.q[None], told.torque[None])
 
 
 def read(**keys):

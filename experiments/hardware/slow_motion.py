@@ -1,0 +1,230 @@
+"""A robot that moves one joint after the other, slowly and by little, and what it tells."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pfsc_drake.checks import require_between
+from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
+from pfsc_drake.physics.velocity_servo import joint_inertia
+from pfsc_drake.robot.robot_model import mass_function
+from pfsc_drake.robot.serial.chain import SerialChain
+
+_LEAST, _LARGEST = 0.5, 20.0  # deg
+_OF_A_JOINT, _SETTLING = 5.0, 1.0  # s
+# of the servo that moves the joints, on top of the robot's own compensation of its weight [1/s]
+_BANDWIDTH = 15.0
+# share of what the drives can do
+_EFFORT = 0.2
+# from which on a joint does not follow [rad]
+_LOST = np.deg2rad(3.0)
+_SILENCE = 0.1  # s
+_BINS = 8
+# of a velocity by the derivative of the position
+_SLOWEST, _FASTEST = 0.5, 1.5
+
+
+@dataclass(frozen=True)
+class SlowMotion:
+    """What a robot told in slow motion.
+
+    Attributes:
+        q: Postures, one after the other, shape (M, N) [rad or m].
+        torque: Torques that it measured there, less those of its small acceleration, the mean of
+            both directions, so that friction takes no part, shape (M, N) [Nm or N]; NaN of joints
+            that rest, since friction bears what it likes of their load.
+        complaint: What was wrong, in words, or None; the robot was let go then.
+    """
+
+    q: np.ndarray
+    torque: np.ndarray
+    complaint: str | None
+
+
+class JointTour:
+    """Moves one joint after the other out and back, along a cosine.
+
+    Torques on top of the robot's own gravity compensation are those of a PID controller with a
+    triple pole, which needs no model but a rough inertia of each joint::
+
+        tau = D (3 w^2 e + 3 w e' + w^3 int e)
+
+    Args:
+        robot: The robot as it is believed, N joints.
+        start: Where it rests, shape (N,) [rad or m].
+        amplitude: How far each joint goes [rad], towards the middle of its range.
+        mode: What it is commanded by: torques or velocities.
+        period: Sampling time [s].
+    """
+
+    def __init__(
+        self,
+        robot: SerialChain,
+        start: np.ndarray,
+        amplitude: float,
+        mode: ControlMode,
+        period: float,
+    ) -> None:
+        n = robot.dimension
+        self._start, self._mode, self._period, self._n = start, mode, period, n
+        lower, upper = robot.gather("position_limits").T
+        with np.errstate(invalid="ignore"):
+            middle = np.where(np.isfinite(lower + upper), (lower + upper) / 2.0, start)
+        self._way = amplitude * np.where(middle >= start, 1.0, -1.0)
+        self._inertia = joint_inertia(robot, start)
+        self._mass = np.array(mass_function(robot)(start)) + np.diag(robot.D_M)
+        self._most = _EFFORT * robot.gather("effort_limit")
+        self._sum = np.zeros(n)
+        self.duration = _SETTLING + n * _OF_A_JOINT
+
+    def desired(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return where the joints are to be, their velocity and acceleration, each (N,).
+
+        Args:
+            time: Since the beginning [s].
+        """
+        q, v, a = self._start.copy(), np.zeros(self._n), np.zeros(self._n)
+        joint, phase = divmod(max(time - _SETTLING, 0.0), _OF_A_JOINT)
+        if joint < self._n:
+            i, w = int(joint), 2.0 * math.pi / _OF_A_JOINT
+            q[i] += self._way[i] * (1.0 - math.cos(w * phase)) / 2.0
+            v[i] = self._way[i] * w * math.sin(w * phase) / 2.0
+            a[i] = self._way[i] * w**2 * math.cos(w * phase) / 2.0
+        return q, v, a
+
+    def command(self, time: float, status: RobotStatus) -> np.ndarray:
+        """Return what the robot is told, shape (N,).
+
+        Args:
+            time: Since the beginning [s].
+            status: What it tells.
+        """
+        q, v, _ = self.desired(time)
+        e, w = q - status.q, _BANDWIDTH
+        if self._mode is ControlMode.VELOCITY:
+            return v + w * e
+        self._sum += self._period * e
+        tau = self._inertia * (3.0 * w**2 * e + 3.0 * w * (v - status.v) + w**3 * self._sum)
+        return np.clip(tau, -self._most, self._most)
+
+    def inertial(self, time: float) -> np.ndarray:
+        """Return the torques that accelerate the joints, shape (N,).
+
+        Args:
+            time: Since the beginning [s].
+        """
+        return self._mass @ self.desired(time)[2]
+
+    def lost(self, time: float, status: RobotStatus) -> str | None:
+        """Return what is to be said of a joint that does not follow, or None.
+
+        Args:
+            time: Since the beginning [s].
+            status: What the robot tells.
+        """
+        off = status.q - self.desired(time)[0]
+        worst = int(np.abs(off).argmax())
+        if not abs(off[worst]) > _LOST:
+            return None
+        return (
+            f"joint {worst + 1} is {np.rad2deg(off[worst]):.1f} deg from where it was told to be: "
+            "does it turn the other way than it is told, or does something hold it?"
+        )
+
+
+def move_slowly(
+    end: ControllerEnd,
+    robot: SerialChain,
+    first: RobotStatus,
+    degrees: float,
+    mode: ControlMode,
+    period: float,
+    interrupted: Callable[[], bool],
+    progress: Callable[[float, str], None],
+) -> SlowMotion:
+    """Move each joint of a robot slowly out and back, and return what it told.
+
+    Whatever goes wrong, nothing more is sent, so that the robot's driver damps it.
+
+    Args:
+        end: The link.
+        robot: The robot as it is believed, N joints.
+        first: A status of it at rest.
+        degrees: How far each joint goes [deg].
+        mode: What it is commanded by.
+        period: Its sampling time [s].
+        interrupted: Whether to end.
+        progress: Told how far it is.
+
+    Raises:
+        InputError: If the angle is out of range.
+    """
+    require_between("--move", degrees, _LEAST, _LARGEST, "deg")
+    tour = JointTour(robot, first.q, np.deg2rad(degrees), mode, period)
+    heard, begin, complaint, told = [], None, None, -1.0
+    while complaint is None:
+        status = end.receive(_SILENCE)
+        if status is None:
+            complaint = f"no status of the robot for {1e3 * _SILENCE:.0f} ms"
+            break
+        begin = status.utime if begin is None else begin
+        time = 1e-6 * (status.utime - begin)
+        if time > tour.duration:
+            break
+        if interrupted():
+            complaint = "interrupted"
+        elif status.robot_mode is not RobotMode.MOVE:
+            complaint = f"the robot went into mode {status.robot_mode.name}"
+        elif not (np.isfinite(status.q).all() and np.isfinite(status.v).all()):
+            complaint = "the robot's positions or velocities are not finite"
+        else:
+            complaint = tour.lost(time, status)
+        if complaint is None:
+            end.send(RobotCommand(status.utime, mode, tour.command(time, status)))
+            heard.append((time, replace(status, torque=status.torque - tour.inertial(time))))
+            if time - told > 0.2:
+                told = time
+                progress(time, "moving one joint after the other")
+    if complaint is None:
+        complaint = _velocity_complaint(heard, period)
+    q, torque = _means(heard, robot.dimension)
+    return SlowMotion(q, torque, complaint)
+
+
+def _velocity_complaint(heard: list[tuple[float, RobotStatus]], period: float) -> str | None:
+    """Return which joint tells a velocity that its position does not have, or None."""
+    t = np.array([time for time, _ in heard])
+    q, v = (np.array([getattr(s, name) for _, s in heard]) for name in ("q", "v"))
+    rate = np.gradient(q, t, axis=0) if len(t) > 2 else np.zeros_like(v)
+    for i in range(q.shape[1]):
+        own = (t - _SETTLING >= i * _OF_A_JOINT) & (t - _SETTLING < (i + 1) * _OF_A_JOINT)
+        ratio = (rate[own, i] @ v[own, i]) / max(rate[own, i] @ rate[own, i], 1e-12)
+        if own.any() and not _SLOWEST < ratio < _FASTEST:
+            return (
+                f"joint {i + 1} tells {ratio:.2f} times the velocity that its position has; "
+                "is the sign of it, or its unit, wrong?"
+            )
+    return None
+
+
+def _means(heard: list[tuple[float, RobotStatus]], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return postures and torques of the moving joint, the mean of both directions, (M, N)."""
+    t = np.array([time for time, _ in heard]) - _SETTLING
+    q, torque = (np.array([getattr(s, name) for _, s in heard]) for name in ("q", "torque"))
+    joint, phase = np.divmod(t, _OF_A_JOINT)
+    # the same place on the way out and back, but where the joint turns round
+    bins = (np.abs(phase / _OF_A_JOINT - 0.5) * 2.0 * _BINS).astype(int)
+    back = phase >= _OF_A_JOINT / 2.0
+    postures, torques = [], []
+    for i in range(n):
+        for k in range(1, _BINS - 1):
+            there = (joint == i) & (bins == k)
+            ways = [there & ~back, there & back]
+            if all(way.any() for way in ways):
+                postures.append(np.mean([q[way].mean(axis=0) for way in ways], axis=0))
+                torques.append(np.full(n, np.nan))
+                torques[-1][i] = np.mean([torque[way, i].mean() for way in ways])
+    return np.array(postures).reshape(-1, n), np.array(torques).reshape(-1, n)

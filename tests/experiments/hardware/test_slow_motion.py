@@ -1,0 +1,211 @@
+"""A simulated robot with one thing wrong moves slowly, and it is said what is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.lcm import DrakeLcm
+
+from diagrams.robot_station import build_robot_station
+from diagrams.robots.arm_model import read_arm
+from experiments.hardware import slow_motion
+from experiments.hardware.robot import SimulatedRobot, Transport
+from experiments.hardware.slow_motion import JointTour, move_slowly
+from experiments.hardware.statics import check_statics
+from experiments.scenario_file import find_scenario
+from pfsc_drake.drivers.driver_rules import DriverOptions
+from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
+from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus, dialect
+from pfsc_drake.errors import InputError
+from pfsc_drake.following.options.friction import JointFrictionParameters
+from pfsc_drake.robot.robot_model import gravity_function, mass_function
+from tests.experiments.hardware.test_drive import panda
+
+FOLDER = find_scenario("pfc_panda_7r").parent
+
+
+class Stepped(ControllerEnd):
+    """The controller's end, on which waiting is a tick of the robot."""
+
+    def __init__(self, robot_settings, seen, heard):
+        lcm, spoken = DrakeLcm("memq://"), dialect("panda")
+        super().__init__(lcm, spoken)
+        robot_settings.simulation.integrator = "runge_kutta3"
+        robot_settings.simulation.max_step = 1e-3
+        self.robot = SimulatedRobot(
+            build_robot_station(robot_settings, FOLDER),
+            robot_settings,
+            RobotEnd(lcm, spoken),
+            DriverOptions(),
+            Transport(),
+        )
+        self._seen, self._heard = seen, heard
+        self.robot.advance()
+        self.robot.tell()
+
+    def receive(self, timeout):
+        status = super().receive(0.0)
+        if status is None:
+            self.robot.advance()
+            self.robot.tell()
+            status = super().receive(0.0)
+        return None if status is None else self._seen(status)
+
+    def send(self, command):
+        super().send(replace(command, values=self._heard(command.values)))
+        self.robot.advance()
+        self.robot.tell()
+
+
+def checked(
+    seen=lambda status: status, heard=lambda values: values, settings=None, believed=None, load=0.0
+):
+    """Return what the check says of a robot whose messages are changed on their way.
+
+    What the robot carries, its driver does not compensate.
+    """
+    settings = settings or panda()
+    settings.controller.sampling_time = 2e-3
+    true = read_arm(settings.robot, FOLDER).chain
+    end = Stepped(settings, seen, heard)
+    if load:
+        end.robot._weight = gravity_function(carrying(true, -load))
+    first = end.receive(0.0)
+    believed = believed or carrying(true, -load)
+    moved = move_slowly(
+        end, believed, first, 3.0, ControlMode.TORQUE, 2e-3, lambda: False, lambda t, phase: None
+    )
+    q, torque = moved.q, moved.torque
+    if not len(q):
+        q, torque = first.q[None], first.torque[None]
+    found = replace(check_statics(believed, q, torque), complaint=moved.complaint)
+    return found, np.abs(end.robot.status().q - first.q).max()
+
+
+def carrying(chain, mass):
+    """Return a robot with so much more mass in its tool point."""
+    last = chain.links[-1]
+    total = last.mass + mass
+    p_LC = (last.mass * last.p_LC + mass * chain.p_LT) / total
+    return replace(chain, links=(*chain.links[:-1], replace(last, mass=total, p_LC=p_LC)))
+
+
+@pytest.fixture(autouse=True)
+def quicker(monkeypatch):
+    monkeypatch.setattr(slow_motion, "_OF_A_JOINT", 2.5)
+    monkeypatch.setattr(slow_motion, "_SETTLING", 0.5)
+
+
+class Obedient:
+    """A robot that does exactly what it is to do, with friction and inertia, and tells it."""
+
+    def __init__(self, chain, zero=0.0):
+        self._chain, self._tick, self.sent = chain, 0, []
+        start = np.deg2rad([20.0, -30.0, 25.0, -110.0, 15.0, 80.0, 40.0])
+        self._tour = JointTour(chain, start, np.deg2rad(3.0), ControlMode.TORQUE, 0.01)
+        self._zero = np.deg2rad(zero) * (np.arange(7) == 3)
+        self._weight, self._mass = gravity_function(chain), mass_function(chain)
+
+    def receive(self, timeout):
+        q, v, a = self._tour.desired(0.01 * self._tick)
+        torque = np.asarray(self._weight(q)).ravel() + np.asarray(self._mass(q)) @ a
+        torque += 3.0 * np.sign(v) * (np.abs(v) > 1e-9) + 2.0 * v
+        self._tick += 1
+        return RobotStatus(10_000 * (self._tick - 1), q + self._zero, v, torque)
+
+    def send(self, command):
+        self.sent.append(command)
+
+
+@pytest.mark.parametrize("zero", [0.0, -3.0])
+def test_friction_and_inertia_take_no_part(zero):
+    chain = read_arm(panda().robot, FOLDER).chain
+    robot = Obedient(chain, zero)
+    first = robot.receive(0.0)
+    moved = move_slowly(
+        robot, chain, first, 3.0, ControlMode.TORQUE, 0.01, lambda: False, lambda t, phase: None
+    )
+    assert moved.complaint is None
+    assert np.all(np.isfinite(moved.torque).sum(axis=0) >= 5)
+    found = check_statics(chain, moved.q, moved.torque)
+    if zero:
+        assert found.verdict.startswith("most likely the zero of joint 4 is off by -3.0")
+    else:
+        assert found.is_good
+        off = moved.torque - np.array([np.asarray(robot._weight(q)).ravel() for q in moved.q])
+        assert np.nanmax(np.abs(off)) < 0.1
+
+
+def flip(values, joint):
+    return np.where(np.arange(7) == joint, -values, values)
+
+
+@pytest.mark.slow
+def test_a_robot_as_it_is_believed_with_friction():
+    settings = panda()
+    settings.friction = JointFrictionParameters(f_c=[2.0] * 4 + [0.5] * 3, f_v=[1.0] * 7)
+    found, off = checked(settings=settings)
+    assert (
+        found.verdict == "the robot's torques at rest and along the motion are those of the model"
+    )
+    assert found.is_good
+    # every joint has moved, and come back
+    assert np.all(np.ptp(found.q, axis=0) > np.deg2rad(2.5))
+    assert off < np.deg2rad(0.5)
+
+
+@pytest.mark.slow
+def test_a_torque_with_the_wrong_sign():
+    found, _ = checked(seen=lambda s: replace(s, torque=flip(s.torque, 3)))
+    assert found.verdict.startswith("most likely the torque of joint 4 has the wrong sign")
+
+
+@pytest.mark.slow
+def test_a_zero_that_is_off():
+    off = np.deg2rad(2.0) * (np.arange(7) == 1)
+    found, _ = checked(seen=lambda s: replace(s, q=s.q + off))
+    # alone, while at rest as well other zeros may be
+    assert found.verdict.startswith("most likely the zero of joint 2 is off by 2.0")
+    assert "as well may be" not in found.verdict
+
+
+@pytest.mark.slow
+def test_a_payload_that_nobody_told():
+    found, off = checked(load=0.5)
+    assert found.verdict.startswith("most likely the tool weighs 0.5")
+    assert "kg more than is told" in found.verdict
+    assert off < np.deg2rad(1.0)
+
+
+@pytest.mark.slow
+def test_gravity_from_another_side():
+    true = read_arm(panda().robot, FOLDER).chain
+    found, _ = checked(believed=replace(true, gravity=np.array([0.0, 0.0, 9.81])))
+    assert found.verdict.startswith("most likely gravity is [")
+    numbers = found.causes[0].words.split("[")[1].split("]")[0]
+    np.testing.assert_allclose(np.array(numbers.split(","), float), [0.0, 0.0, -9.81], atol=0.1)
+
+
+def test_a_joint_that_turns_the_other_way_than_it_is_told():
+    found, off = checked(heard=lambda values: flip(values, 1))
+    assert found.complaint.startswith("joint 2 is ")
+    assert "the other way than it is told" in found.verdict
+    assert off < np.deg2rad(8.0)
+
+
+def test_a_velocity_with_the_wrong_sign():
+    found, _ = checked(seen=lambda s: replace(s, v=flip(s.v, 5)))
+    assert found.complaint.startswith("joint 6 ")
+
+
+def test_a_robot_that_leaves_its_mode_or_tells_nonsense():
+    found, _ = checked(seen=lambda s: replace(s, robot_mode=RobotMode.REFLEX))
+    assert found.complaint == "the robot went into mode REFLEX"
+    found, _ = checked(seen=lambda s: replace(s, v=s.v * np.nan))
+    assert found.complaint == "the robot's positions or velocities are not finite"
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, np.nan])
+def test_angles_out_of_range(degrees):
+    with pytest.raises(InputError, match="--move = "):
+        move_slowly(None, None, None, degrees, ControlMode.TORQUE, 1e-3, None, None)
