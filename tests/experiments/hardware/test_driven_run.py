@@ -53,10 +53,12 @@ def test_an_override_slows_both_directions_of_a_surface(monkeypatch):
         raise Built(settings.reference)
 
     monkeypatch.setattr(driven_run, "build_station", build)
+    second = "{points: [0, 0.1], velocity: 0.2, acceleration: 3}"
+    changes = "reference.places=[]", "reference.points=[0, 0.1]", f"reference.second={second}"
     found = []
     for override in (1.0, 0.5):
         with pytest.raises(Built) as built:
-            prepared("sfc_polish", override=override)
+            prepared("sfc_polish", *changes, override=override)
         found.append(built.value.args[0])
     full, slow = found
     for one, other in ((full, slow), (full.second, slow.second)):
