@@ -137,6 +137,24 @@ def test_time_is_counted_in_ticks():
     assert stepper.states["asked"][0] == 3.0
 
 
+def test_a_later_start_knows_its_tick():
+    class Late(Clock):
+        def initial(self, u, t):
+            return {"asked": t}
+
+    stepper = Stepper(Late())
+    for _ in range(3):
+        stepper.step(u=0.0)
+    stepper.start()
+    assert stepper.states["asked"][0] == 3.0
+
+
+def test_ports_of_a_whole_have_the_units_of_their_parts():
+    network = wired()
+    assert network.units == {"slow": "m", "rate": ""}
+    assert network.inputs["u"].unit == "m"
+
+
 def test_stages_share_what_they_evaluate():
     """Each block's function is called once in all stages and the update together."""
     program = Program(wired())

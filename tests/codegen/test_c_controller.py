@@ -4,6 +4,7 @@ import ctypes
 import json
 import subprocess
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -100,3 +101,18 @@ def test_what_has_no_fault_is_no_controller():
 
     with pytest.raises(InputError, match=r"^export: outputs drive_torque, int .* must be fault"):
         CController.of(Network.of(Silent()), 1e-3)
+
+
+class Looked(Block):
+    """A number of a table."""
+
+    expands = False
+    inputs, outputs, states = {"place": Port(1)}, {"value": Port(1), "fault": Port(1)}, {}
+
+    def output(self, x, u, t):
+        table = ca.MX(ca.DM(np.random.default_rng(0).normal(size=50)))
+        return {"value": table[u.place], "fault": 0.0}
+
+
+def test_tables_take_eight_bytes_a_number():
+    assert CController.of(Network.of(Looked()), 1e-3).table_bytes == 8 * 50

@@ -52,6 +52,38 @@ def test_c_repeats_the_record(tmp_path):
         )
         assert done.returncode == 0, done.stdout
     assert "faults" in done.stdout
+    # one number that is another is found
+    record = np.fromfile(tmp_path / "replay.bin").reshape(20, 10)
+    record[7, 5] += 1e-9
+    record.tofile(tmp_path / "other.bin")
+    command = ["./replay", "other.bin", "10"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "first difference: tick 7, number 0 of the outputs" in done.stdout
+    assert "ticks 20 differing 1 " in done.stdout
+
+
+def test_a_record_has_the_order_of_the_interface(tmp_path):
+    """Whatever order its inputs are given in."""
+    turned = {name: INPUTS[name] for name in ("gain", "joint_state")}
+    export(diagram(), tmp_path, turned)
+    record = np.fromfile(tmp_path / "replay.bin").reshape(20, 10)
+    np.testing.assert_array_equal(record[:, :4], INPUTS["joint_state"])
+    np.testing.assert_array_equal(record[:, 5:7], -INPUTS["joint_state"][:, 2:])
+
+
+def test_the_header_says_what_interface_json_does(tmp_path):
+    export(diagram(), tmp_path)
+    said = json.loads((tmp_path / "interface.json").read_text(encoding="utf-8"))
+    assert [port["unit"] for port in said["outputs"]] == ["Nm", "", ""]
+    header = (tmp_path / "controller.h").read_text(encoding="utf-8")
+    for line in (
+        "#define CONTROLLER_SAMPLING_TIME 0.002 /* s */",
+        "#define CONTROLLER_DRIVES 2 /*",
+        "    double joint_state[4]; /* rad, rad/s */",
+        "    double drive_torque[2]; /* Nm */",
+    ):
+        assert line in header
 
 
 @needs_gcc
@@ -63,6 +95,14 @@ def test_the_loop_with_deadlines(tmp_path):
     assert done.returncode == 0
     assert "no more inputs after 20 ticks" in done.stdout
     assert "worst" in done.stdout
+    record = np.fromfile(tmp_path / "replay.bin").reshape(20, 10)
+    record[7, 0] = np.nan
+    record.tofile(tmp_path / "bad.bin")
+    command = ["./main_rt", "0.03", "bad.bin"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 3
+    assert "fault 3" in done.stdout
+    assert "no more inputs" not in done.stdout
 
 
 def test_what_is_no_block_is_refused(tmp_path):

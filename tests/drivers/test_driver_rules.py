@@ -50,6 +50,15 @@ def test_old_commands_do_not_count_and_the_joints_are_damped():
     assert driver.ended is None
 
 
+def test_commands_of_a_clock_that_was_ahead_do_not_count():
+    """A robot that starts anew counts from zero: what came before is of another time."""
+    driver = rules(torque_rate=1e9)
+    driver.advance(0, torque(0, 1.0, 1.0), STILL)
+    acting = driver.advance(1000, torque(5_000_000, 9.0, 9.0), STILL)
+    np.testing.assert_array_equal(acting, [1.0, 1.0])
+    assert driver.rejected == 1
+
+
 def test_velocities_end_with_the_commands():
     driver = rules(ControlMode.VELOCITY)
     command = torque(0, 0.3, -0.1, mode=ControlMode.VELOCITY)
@@ -71,8 +80,10 @@ def test_what_ends_a_driver(command, said):
     np.testing.assert_array_equal(driver.advance(0, command, v), [-10.0, 0.0])
     assert said in driver.ended
     assert driver.robot_mode is RobotMode.REFLEX
-    # nothing is taken any more
-    np.testing.assert_array_equal(driver.advance(1000, torque(1000, 3.0, 3.0), v), [-10.0, 0.0])
+    # nothing is taken any more, and the first reason stays
+    for later in (torque(1000, 3.0, 3.0), torque(1000, *np.ones(5))):
+        np.testing.assert_array_equal(driver.advance(1000, later, v), [-10.0, 0.0])
+    assert said in driver.ended
 
 
 @pytest.mark.parametrize("options", [{"expiry": 0.0}, {"low_pass": -1.0}, {"torque_rate": np.nan}])

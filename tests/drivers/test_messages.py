@@ -102,6 +102,19 @@ def test_messages_are_read_as_they_were_written(name):
     np.testing.assert_array_equal(command.values, TAU)
 
 
+@pytest.mark.parametrize(
+    ("name", "channels", "expiry"),
+    [
+        ("panda", ("PANDA_STATUS", "PANDA_COMMAND"), 0.1),
+        ("iiwa", ("IIWA_STATUS", "IIWA_COMMAND"), 0.05),
+    ],
+)
+def test_what_drivers_listen_to_and_for_how_long(name, channels, expiry):
+    spoken = dialect(name)
+    assert (spoken.status_channel, spoken.command_channel) == channels
+    assert spoken.expiry == expiry
+
+
 def test_wrenches():
     wrench = RANDOM.normal(size=6)
     np.testing.assert_array_equal(decode_wrench(encode_wrench(3, wrench)), wrench)

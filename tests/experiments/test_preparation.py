@@ -31,6 +31,8 @@ def test_too_long(duration, time, memory):
 
 def test_long_enough():
     check_length(SimpleNamespace(duration=MAX_TICKS * 1e-3), STATION)
+    with pytest.raises(InputError, match="sampling intervals"):
+        check_length(SimpleNamespace(duration=(MAX_TICKS + 1) * 1e-3), STATION)
 
 
 def test_too_many_frames():

@@ -1,5 +1,7 @@
 """A tool that yields to a hand on a user's own path or surface: options of the same call."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from pydrake.multibody.parsing import Parser
@@ -19,9 +21,14 @@ from pfsc_drake import (
     rest_to_rest,
     straight_lines,
 )
+from pfsc_drake.control.compliance.impedance import ImpedanceLaw
+from pfsc_drake.control.compliance.impedance_parameters import ImpedanceParameters
 from pfsc_drake.control.fixtures.parameters import RobotLimitParameters
 from pfsc_drake.control.law.fault import Fault
+from pfsc_drake.control.manifolds.coordinate import Coordinate, Kind
+from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
+from pfsc_drake.following import compliance as compliance_module
 from pfsc_drake.following.options.controller import ExternalTorqueParameters
 from pfsc_drake.geometry.surfaces.shapes import paraboloid
 from pfsc_drake.robot.models.files import models_directory
@@ -137,3 +144,57 @@ def test_what_yields_can_do_without_a_sensor_before_torques(path):
     assert follower.HasOutputPort("manifold_force")
     with pytest.raises(InputError, match=r"compliance.source = observed with .*velocity_servo"):
         add_path_following(builder, plant, "tool_point", path, "velocity_servo", options=chosen)
+
+
+class Asked(Exception):
+    """What was asked for."""
+
+
+def ask(*given, **more):
+    raise Asked(*given, *more.values())
+
+
+def impedance_law(kinds, **impedances):
+    coordinates = [
+        Coordinate(f"{kind.value}_{i}", kind, f"force_{i}") for i, kind in enumerate(kinds)
+    ]
+    return ImpedanceLaw(ImpedanceParameters(**impedances), coordinates, 2, 1e-3), coordinates
+
+
+def test_a_tool_that_presses_swings_on_no_spring():
+    """The stiffest spring that mass and damping across bear without a swing."""
+    across = CoordinateImpedance(Profile(2.0), Profile(80.0), Profile(0.0))
+    kinds = [Kind.TANGENTIAL, Kind.TANGENTIAL, Kind.TRANSVERSAL]
+    law, coordinates = impedance_law(kinds, tangential=FREE, transversal=across)
+    compliance = SimpleNamespace(press=SimpleNamespace(over_time=ask))
+    with pytest.raises(Asked) as asked:
+        compliance_module._add_press(None, compliance, law, coordinates, {}, 7.0)
+    assert asked.value.args == (7.0, 80.0**2 / 8.0)
+
+
+def test_what_is_rigid_is_made_soft_with_the_mass_along(monkeypatch):
+    turning = CoordinateImpedance(Profile(0.2), Profile(2.0), Profile(30.0))
+    kinds = [Kind.TANGENTIAL, Kind.TRANSVERSAL, Kind.TRANSVERSAL, Kind.ROTATIONAL]
+    law, coordinates = impedance_law(kinds, tangential=FREE, rotational=turning)
+    monkeypatch.setattr(compliance_module, "ImpedanceTuner", ask)
+    ports = dict.fromkeys(("impedance_request", "manifold_state", "desired_reference"))
+    impedance = SimpleNamespace(GetOutputPort=lambda name: None)
+    with pytest.raises(Asked) as asked:
+        compliance_module._add_tuner(None, None, coordinates, law, impedance, ports)
+    np.testing.assert_array_equal(asked.value.args[3], [3.0, 3.0, 3.0, 0.2])
+
+
+def test_limits_that_are_off_limit_nobody(monkeypatch):
+    monkeypatch.setattr(compliance_module, "LedMotion", lambda *_: "limits")
+    monkeypatch.setattr(compliance_module, "RobotLimits", lambda *_, **__: None)
+    along = PathManifold(2, oriented=False)
+    for tangential, on, expected in (
+        (FREE, True, "limits"),
+        (FREE, False, None),
+        (None, True, None),
+    ):
+        compliance = ComplianceParameters(
+            tangential=tangential or CoordinateImpedance(), limits=RobotLimitParameters(on=on)
+        )
+        found = compliance_module._limits(compliance, along, None, np.zeros(3), 1e-3)
+        assert found == expected

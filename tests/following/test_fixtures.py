@@ -1,12 +1,15 @@
 """What is near a tool that is led by hand, as an expression or by a schedule."""
 
+import dataclasses as dc
+
 import casadi as ca
 import pytest
 
 from pfsc_drake.control.fixtures.lead import FilterLead, ServoLead
 from pfsc_drake.control.fixtures.parameters import Admittance, Fixture
 from pfsc_drake.control.manifolds.space import SpaceManifold
-from pfsc_drake.following.fixtures import make_lead, near_expression
+from pfsc_drake.following import fixtures as fixtures_module
+from pfsc_drake.following.fixtures import _robot_limits, make_lead, near_expression
 from pfsc_drake.following.followed import Guided
 from pfsc_drake.following.options.follower import FixtureOptions
 from pfsc_drake.geometry import torus
@@ -45,3 +48,13 @@ def test_before_servos_their_lag_counts_before_torques_a_filter():
     filtered = make_lead(3, options, PERIOD, lag=0.005, delay=0.002)
     assert isinstance(filtered, FilterLead)
     assert filtered.lag == pytest.approx(0.008)
+
+
+def test_robot_limits_are_for_tools_as_fast_as_regions_that_push_them(monkeypatch):
+    monkeypatch.setattr(fixtures_module, "RobotLimits", lambda *given, **more: (given, more))
+    led = dc.replace(guided([BALL, BALL]), speeds=[0.05, 0.3])
+    (_, limits, _), more = _robot_limits(led, None, None)
+    assert limits is led.options.limits
+    assert more["fastest"] == led.options.guidance.largest_speed + 0.3
+    led.options.limits.on = False
+    assert _robot_limits(led, None, None) is None

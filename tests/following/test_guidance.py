@@ -14,6 +14,7 @@ from pfsc_drake.control.fixtures.record import Mode
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.reference import rest_to_rest
 from pfsc_drake.errors import InputError
+from pfsc_drake.following.guidance import _told
 from pfsc_drake.geometry.regions.moving import CurveCourse, ShiftedRegion
 from pfsc_drake.geometry.regions.shapes import HalfSpace
 from pfsc_drake.robot.models.files import models_directory
@@ -40,6 +41,21 @@ def led(regions, law="rigid", model="comau_racer_1_4", options=None, start=START
         builder, plant, "tool_point", regions, law, start=start, options=options
     )
     return Pulled(builder, plant, follower)
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [
+        ("elastic", ("measured", 200.0)),
+        ("rigid", ("measured", 0.0)),
+        ("velocity_servo", ("none", 0.0)),
+    ],
+)
+def test_laws_of_torques_are_told_of_the_hand(law, told):
+    """With derivatives where those count."""
+    for tells, expected in ((True, told), (False, ("none", 0.0))):
+        torque = _told(GuidanceOptions(tells_law=tells), law).controller.external_torque
+        assert (torque.source, torque.bandwidth) == expected
 
 
 @pytest.mark.parametrize(

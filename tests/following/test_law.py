@@ -9,9 +9,12 @@ from diagrams.scenario import (
     LawGains,
 )
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
+from pfsc_drake.control.law.loop_at_rest import RestPosture
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.following.law import make_law
+from pfsc_drake.following import law as law_module
+from pfsc_drake.following.law import Believed, make_law, safe_state, sampled_robot, supervision
+from pfsc_drake.following.options.follower import FaultParameters
 
 
 def by_poles(*poles):
@@ -62,6 +65,51 @@ def test_limits_are_those_of_the_model_scaled(load_arm):
     chain = load_arm("comau_racer_1_4_3r").chain
     parameters = controller("rigid", by_poles(-3, -3), by_poles(-3, -3), effort_scale=0.5)
     np.testing.assert_array_equal(make(parameters, chain).limits, [900, 900, 450])
+
+
+def test_after_a_fault_motors_are_braked_by_their_scaled_limits(load_arm):
+    parameters = ControllerParameters("rigid", effort_scale=0.5, brake_damping=0.1)
+    faults = FaultParameters(hold_bandwidth=35.0, effort_share=0.6)
+    found = safe_state(parameters, load_arm("comau_racer_1_4_3r").chain, faults)
+    np.testing.assert_allclose(found.damping, [90.0, 90.0, 45.0])
+    assert (found.bandwidth, found.effort_share) == (35.0, 0.6)
+
+
+def test_what_is_watched_knows_how_well_motion_is_measured(load_arm):
+    believed = Believed(load_arm("comau_racer_1_4_3r").chain, resolution=1e-5, filter_time=2e-3)
+    watched = supervision("rigid", FaultParameters(), believed)
+    np.testing.assert_array_equal(watched.resolution, np.full(3, 1e-5))
+    assert watched.filter_time == 2e-3
+    # servos may stay at their limits of velocity, unless somebody minds
+    times = [("rigid", None, 0.2), ("velocity_servo", None, 0.0), ("velocity_servo", 0.3, 0.3)]
+    for law, given, expected in times:
+        found = supervision(law, FaultParameters(saturation_time=given), believed)
+        assert found.saturation_time == expected
+
+
+def test_poles_are_chosen_for_the_largest_error_and_the_delay(load_arm, monkeypatch):
+    """Of all coordinates, each of which keeps its own bandwidth."""
+    chain, asked = load_arm("comau_racer_1_4_elastic_3r").chain, []
+    monkeypatch.setattr(law_module, "sampled_robot", lambda parameters, *_: parameters.delay)
+    monkeypatch.setattr(law_module, "choose_fast_pole", lambda *given: asked.append(given) or 100.0)
+    eta, xi = GainParameters(bandwidth=20.0, bears=0.2), GainParameters(bandwidth=30.0, bears=0.1)
+    parameters = controller("elastic", eta, xi, delay=2e-3)
+    rest = RestPosture(np.array([0.3, 1.3, -0.5]), np.zeros(1))
+    make_law(parameters, chain, PathManifold(4, oriented=False), lambda: rest)
+    ((robot, _, bandwidths, error),) = asked
+    assert (robot, list(bandwidths), error) == (2e-3, [20.0, 30.0], 0.2)
+    for gains, bandwidth in ((eta, 20.0), (xi, 30.0)):
+        assert gains.poles[:3] == [-bandwidth, -bandwidth, -100.0]
+        assert gains.poles[3] < -100.0
+
+
+def test_a_law_at_rest_has_its_delay(load_arm, monkeypatch):
+    monkeypatch.setattr(law_module, "LoopAtRest", lambda *given: given)
+    parameters = ControllerParameters("elastic", delay=3e-3, sampling_time=1e-3)
+    chain = load_arm("comau_racer_1_4_elastic_3r").chain
+    found = sampled_robot.__wrapped__(parameters, chain, None, None)
+    assert found.loop[3:] == (1e-3, None, 3)
+    assert found.is_elastic
 
 
 @pytest.mark.parametrize(

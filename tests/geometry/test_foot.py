@@ -118,6 +118,28 @@ def test_the_axis_of_a_circle_has_no_minimum() -> None:
     assert alpha == pytest.approx(1.0, abs=1e-14)
 
 
+def test_a_saddle_of_the_distance_is_no_minimum() -> None:
+    """Above z = x y by h the distance grows along x and y, and falls between them where h > 1."""
+    domain = [(-1.0, 1.0), (-1.0, 1.0)]
+    find, _ = _finder(2, lambda t: ca.vertcat(t, t[0] * t[1]), domain, [False, False])
+    for height, is_minimum in ((0.9, 1.0), (1.1, 0.0)):
+        theta, distance, alpha, _, converged, _ = find([0.0, 0.0, height], [0.0, 0.0])
+        np.testing.assert_array_equal(theta, 0.0)
+        assert (distance, alpha) == (pytest.approx(height), pytest.approx(height))
+        assert converged == is_minimum
+
+
+def test_a_maximum_along_an_end_is_no_minimum() -> None:
+    """Beyond the end of a half pipe, the far side of its rim from a point beside the axis."""
+    find, _ = _finder(
+        2, lambda t: ca.vertcat(ca.cos(t[0]), ca.sin(t[0]), t[1]), [TURN, (0.0, 1.0)], [True, False]
+    )
+    for guess, is_minimum in ((0.0, 1.0), (math.pi, 0.0)):
+        theta, *_, beyond_end, converged, _ = find([0.5, 0.0, 1.3], [guess, 1.0])
+        np.testing.assert_allclose(theta, [guess, 1.0], atol=1e-15)
+        assert (beyond_end, converged) == (1.0, is_minimum)
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_nowhere(value: float) -> None:
     for (find, _), p in ((CURVE, 1), (TORUS, 2), (SADDLE, 2)):

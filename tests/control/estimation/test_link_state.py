@@ -2,19 +2,22 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.estimation.link_state import LinkState
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor, TorqueSensorOptions
+from pfsc_drake.robot.robot_model import gravity_function
+from tests.control.estimation.conftest import BEARINGS, DAMPING
 
 PERIOD, COUNT = 1e-3, 120
 NOTHING = np.zeros(3)
 
 
 def moved(arm):
-    """Return states of the arm, driven by torques that change slowly."""
+    """Return drives and states of the arm, driven by torques that change slowly."""
     turns = np.linspace(0.0, 2.0, COUNT)[:, None]
     drives = np.array([120.0, -300.0, 80.0]) * np.sin(turns)
     return drives, np.array(arm.move(drives, lambda _: NOTHING, lambda _: NOTHING, PERIOD))
@@ -54,6 +57,46 @@ def test_torques_tell_where_the_links_are(drake_arm, kind):
     swing = np.abs(states[settled, 9:] - states[settled, 3:6]).max()
     assert swing > 0.3
     np.testing.assert_allclose(links[settled, 3:6], states[settled, 3:6], rtol=0, atol=3e-3)
+
+
+def test_a_robot_at_rest_is_at_rest_from_the_first_tick(drake_arm):
+    """Its springs bear the weight: the links are not where the motors are."""
+    arm = drake_arm("elastic")
+    q = np.array([0.3, 1.3, -0.5])
+    weight = gravity_function(arm.chain)(q).full().ravel()
+    state = np.concatenate([q, NOTHING, q + weight / arm.chain.K_s, NOTHING])
+    found = Stepper(LinkState(arm.chain, 800.0, PERIOD))
+    assert np.abs(weight / arm.chain.K_s).max() > 1e-3
+    for _ in range(3):
+        told = found.step(joint_state=motors_only(state[None])[0], joint_torque=weight)
+        np.testing.assert_allclose(told["joint_state"], state, rtol=0, atol=1e-10)
+
+
+def test_links_are_expected_where_springs_move_them_that_bend_meanwhile(drake_arm):
+    """At first all torques are in balance; motors that turn bend the springs from then on."""
+    arm, v_M = drake_arm("elastic"), np.array([0.3, -0.2, 0.4])
+    q = np.array([0.3, 1.3, -0.5])
+    weight = gravity_function(arm.chain)(q).full().ravel()
+    state = np.concatenate([q, NOTHING, q + (weight - DAMPING * v_M) / arm.chain.K_s, v_M])
+    drive = weight + BEARINGS * v_M
+    np.testing.assert_allclose(
+        arm.rates(state, drive, NOTHING, NOTHING)[[3, 4, 5, 9, 10, 11]], 0.0, atol=1e-8
+    )
+    later = solve_ivp(
+        lambda _, x: arm.rates(x, drive, NOTHING, NOTHING),
+        (0.0, PERIOD),
+        state,
+        rtol=1e-10,
+        atol=1e-13,
+    ).y[:, -1]
+    found = Stepper(LinkState(arm.chain, 800.0, PERIOD))
+    given = {"joint_state": state, "joint_torque": weight}
+    found.start(**given)
+    found.set_state("prediction", np.concatenate([q, NOTHING, NOTHING]))
+    found.step(**given)
+    expected = found.states["prediction"][:6]
+    np.testing.assert_allclose(expected[3:], later[3:6], rtol=0.1)
+    assert np.all(np.abs(expected[:3] - later[:3]) < 0.2 * PERIOD * np.abs(later[3:6]))
 
 
 def test_forces_that_nobody_knows_are_found_as_accelerations(drake_arm):

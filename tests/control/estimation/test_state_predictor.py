@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.estimation.state_predictor import StatePredictor
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import gravity_function
+from tests.control.estimation.conftest import BEARINGS, DAMPING
 
 PERIOD, COUNT = 1e-3, 60
 NOTHING = np.zeros(3)
@@ -45,6 +47,33 @@ def test_the_state_is_that_of_so_many_ticks_later(drake_arm, kind, ticks):
     unpredicted = np.abs((states[settled] - later) / scale).max()
     assert unpredicted > 5e-4
     assert ahead < 0.02 * unpredicted
+
+
+def test_springs_are_exact_and_inertia_is_that_of_the_middle(drake_arm):
+    """Against the matrix exponential of the linear system that Drake tells there."""
+    arm, ticks = drake_arm("elastic"), 3
+    state, K_s, n = arm.state(), arm.chain.K_s, 3
+    v, middle = state[3:6], state[:3] + 0.5 * ticks * PERIOD * state[3:6]
+    tau = gravity_function(arm.chain)(state[:3]).full().ravel()
+
+    def accelerated(bend):
+        there = np.concatenate([middle, v, middle + bend, v])
+        return arm.rates(there, NOTHING, NOTHING, NOTHING)[3:6]
+
+    falling = accelerated(NOTHING)
+    inverse = np.column_stack(
+        [(accelerated(e) - falling) / k for e, k in zip(np.eye(n), K_s, strict=True)]
+    )
+    spring = np.hstack([-np.diag(K_s), -np.diag(DAMPING), np.diag(K_s), np.diag(DAMPING)])
+    A = np.zeros((4 * n + 1, 4 * n + 1))
+    A[:n, n : 2 * n] = A[2 * n : 3 * n, 3 * n : -1] = np.eye(n)
+    A[n : 2 * n, :-1], A[n : 2 * n, -1] = inverse @ spring, falling
+    A[3 * n : -1, :-1] = -spring / arm.chain.D_M[:, None]
+    A[3 * n : -1, 3 * n : -1] -= np.diag(BEARINGS / arm.chain.D_M)
+    A[3 * n : -1, -1] = tau / arm.chain.D_M
+    expected = (scipy.linalg.expm(ticks * PERIOD * A) @ [*state, 1.0])[:-1]
+    found = told(StatePredictor(arm.chain, ticks, PERIOD), [state], [tau])[0]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["rigid", "elastic"])

@@ -89,6 +89,9 @@ def test_a_payload(panda):
     found = check_at_rest(panda[1], status(panda, tool=1.0))
     assert "most likely the tool weighs 1.0" in found.verdict
     assert "kg more than is told" in found.verdict
+    found = check_at_rest(panda[1], status(panda, tool=-0.5))
+    assert "most likely the tool weighs 0.5" in found.verdict
+    assert "kg less than is told" in found.verdict
 
 
 def test_gravity_from_another_side(panda):
@@ -113,5 +116,29 @@ def test_what_is_listened_to(panda):
     robot.tell(replace(status(panda), v=np.full(7, 0.1)))
     with pytest.raises(InputError, match="the robot moves at"):
         listen(end, 0.5)
+    for bad in (np.nan, np.inf):
+        robot.tell(replace(status(panda), v=np.array([0.0, bad, 0.0, 0.0, 0.0, 0.0, 0.0])))
+        with pytest.raises(InputError, match="the robot moves at"):
+            listen(end, 0.5)
     with pytest.raises(InputError, match="the robot has 6 joints; the scenario's has 7"):
         check_at_rest(panda[1], RobotStatus(0, *np.zeros((3, 6))))
+
+
+class Told:
+    """A link on which one status after another waits."""
+
+    dialect = dialect("panda")
+
+    def __init__(self, *told):
+        self._told = list(told)
+
+    def receive(self, timeout):
+        return self._told.pop(0) if self._told else None
+
+
+def test_noise_is_averaged_over_half_a_second():
+    states = [RobotStatus(k, *np.full((3, 7), 1e-3 * k)) for k in range(8)]
+    found = listen(Told(*states), 0.1)
+    assert found.utime == 4
+    for values in (found.q, found.v, found.torque):
+        np.testing.assert_allclose(values, np.full(7, 2e-3))

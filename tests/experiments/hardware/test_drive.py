@@ -254,6 +254,23 @@ def test_torques_come_up_smoothly_and_within_limits():
     sent = loop.log()["sent"].values
     assert loop.log()["clipped"].values.any()
     assert np.abs(np.diff(sent, axis=0)).max() < 1.0 + 1e-9
+    # whatever was sent before, a joint is told no more than its share
+    share, loop.drive._sent = 0.95 * np.array([87.0] * 4 + [12.0] * 3), None
+    turns = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0])
+    values, clipped = loop.drive._within_limits(1e3 * turns)
+    np.testing.assert_allclose(values, share * turns)
+    assert clipped == 6
+
+
+def test_the_robots_drives_have_limits_of_their_own():
+    """The weight on top of what is told among them."""
+    loop = Loop(panda(), options=DriverOptions(low_pass=0.0, torque_rate=1e9))
+    for sign in (1.0, -1.0):
+        loop.end.send(RobotCommand(loop.robot.utime, ControlMode.TORQUE, np.full(7, sign * 1e3)))
+        loop.robot.advance()
+        np.testing.assert_array_equal(
+            loop.robot.status().torque, sign * np.array([87.0] * 4 + [12.0] * 3)
+        )
 
 
 def test_forces_are_measured_by_the_robot_and_told():

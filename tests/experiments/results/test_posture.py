@@ -112,3 +112,11 @@ def test_what_the_elbow_does_before_it_is_pushed_is_no_shift(log):
     np.testing.assert_allclose(shift[first:], elbow[first:] - elbow[first])
     log["push_force"].values[:] = 0.0
     assert not elbow_shift(log).any()
+
+
+def test_what_the_elbow_does_after_it_is_pushed_is_no_travel(log):
+    travel, pushed = elbow_travel(log), log["push_force"].values.any(axis=1)
+    last = np.flatnonzero(pushed)[-1]
+    log["elbow"].values[last + 1 :] += 9.0
+    assert elbow_travel(log) == travel
+    assert np.abs(elbow_shift(log)).max() > 8.0

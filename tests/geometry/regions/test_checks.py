@@ -106,6 +106,9 @@ def test_moving_regions_may_begin_at_one_place():
         name: ShiftedRegion(HalfSpace((0, 0, 0), UP), Still(), UP) for name in ("one", "other")
     }
     refuse_same_regions(regions, (0.0, 0.0, 1.0))
+    resting = {name: HalfSpace((0, 0, 0), UP) for name in regions}
+    with pytest.raises(InputError, match="one and other: the same region"):
+        refuse_same_regions(resting, (0.0, 0.0, 1.0))
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,14 @@
 
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from pfsc_drake.geometry import interpolate, surface_through_grid, torus
 from pfsc_drake.geometry.regions import profile, surface_region
-from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces
+from pfsc_drake.geometry.regions.pieces import NearestFoot, Pieces, nearest_foot
 from pfsc_drake.geometry.regions.surface_region import SurfaceRegion
 
 
@@ -69,6 +70,11 @@ class _PlaceFoot(NamedTuple):
     below: bool = False
 
 
+def _foot(point, number, distance, piece, below):
+    """Return an expression of a foot, as `nearest_foot` takes it."""
+    return ca.Function("foot", [point, number], [ca.vertcat(distance, piece, below)])
+
+
 @pytest.mark.parametrize("bulging", range(0, 32, 3))
 def test_a_piece_may_bulge_far_from_its_disc(bulging):
     """32 pieces in a row, a metre apart; one reaches 16 m to a place beside another's middle."""
@@ -84,9 +90,13 @@ def test_a_piece_may_bulge_far_from_its_disc(bulging):
     def project(x, y, z, row, column):
         return _PlaceFoot(float(np.linalg.norm(places[row] - (x, y, z))), None)
 
-    nearest = NearestFoot(Pieces(centre, normal, radius, sag, bends, (False, False)), project)
+    pieces = Pieces(centre, normal, radius, sag, bends, (False, False))
     x, y, z = places[bulging] - [0.0, 0.0, 0.01]
-    assert nearest(x, y, z).distance == pytest.approx(0.01)
+    assert NearestFoot(pieces, project)(x, y, z).distance == pytest.approx(0.01)
+    point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
+    away = ca.norm_2(ca.MX(ca.DM(places).T)[:, number] - point)
+    expression = nearest_foot(pieces, _foot(point, number, away, -1.0, 0.0))
+    assert float(expression([x, y, z])[0]) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("below", [False, True])
@@ -106,11 +116,16 @@ def test_a_foot_hides_its_neighbours_only_where_the_boundary_bends_away(below):
         tried.append(row)
         return _PlaceFoot(0.5 if row == 11 and not below else 1.0, (row, 0), below)
 
-    nearest = NearestFoot(Pieces(centre, normal, radius, sag, bends, (False, False)), project)
-    foot = nearest(1.02, 0.0, -1.0 if below else 1.0)
+    pieces, y = Pieces(centre, normal, radius, sag, bends, (False, False)), -1.0 if below else 1.0
+    foot = NearestFoot(pieces, project)(1.02, 0.0, y)
     assert tried[0] == 10
     assert foot.distance == (1.0 if below else 0.5)
     assert not below or not {8, 9, 11, 12} & set(tried)
+    point, number = ca.MX.sym("point", 3), ca.MX.sym("number")
+    found = _foot(point, number, ca.if_else(number == 11, 0.5, 1.0), number, float(below))
+    # what is hidden is not tried, whatever it would be
+    expression = nearest_foot(pieces, found)
+    assert float(expression([1.02, 0.0, y])[0]) == (1.0 if below else 0.5)
 
 
 @pytest.mark.parametrize(("seed", "height"), [(0, 0.01), (1, 0.04)])

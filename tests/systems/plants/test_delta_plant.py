@@ -116,8 +116,12 @@ def test_a_state_that_is_not_finite_ends_the_simulation(robot):
 
 
 def test_the_ends_of_the_travel_belong_to_it(robot):
-    for q in ([0.0, 0.1, 0.2], [0.4, 0.3, 0.35]):
-        simulate(DeltaPlant(robot), np.array(q), None, np.zeros(3), None, 0.0)
+    for q, out in (([0.0, 0.1, 0.2], -2e-9), ([0.4, 0.3, 0.35], 2e-9)):
+        state, _ = simulate(DeltaPlant(robot), np.array(q), None, np.zeros(3), None, 0.0)
+        np.testing.assert_array_equal(state[:3], q)
+        beyond = np.array([q[0] + out, *q[1:]])
+        with pytest.raises(RuntimeError, match="slide 1 left its travel"):
+            simulate(DeltaPlant(robot), beyond, None, np.zeros(3), None, 0.0)
 
 
 def test_where_the_rods_cannot_meet_the_derivatives_are_not_finite(robot):
