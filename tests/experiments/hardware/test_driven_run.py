@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
 
-from experiments.hardware import driven_run
 from experiments.hardware.driven_run import drive_scenario, prepare_driven
 from experiments.scenario_file import read_scenario
 from pfsc_drake.drivers.link import ControllerEnd
@@ -19,30 +18,6 @@ def nothing(_time, _phase):
 def prepared(name="pfc_panda_7r", *overrides):
     scenario = read_scenario(name, list(overrides))
     return prepare_driven(scenario, None, recording=False, progress=nothing)
-
-
-class Built(Exception):
-    """The settings that a station was to be built of."""
-
-
-def test_an_override_slows_both_directions_of_a_surface(monkeypatch):
-    """By its square where it is an acceleration."""
-
-    def build(settings, *_, **__):
-        raise Built(settings.reference)
-
-    monkeypatch.setattr(driven_run, "build_station", build)
-    second = "{points: [0, 0.1], velocity: 0.2, acceleration: 3}"
-    changes = "reference.places=[]", "reference.points=[0, 0.1]", f"reference.second={second}"
-    found = []
-    for override in (1.0, 0.5):
-        with pytest.raises(Built) as built:
-            prepared("sfc_polish", *changes, override=override)
-        found.append(built.value.args[0])
-    full, slow = found
-    for one, other in ((full, slow), (full.second, slow.second)):
-        assert other.velocity == 0.5 * one.velocity > 0.0
-        assert other.acceleration == 0.25 * one.acceleration > 0.0
 
 
 def test_what_is_said_of_it():

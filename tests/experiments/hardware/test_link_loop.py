@@ -7,7 +7,8 @@ import pytest
 
 from experiments.hardware import robot as robot_module
 from experiments.hardware.check import check_first
-from experiments.hardware.drive import DriveOptions, run_drive
+from experiments.hardware.drive import DriveOptions
+from experiments.hardware.driven_run import run_drive
 from experiments.hardware.robot import run_robot
 from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus
 from pfsc_drake.errors import InputError
@@ -71,7 +72,7 @@ def test_a_robot_stands_at_its_start_on_neither_side_of_it(joint, off):
 class Counted:
     """A drive that counts what it is told."""
 
-    period, has_ended = 1e-3, False
+    period, has_ended, override = 1e-3, False, 1.0
 
     def __init__(self):
         self.begun, self.answered, self.lost = [], [], None
@@ -79,6 +80,13 @@ class Counted:
     @property
     def time(self):
         return len(self.answered) * self.period
+
+    @property
+    def motion_time(self):
+        return self.time
+
+    def progress(self):
+        return {}
 
     def begin(self, status):
         self.begun.append(status)
@@ -99,7 +107,11 @@ class Counted:
 def test_a_drive_begins_with_what_is_new_and_ends_in_time(count, answers, lost):
     """The first status came while nobody listened."""
     waiting, drive = list(range(count)), Counted()
-    end = SimpleNamespace(receive=lambda timeout: waiting.pop(0) if waiting else None)
+    end = SimpleNamespace(
+        receive=lambda timeout: waiting.pop(0) if waiting else None,
+        requests=list,
+        tell=lambda utime, values: None,
+    )
     found = run_drive(drive, end, DriveOptions(), 0.01, lambda: False, lambda *_: None)
     assert drive.begun == [1]
     assert drive.answered == list(range(1, answers + 1))
