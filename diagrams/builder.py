@@ -133,7 +133,7 @@ def build_station(
         period,
         scenario.encoder_period,
     )
-    joint_state, told = add_link_state(
+    links = add_link_state(
         builder,
         part,
         scenario.controller,
@@ -143,6 +143,7 @@ def build_station(
         start_posture,
         friction,
     )
+    joint_state = links.joint_state
     place = add_place(builder, following, joint_state)
     # what acts on the tool acts where the tool is, also if a law follows another point
     beside = place.projector.GetOutputPort("manifold_point")
@@ -163,10 +164,10 @@ def build_station(
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
     requests = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | requests)
-    signals = place.signals | forces | made
+    signals = place.signals | forces | made | links.signals
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    if told is not None:
-        builder.Connect(drive["drive"], told)
+    if links.drive_torque is not None:
+        builder.Connect(drive["drive"], links.drive_torque)
     if isinstance(part, RemoteArm):
         builder.Connect(
             part.stop_request.get_output_port(), controller.GetInputPort("stop_request")
