@@ -124,7 +124,7 @@ def build_station(
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
-    joint_state = add_joint_state(
+    measured = add_joint_state(
         builder,
         true_state,
         part.robot,
@@ -138,7 +138,7 @@ def build_station(
         part,
         scenario.controller,
         scenario.encoders,
-        joint_state,
+        measured,
         true_state,
         start_posture,
         friction,
@@ -192,7 +192,7 @@ def build_station(
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
-    measured = joint_state.get_system().get_name(), joint_state.get_name()
+    source = measured.get_system().get_name(), measured.get_name()
     if scenario.simulation.fused:
         fuse_blocks(builder)
     planned = [] if task.drive_plan is None else task.drive_plan.said
@@ -220,7 +220,7 @@ def build_station(
         initial_state,
         start,
         on_motors,
-        measured,
+        source,
         warn,
         workpiece,
         operator,

@@ -77,6 +77,25 @@ def test_c_repeats_runs_of_other_kinds(name, tmp_path):
 
 
 @needs_gcc
+@pytest.mark.parametrize(
+    ("sides", "state", "torque"),
+    [("motor", "observed", []), ("motor_and_torque", "from_torque", ["joint_torque"])],
+)
+def test_deviations_of_links_that_are_found_are_told_in_c(sides, state, torque, tmp_path):
+    changes = [f"encoders.sides={sides}", f"controller.state={state}"]
+    export, recorded = exported(ARM, tmp_path, changes)
+    said = export.controller.interface()
+    assert [port["name"] for port in said["inputs"]] == ["joint_state", *torque]
+    told = {port["name"]: port["size"] for port in said["outputs"]}
+    expected = {"position_deviation": 6, "tool_deviation": 3}
+    expected |= {"velocity_deviation": 6} if torque else {}
+    assert {name: told[name] for name in list(told)[5:]} == expected
+    replay = check_export(tmp_path, quiet, "-O0", steps=10)
+    assert (replay.ticks, replay.differing) == (TICKS, 0)
+    assert np.all(recorded[:, -sum(expected.values()) :] > 0.0)
+
+
+@needs_gcc
 def test_wrong_inputs_end_in_a_fault(elastic):
     folder = elastic[0]
     build = ["make", "--silent", "OPTIMIZATION=-O0", "replay_random"]

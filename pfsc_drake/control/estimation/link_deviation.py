@@ -82,12 +82,12 @@ class LinkDeviation(Block):
         sigma_f^2 = (f_c tanh(v_M / w))^2 + (f_v v_M)^2 + (f_s / cosh^2(v_M / w))^2 / 3
         sigma_y^2 = sum over the joints of (dy/dq_J sigma_q)^2
 
-    ``share`` is that of wrong stiffnesses, ``d K_s`` being right, and of wrong scales. A torque that
-    is observed comes later by the ``lag``, and what is not known of friction is taken for one:
-    while a joint moves, an error of the friction believed, and while it rests, anything up to what
-    may hold it, evenly, whence the 3. What a motor's friction does to a velocity comes and goes
-    with its reversals, so that of these no deviation is told. An error that stays and is known,
-    as is that of the lag, counts like a deviation.
+    ``share`` is that of wrong stiffnesses, of torques that are right, and of wrong scales. Torques
+    that are observed come later by the ``lag``, and what is not known of friction is taken for
+    one: an error of what is believed while a joint moves, and anything up to what may hold it while
+    it rests, evenly, whence the 3. What that does to a velocity comes and goes with reversals, so
+    that of such velocities no deviation is told. An error of known size, as that of the lag, counts
+    like a deviation.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]`` as :class:`LinkState` finds it, shape (4N,).
@@ -130,9 +130,7 @@ class LinkDeviation(Block):
             "tool_deviation": ca.sqrt(self._jacobian(q_J) ** 2 @ squares),
         }
         if errors.of_sensors:
-            found["velocity_deviation"] = ca.sqrt(
-                noise_v**2 + (errors.share * (v_M - v_J)) ** 2
-            )
+            found["velocity_deviation"] = ca.sqrt(noise_v**2 + (errors.share * (v_M - v_J)) ** 2)
         return found
 
 
