@@ -46,7 +46,8 @@ class FoundLinks:
         joint_state: ``[q_J, v_J, q_M, v_M]`` as the controller takes it.
         drive_torque: Port that wants to know what the drives are told, if there is one.
         signals: For the log: ``found_joint_state``, unless that is all that is known of the
-            robot, and standard deviations, see :class:`LinkDeviation`; none where nothing is found.
+            robot, ``joint_torque`` where that is measured, and standard deviations, see
+            :class:`LinkDeviation`; none where nothing is found.
     """
 
     joint_state: OutputPort
@@ -97,6 +98,8 @@ def add_link_state(
     builder.Connect(torque, system.GetInputPort("joint_torque"))
     joint_state = system.GetOutputPort("joint_state")
     signals = _add_deviation(builder, robot, controller, encoders, joint_state, start, friction)
+    if source == "from_torque":
+        signals |= {"joint_torque": torque}
     if not isinstance(part, RemoteArm):
         signals |= {"found_joint_state": joint_state}
     return FoundLinks(joint_state, wants, signals)

@@ -11,6 +11,7 @@ from reporting.metrics import Metrics
 
 _SIGMAS = 2.0
 _OF_BLOCK = {
+    "joint_torque": "tau_J_measured",
     "position_deviation": "q_J_deviation",
     "velocity_deviation": "v_J_deviation",
     "tool_deviation": "y_t_deviation",
@@ -18,7 +19,7 @@ _OF_BLOCK = {
 
 
 def add_found_links(log: RunLog, station: Station, raw: Mapping[str, FloatArray]) -> None:
-    """Add where links and tool were found, and standard deviations of that, if they were.
+    """Add where links and tool were found, by what, and standard deviations, if they were.
 
     Args:
         log: To add to.
