@@ -124,7 +124,7 @@ def build_station(
 
     true_state = part.joint_state(builder)
     period, failures = scenario.controller.sampling_time, scenario.simulation
-    joint_state = add_joint_state(
+    measured = add_joint_state(
         builder,
         true_state,
         part.robot,
@@ -133,16 +133,17 @@ def build_station(
         period,
         scenario.encoder_period,
     )
-    joint_state, told = add_link_state(
+    links = add_link_state(
         builder,
         part,
         scenario.controller,
         scenario.encoders,
-        joint_state,
+        measured,
         true_state,
         start_posture,
         friction,
     )
+    joint_state = links.joint_state
     override = part.override.get_output_port() if isinstance(part, RemoteArm) else None
     place = add_place(builder, following, joint_state, override)
     # what acts on the tool acts where the tool is, also if a law follows another point
@@ -164,10 +165,10 @@ def build_station(
             forces |= add_payload(builder, mounting, part.gravity, period, place.signals | forces)
     requests = {} if operator is None else operator.requests
     controller, made = add_law(builder, following, place, forces | requests)
-    signals = place.signals | forces | made
+    signals = place.signals | forces | made | links.signals
     drive = {"drive": controller.GetOutputPort(controller.drive_port)}
-    if told is not None:
-        builder.Connect(drive["drive"], told)
+    if links.drive_torque is not None:
+        builder.Connect(drive["drive"], links.drive_torque)
     if isinstance(part, RemoteArm):
         builder.Connect(
             part.stop_request.get_output_port(), controller.GetInputPort("stop_request")
@@ -192,7 +193,7 @@ def build_station(
     discrete = part.drives.step is not None
     log = add_log(builder, signals, scenario.controller.sampling_time, discrete_plant=discrete)
     access = ControllerAccess(controller)
-    measured = joint_state.get_system().get_name(), joint_state.get_name()
+    source = measured.get_system().get_name(), measured.get_name()
     if scenario.simulation.fused:
         fuse_blocks(builder)
     planned = [] if task.drive_plan is None else task.drive_plan.said
@@ -220,7 +221,7 @@ def build_station(
         initial_state,
         start,
         on_motors,
-        measured,
+        source,
         warn,
         workpiece,
         operator,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 
+from diagrams.robots.link_state import DEVIATION
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.wiring_blocks import Hold
@@ -36,7 +37,8 @@ class ControllerPart:
         period: Sampling time [s].
         inputs: Ports of the station's systems that the network's inputs come from, by name.
         outputs: The same of its outputs: ``drive_torque`` or ``velocity_reference``,
-            ``manifold_state``, ``status``, ``fault``, ``reference``.
+            ``manifold_state``, ``status``, ``fault``, ``reference``; then standard deviations,
+            where links are found without encoders on them.
     """
 
     network: Network
@@ -93,6 +95,11 @@ class _Search:
         reference = self._source(controller.GetInputPort("reference"))
         assert reference is not None  # every law has one
         outputs["reference"] = reference
+        if self._station.diagram.HasSubsystemNamed(DEVIATION):
+            deviation = self._station.diagram.GetSubsystemByName(DEVIATION)
+            self._add(deviation)
+            ports = [deviation.get_output_port(i) for i in range(deviation.num_output_ports())]
+            outputs |= {port.get_name(): port for port in ports}
         for name, port in outputs.items():
             self._wiring.outputs[name] = _names(port)
         network = self._wiring.network()

@@ -22,6 +22,7 @@ from experiments.results.drives import (
     plan_metrics,
     saturation_warnings,
 )
+from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
 from experiments.results.link import link_metrics
 from experiments.results.mounting import mounting_metrics
@@ -216,6 +217,7 @@ def _measure(
     metrics.update(shape_metrics(station.task.shape, station.task.fit))
     limits = DriveLimitsOfRun.of(station.robot)
     metrics.update(limits.metrics(log))
+    metrics.update(found_links_metrics(log))
     metrics.update(link_metrics(log))
     metrics.update(plan_metrics(station.task.drive_plan))
     metrics.update(posture_metrics(log, station.task.lap))

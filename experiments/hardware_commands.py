@@ -51,6 +51,12 @@ def robot_command(
             help="Low pass of commanded torques; 0 for none. Default: driver.low_pass, or 30",
         ),
     ] = None,
+    damping: Annotated[
+        float,
+        typer.Option(
+            metavar="1/S", help="Rate with which joints lose their speed while no command counts."
+        ),
+    ] = 10.0,
     lose: Annotated[
         float, typer.Option(metavar="SHARE", help="Share of packets that are lost.")
     ] = 0.0,
@@ -79,7 +85,8 @@ def robot_command(
         if low_pass is None:
             own = load_typed(Scenario, loaded.data, str(loaded.path)).driver.low_pass
             low_pass = own or DriverOptions.low_pass
-        options = DriverOptions(messages.expiry if expire is None else expire, low_pass)
+        expiry = messages.expiry if expire is None else expire
+        options = DriverOptions(expiry, low_pass, damping=damping)
         transport = Transport(lose, delay)
         end = RobotEnd(open_bus(lcm), messages)
         console = Console()

@@ -26,6 +26,8 @@ _RESULT = re.compile(
 _TOOLS = ("gcc", "make")
 # a force sensor's, whatever led it to the controller
 _WRENCH, _WRENCH_SIZE = "wrench_sensor", 6
+# what joints measure of themselves, by port
+_TORQUES_OF_JOINTS = {"joint_torque": "tau_J_measured"}
 _LINKS, _MOTORS = ("q_J", "v_J"), ("q_M", "v_M")
 _TORQUE = "drive_torque"
 _ROUNDING = 1e-6  # of a tick
@@ -224,8 +226,9 @@ def _of_run(log: Path, inputs: list[dict[str, Any]]) -> _Recorded:
             sides = _LINKS + (_MOTORS if f"q_M{seen}" in run else _LINKS)
             values = np.hstack([found(f"{name}{seen}") for name in sides])
         else:
-            is_sensor = port["name"] not in run and port["size"] == _WRENCH_SIZE
-            values = found(_WRENCH if is_sensor else port["name"])
+            name = _TORQUES_OF_JOINTS.get(port["name"], port["name"])
+            is_sensor = name == port["name"] and name not in run and port["size"] == _WRENCH_SIZE
+            values = found(_WRENCH if is_sensor else name)
         columns.append(values)
         if values.shape[1] != port["size"]:
             raise InputError(f"{log}: not of this robot; {port['name']} has {port['size']} numbers")

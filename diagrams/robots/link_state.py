@@ -1,5 +1,7 @@
 """Where a controller has the links' side of elastic joints from."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
@@ -9,11 +11,17 @@ from diagrams.robots.sensors import add_torque_sensor
 from diagrams.scenario.checks import require
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant, Sum
+from pfsc_drake.control.estimation.link_deviation import LinkDeviation
+from pfsc_drake.control.estimation.link_errors import (
+    MotorEncoders,
+    errors_of_measured_torques,
+    errors_of_observed_torques,
+)
 from pfsc_drake.control.estimation.link_state import LinkState
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
 from pfsc_drake.following.law import Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_encoders import EncoderOptions, encoder_resolution
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
 
@@ -27,6 +35,26 @@ _NEEDED = {
 }
 
 
+DEVIATION = "link_deviation"
+
+
+@dataclass(frozen=True)
+class FoundLinks:
+    """What a controller has instead of the links' side of elastic joints.
+
+    Attributes:
+        joint_state: ``[q_J, v_J, q_M, v_M]`` as the controller takes it.
+        drive_torque: Port that wants to know what the drives are told, if there is one.
+        signals: For the log: ``found_joint_state``, unless that is all that is known of the
+            robot, ``joint_torque`` where that is measured, and standard deviations, see
+            :class:`LinkDeviation`; none where nothing is found.
+    """
+
+    joint_state: OutputPort
+    drive_torque: InputPort | None = None
+    signals: dict[str, OutputPort] = field(default_factory=dict)
+
+
 def add_link_state(
     builder: DiagramBuilder,
     part: RobotPart,
@@ -36,7 +64,7 @@ def add_link_state(
     true_state: OutputPort,
     start: np.ndarray,
     friction: Coefficients | None,
-) -> tuple[OutputPort, InputPort | None]:
+) -> FoundLinks:
     """Add what finds the links' side of elastic joints where it is not measured.
 
     Args:
@@ -49,20 +77,16 @@ def add_link_state(
         start: Joint coordinates at the start, at rest, shape (N,).
         friction: Coefficients f_c and f_v that are believed, each (N,), if there are any.
 
-    Returns:
-        ``[q_J, v_J, q_M, v_M]`` as the controller takes it, and a port that wants to know what the
-        drives are told, if there is one.
-
     Raises:
         InputError: If what the controller wants is not measured.
     """
     robot, source, sides = part.belief.robot, controller.state, encoders.sides
     if robot.is_rigid or (source == "measured" and controller.law in _OF_MOTORS):
-        return measured, None
+        return FoundLinks(measured)
     if not isinstance(part, RemoteArm):  # else the robot knows what it measures
         require(sides in _NEEDED[source], "encoders.sides", sides, _wanted(source))
     if source == "measured":
-        return measured, None
+        return FoundLinks(measured)
     period, wants = controller.sampling_time, None
     if source == "from_torque":
         torque = _measured_torque(builder, part, encoders, period, true_state)
@@ -72,7 +96,40 @@ def add_link_state(
     system = builder.AddNamedSystem("link_state", BlockSystem(found, period))
     builder.Connect(measured, system.GetInputPort("joint_state"))
     builder.Connect(torque, system.GetInputPort("joint_torque"))
-    return system.GetOutputPort("joint_state"), wants
+    joint_state = system.GetOutputPort("joint_state")
+    signals = _add_deviation(builder, robot, controller, encoders, joint_state, start, friction)
+    if source == "from_torque":
+        signals |= {"joint_torque": torque}
+    if not isinstance(part, RemoteArm):
+        signals |= {"found_joint_state": joint_state}
+    return FoundLinks(joint_state, wants, signals)
+
+
+def _add_deviation(
+    builder: DiagramBuilder,
+    robot: RobotModel,
+    controller: ControllerParameters,
+    encoders: EncoderOptions,
+    joint_state: OutputPort,
+    start: np.ndarray,
+    friction: Coefficients | None,
+) -> dict[str, OutputPort]:
+    """Add what tells how far the links may be from where they were found; its outputs by name."""
+    robot, period = robot.numeric, controller.sampling_time
+    uncertainty, rate = controller.state_uncertainty, controller.state_bandwidth
+    motors = MotorEncoders(
+        encoder_resolution(robot, encoders)[1], encoders.difference_quotient, encoders.filter_time
+    )
+    if controller.state == "from_torque":
+        errors = errors_of_measured_torques(robot, uncertainty, motors, start, rate, period)
+    else:
+        errors = errors_of_observed_torques(
+            robot, uncertainty, motors, start, rate, period, friction
+        )
+    block = LinkDeviation(robot, errors)
+    system = builder.AddNamedSystem(DEVIATION, BlockSystem(block, period))
+    builder.Connect(joint_state, system.get_input_port())
+    return {name: system.GetOutputPort(name) for name in block.outputs}
 
 
 def _add_torque_observer(

@@ -40,6 +40,7 @@ from experiments.figures.guidance import (
     has_regions,
     held_by_robot,
 )
+from experiments.figures.links import draw_found_links
 from experiments.figures.mounting import draw_mounting, draw_use_case
 from experiments.figures.path import draw_notch_position, draw_path, draw_surface_fit
 from experiments.figures.posture import (
@@ -136,4 +137,5 @@ _DRAWN: dict[str, tuple[Callable[[RunLog], Drawing], Callable[[RunLog], bool]]] 
     "friction_estimate": (draw_friction_estimate, _always),
     "friction_coefficients": (draw_friction_coefficients, _always),
     "deflection": (draw_deflection, _always),
+    "found_links": (draw_found_links, _always),
 }

@@ -310,15 +310,30 @@ class Drive:
         return values, int(np.count_nonzero(np.abs(values - wanted) > 1e-9))
 
     def _bridge(self, state: np.ndarray, missed: int, status: RobotStatus) -> None:
-        """Let the controller see, tick by tick, what the robot may have done in between."""
+        """Let the controller see, tick by tick, what the robot may have done in between.
+
+        Positions are cubic in time, and velocities their rates: what contradicts itself would be
+        a fault, and a stop would begin where the robot was then.
+        """
         for k in range(1, missed + 1):
             share = k / (missed + 1)
             self._tell(
-                (1.0 - share) * self._last_state + share * state,
+                self._between(state, share, (missed + 1) * self.period),
                 (1.0 - share) * self._last_torque + share * status.torque,
             )
             held = np.zeros(self._n) if self._sent is None else self._sent
             self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held, self.override))
+
+    def _between(self, state: np.ndarray, share: float, span: float) -> np.ndarray:
+        """Return the joint state at a share of a span of time that ends now, shape (4N,)."""
+        q_0, v_0 = np.split(self._last_state, 4)[:2]
+        q_1, v_1 = np.split(state, 4)[:2]
+        rest = 1.0 - share
+        ways = (share**2 * (3.0 - 2.0 * share), span * share * rest**2, span * share**2 * rest)
+        rates = (6.0 * share * rest / span, rest * (1.0 - 3.0 * share), share * (1.0 - 3.0 * rest))
+        q = q_0 + ways[0] * (q_1 - q_0) + ways[1] * v_0 - ways[2] * v_1
+        v = rates[0] * (q_1 - q_0) + rates[1] * v_0 + rates[2] * v_1
+        return np.concatenate([q, v, q, v])
 
     def _advance(self, tick: DrivenTick) -> None:
         self.record.ticks.append(tick)

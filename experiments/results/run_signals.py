@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.station import Station
 from experiments.results.drives import add_friction
+from experiments.results.found_links import add_found_links
 from experiments.results.guidance import add_guidance
 from experiments.results.mounting import add_mounting_signals
 from experiments.results.posture import add_posture
@@ -65,6 +66,7 @@ def _named(station: Station, times: FloatArray, raw: dict[str, FloatArray]) -> R
     pose = _tool_poses(station, raw["joint_state"])
     log.add("y_t", pose[:, :3])
     log.add("R_e", pose[:, 3:])
+    add_found_links(log, station, raw)
     deceived = measured is not None or not station.part.belief.sees_truth
     if deceived:
         log.add("y_t_measured", raw["tool_pose"][:, :3])

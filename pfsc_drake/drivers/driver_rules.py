@@ -33,7 +33,7 @@ class DriverOptions:
         require_positive("--expire", self.expiry)
         require_not_negative("--low-pass", self.low_pass)
         require_positive("torque_rate", self.torque_rate)
-        require_not_negative("damping", self.damping)
+        require_not_negative("--damping", self.damping)
 
 
 def torque_rates(rate: float, effort: np.ndarray) -> np.ndarray:

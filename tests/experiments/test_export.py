@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.export import export_scenario
-from experiments.replay import check_export
+from experiments.replay import check_export, replay_log
+from experiments.results.run_log import RunLog
 from experiments.scenario_file import read_scenario
 from tests.compilers import needs_gcc
 
@@ -74,6 +75,37 @@ def test_c_repeats_runs_of_other_kinds(name, tmp_path):
     replay = check_export(tmp_path, quiet, "-O0", steps=10)
     assert (replay.ticks, replay.differing) == (TICKS, 0)
     assert np.ptp(recorded, axis=0).max() > 0.0
+
+
+def assert_torques_are_fed_from_a_log(folder, recorded):
+    log = RunLog(1e-3 * np.arange(TICKS))
+    names = ("q_J_measured", "v_J_measured", "q_M_measured", "v_M_measured", "tau_J_measured")
+    for k, name in enumerate(names):
+        log.add(name, recorded[:, 6 * k : 6 * k + 6])
+    log.write(folder / "log.h5")
+    told = replay_log(folder, folder / "log.h5", quiet).told
+    np.testing.assert_array_equal(told, recorded[:, 30:36])
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("sides", "state", "torque"),
+    [("motor", "observed", []), ("motor_and_torque", "from_torque", ["joint_torque"])],
+)
+def test_deviations_of_links_that_are_found_are_told_in_c(sides, state, torque, tmp_path):
+    changes = [f"encoders.sides={sides}", f"controller.state={state}"]
+    export, recorded = exported(ARM, tmp_path, changes)
+    said = export.controller.interface()
+    assert [port["name"] for port in said["inputs"]] == ["joint_state", *torque]
+    told = {port["name"]: port["size"] for port in said["outputs"]}
+    expected = {"position_deviation": 6, "tool_deviation": 3}
+    expected |= {"velocity_deviation": 6} if torque else {}
+    assert {name: told[name] for name in list(told)[5:]} == expected
+    replay = check_export(tmp_path, quiet, "-O0", steps=10)
+    assert (replay.ticks, replay.differing) == (TICKS, 0)
+    assert np.all(recorded[:, -sum(expected.values()) :] > 0.0)
+    if torque:
+        assert_torques_are_fed_from_a_log(tmp_path, recorded)
 
 
 @needs_gcc

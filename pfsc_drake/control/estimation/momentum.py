@@ -19,6 +19,8 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.filters import SignalDerivatives
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, gravity_torque
 
+SMOOTH = 0.01  # rad/s or m/s, within which Coulomb friction changes its sign
+
 
 @dataclass(frozen=True)
 class MomentumModel:
@@ -173,12 +175,9 @@ def motor_momentum(robot: RobotModel, friction: tuple[np.ndarray, np.ndarray]) -
     n, (f_c, f_v) = robot.dimension, friction
     state = ca.SX.sym("state", 4 * n)
     v_M = ca.vertsplit(state, n)[3]
-    rubbing = ca.DM(f_c) * ca.tanh(v_M / _SMOOTH) + ca.DM(f_v) * v_M
+    rubbing = ca.DM(f_c) * ca.tanh(v_M / SMOOTH) + ca.DM(f_v) * v_M
     forces = -ca.DM(robot.viscous_damping) * v_M - rubbing
     return MomentumModel(state, robot.D_M * v_M, forces, np.ones(n), -np.ones(n), -1.0)
-
-
-_SMOOTH = 0.01  # rad/s or m/s, within which Coulomb friction changes its sign
 
 
 def _links(robot: RobotModel, state: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.blocks.cases import is_finite, where
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.robot_model import MAY_BE_PARAMETRIC, RobotModel, bias_torque
@@ -90,6 +91,8 @@ class StatePredictor(Block):
     whose state is that of d ticks later: it follows from what is measured, from the torques that
     are on their way, and from the model, see :func:`advanced`. An error of the model is an error of
     d ticks' motion alone. Velocities that are older than positions are brought up to them, too.
+    What cannot be foretold, because something of the state is no number, is passed on as it is
+    measured: by that a robot can still be stopped and held.
 
     Ports:
         joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,).
@@ -143,7 +146,8 @@ class StatePredictor(Block):
 
     def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
         """Return all outputs, and the inner values."""
-        return {"joint_state": self._advance(u.joint_state, x.sent)}
+        told = self._advance(u.joint_state, x.sent)
+        return {"joint_state": where(is_finite(told), told, u.joint_state)}
 
     def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
         """Return what is remembered at the next tick; what is left out stays."""

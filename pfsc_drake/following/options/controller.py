@@ -10,6 +10,7 @@ from pfsc_drake.checks import (
     require_not_negative,
     require_positive,
 )
+from pfsc_drake.control.estimation.link_deviation import StateUncertainty
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.following.options.friction import FrictionCompensationParameters
 from pfsc_drake.yaml.reading import NAME_OR_FILE
@@ -243,6 +244,7 @@ class ControllerParameters:
         state: Where it has the links' side of elastic joints from: ``measured``; ``from_torque``,
             by torque sensors in the joints; ``observed``, by the motors alone.
         state_bandwidth: Bandwidth with which the links' motion and torques are observed [rad/s].
+        state_uncertainty: How well is known by what that is done, for a run's standard deviations.
         delay: Until a torque acts that the law commands [s], a multiple of its sampling time, at
             most 10 of it: it then acts on the state that its model foretells for that moment, with
             velocities of the age of positions. Null for a law that takes what is measured.
@@ -266,6 +268,7 @@ class ControllerParameters:
     posture: PostureParameters = dc.field(default_factory=PostureParameters)
     state: str = "measured"
     state_bandwidth: float = 800.0
+    state_uncertainty: StateUncertainty = dc.field(default_factory=StateUncertainty)
     delay: float | None = None
 
     def __post_init__(self) -> None:

@@ -120,3 +120,14 @@ def test_a_robot_at_rest_stays_at_rest(drake_arm):
 def test_numbers_out_of_range(drake_arm, ticks, age, message):
     with pytest.raises(InputError, match=message):
         StatePredictor(drake_arm("rigid").chain, ticks, PERIOD, age)
+
+
+def test_what_is_not_measured_is_not_foretold(drake_arm):
+    """The rest is passed on, so that a stop still sees it; afterwards all is foretold again."""
+    arm = drake_arm("elastic")
+    states = np.array(arm.move(drives(), lambda _: NOTHING, lambda _: NOTHING, PERIOD))[:3]
+    whole = told(StatePredictor(arm.chain, 2, PERIOD), states, drives())
+    states[1, 7] = np.nan
+    found = told(StatePredictor(arm.chain, 2, PERIOD), states, drives())
+    np.testing.assert_array_equal(found[1], states[1])
+    np.testing.assert_array_equal(found[[0, 2]], whole[[0, 2]])

@@ -6,6 +6,7 @@ import pytest
 from diagrams.builder import build_station
 from diagrams.robots import link_state
 from diagrams.scenario import ControllerParameters
+from experiments.results.found_links import found_links_metrics
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
@@ -85,3 +86,67 @@ def test_friction_that_is_believed_is_no_torque_of_a_spring(load_arm, monkeypatc
                 None, robot, ControllerParameters(), None, np.zeros(3), friction
             )
     np.testing.assert_array_equal(told, [[f_c, f_v], np.zeros((2, 3))])
+
+
+def drawn(load_scenario, sides, state, seed, errors=1.0):
+    """Return the log of 0.4 s of which errors were drawn as the controller has them told.
+
+    Args:
+        load_scenario: Loads a shipped scenario.
+        sides: What is measured.
+        state: Where the links are found by.
+        seed: Seed of the errors.
+        errors: What they are multiplied by.
+    """
+    settings, rng = load_scenario("pfc_elastic_6r"), np.random.default_rng(seed)
+    settings.encoders.sides, settings.controller.state = sides, state
+    known, torque = settings.controller.state_uncertainty, settings.encoders.torque
+    for kind in ("eta", "xi", "phi"):
+        getattr(settings.controller.gains["elastic"], kind).poles = [-40, -40, -250, -350]
+    settings.reference.dwell, settings.start.transition = 0.1, 0.1
+
+    def factors(sigma):
+        return (1.0 + errors * sigma * rng.standard_normal(6)).tolist()
+
+    settings.model_error.stiffness = factors(known.stiffness)
+    if state == "from_torque":
+        torque.scale = errors * known.torque_scale * rng.standard_normal()
+        torque.noise, torque.seed = errors * known.torque_noise, seed
+    else:
+        settings.friction.file = "comau_racer_1_4"
+        settings.model_error.friction = factors(known.friction)
+    settings.simulation.fused, settings.simulation.integrator = True, "runge_kutta3"
+    station = build_station(settings, FOLDER)
+    result = simulate(station, settings.simulation, 0.4, lambda *_: None)
+    assert result.fault is None
+    return collect_log(station, result.root)
+
+
+def within(log):
+    """Return the share of positions within two standard deviations, and error by deviation."""
+    off = np.abs(log["q_J_found"].values - log["q_J"].values)
+    ratio = off / log["q_J_deviation"].values
+    share = found_links_metrics(log)["links_within_two_sigma"].value
+    assert share == pytest.approx(np.mean(ratio <= 2.0))
+    return share, np.mean(ratio**2)
+
+
+@pytest.mark.parametrize(
+    ("sides", "state"), [("motor_and_torque", "from_torque"), ("motor", "observed")]
+)
+def test_deviations_promise_what_is_kept(load_scenario, sides, state):
+    """Over draws of all that is said to be uncertain; of errors three times as large it is not."""
+    logs = [drawn(load_scenario, sides, state, seed) for seed in (1, 2, 3)]
+    shares, squares = np.array([within(log) for log in logs]).T
+    assert 0.9 < shares.mean() < 0.99
+    assert 0.5 < squares.mean() < 1.6
+    log = logs[0]
+    off = np.abs(log["y_t_found"].values - log["y_t"].values)
+    assert 0.8 < np.mean(off <= 2.0 * log["y_t_deviation"].values) <= 1.0
+    assert 1e-5 < found_links_metrics(log)["largest_tool_deviation"].value < 1e-3
+    assert within(drawn(load_scenario, sides, state, 0, errors=3.0))[0] < 0.8
+
+
+def test_who_measures_the_links_is_told_no_deviation(load_scenario):
+    station = build_station(load_scenario("pfc_elastic_3r"), FOLDER)
+    assert not [name for name in station.log.rows if "deviation" in name or "found" in name]

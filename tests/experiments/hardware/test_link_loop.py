@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 from experiments.hardware import robot as robot_module
 from experiments.hardware.check import check_first
@@ -18,7 +19,7 @@ STATUS = RobotStatus(0, np.array([0.1, -0.2]), np.zeros(2), np.zeros(2))
 
 
 def test_what_was_missed_is_taken_to_lie_between():
-    """Three ticks without a status: the controller sees them on a line, and answers the last."""
+    """Three ticks without a status: the controller sees a cubic way, and answers the last."""
     loop, told = Loop(panda()), []
     drive, status, tell = loop.drive, loop.robot.status(), loop.drive._tell
 
@@ -34,12 +35,18 @@ def test_what_was_missed_is_taken_to_lie_between():
     for tick in range(3):
         drive.answer(at(tick))
     loop.robot_end.hear()
-    before, later = told[-1], at(6, q=status.q + 4e-4, torque=status.torque + 2.0)
+    before, later = (
+        told[-1],
+        at(6, q=status.q + 4e-4, v=status.v + 0.02, torque=status.torque + 2.0),
+    )
     told.clear()
     drive.answer(later)
     after = np.concatenate([later.q, later.v, later.q, later.v, later.torque])
-    expected = before + np.arange(1.0, 5.0)[:, None] / 4.0 * (after - before)
-    np.testing.assert_allclose(told, expected, rtol=0, atol=1e-14)
+    ticks = np.arange(1.0, 5.0) * 1e-3
+    way = CubicHermiteSpline([0.0, 4e-3], [before[:7], after[:7]], [before[7:14], after[7:14]])
+    side = np.hstack([way(ticks), way(ticks, 1)])
+    torque = before[28:] + ticks[:, None] / 4e-3 * (after[28:] - before[28:])
+    np.testing.assert_allclose(told, np.hstack([side, side, torque]), rtol=0, atol=1e-12)
     assert loop.robot_end.hear().utime == later.utime
     assert drive.time == pytest.approx(0.007)
     # what comes after the next is nothing any more

@@ -1,0 +1,142 @@
+"""How far links may be from where motors and torques say that they are."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pfsc_drake.blocks.block import Block, Port, Values
+from pfsc_drake.checks import require_between, require_not_negative
+from pfsc_drake.compiled.content import once_per_content
+from pfsc_drake.control.estimation.momentum import SMOOTH
+from pfsc_drake.robot.robot_model import RobotModel, pose_function
+
+
+@dataclass
+class StateUncertainty:
+    """How well is known by what a controller finds the links' side of elastic joints.
+
+    All are standard deviations. Errors of two joints, and of two kinds, have nothing to do with
+    each other.
+
+    Attributes:
+        stiffness: Stiffness of a joint, as a share of it.
+        torque_scale: Relative error of the scale of torque sensors.
+        torque_noise: Noise of a sample of theirs, as a share of the joint's largest torque.
+        friction: Friction that is believed, as a share of it.
+        coulomb: Coulomb friction of which nothing is believed, as a share of the joint's largest
+            torque.
+        viscous: Viscous friction of which nothing is believed, as a share of the largest torque at
+            the largest speed.
+    """
+
+    stiffness: float = 0.05
+    torque_scale: float = 0.01
+    torque_noise: float = 0.001
+    friction: float = 0.2
+    coulomb: float = 0.05
+    viscous: float = 0.05
+
+    def __post_init__(self) -> None:
+        require_between("stiffness", self.stiffness, 0.0, 0.5, "")
+        require_between("torque_scale", self.torque_scale, 0.0, 0.5, "")
+        for key in ("torque_noise", "friction", "coulomb", "viscous"):
+            require_not_negative(key, getattr(self, key))
+
+
+@dataclass(frozen=True)
+class LinkErrors:
+    """Standard deviations of what goes into the links' side of N joints; see the block.
+
+    Attributes:
+        noise: What noise leaves of positions and velocities, shape (2, N) [rad, rad/s or m, m/s].
+        share: Relative error of a deflection.
+        lag: By how much torques are found later than they act [s].
+        coulomb: Of Coulomb friction while a joint moves, shape (N,) [Nm or N].
+        stuck: Largest friction that may hold a joint at rest, shape (N,) [Nm or N].
+        viscous: Of viscous friction, shape (N,) [Nm s/rad or N s/m].
+    """
+
+    noise: np.ndarray
+    share: float
+    lag: float
+    coulomb: np.ndarray
+    stuck: np.ndarray
+    viscous: np.ndarray
+
+    @property
+    def of_sensors(self) -> bool:
+        """Whether torques are measured, not observed."""
+        return self.lag == 0.0
+
+
+class LinkDeviation(Block):
+    """Tells standard deviations of the links' positions and velocities, and of the tool point.
+
+    What :class:`LinkState` finds is off by errors that have nothing to do with each other. With
+    the deflection ``d = q_M - q_J`` of a joint as it was found::
+
+        sigma_q^2 = noise^2 + (share d)^2 + (lag d')^2 + (sigma_f / K_s)^2
+        sigma_v^2 = noise_v^2 + (share d')^2                 of torques that are measured
+        sigma_f^2 = (f_c tanh(v_M / w))^2 + (f_v v_M)^2 + (f_s / cosh^2(v_M / w))^2 / 3
+        sigma_y^2 = sum over the joints of (dy/dq_J sigma_q)^2
+
+    ``share`` is that of wrong stiffnesses, of torques that are right, and of wrong scales. Torques
+    that are observed come later by the ``lag``, and what is not known of friction is taken for
+    one: an error of what is believed while a joint moves, and anything up to what may hold it while
+    it rests, evenly, whence the 3. What that does to a velocity comes and goes with reversals, so
+    that of such velocities no deviation is told. An error of known size, as that of the lag, counts
+    like a deviation.
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]`` as :class:`LinkState` finds it, shape (4N,).
+        position_deviation (output): sigma_q, shape (N,) [rad or m].
+        velocity_deviation (output): sigma_v where torques are measured, shape (N,)
+            [rad/s or m/s].
+        tool_deviation (output): sigma_y along the axes of the world, shape (3,) [m].
+
+    Args:
+        robot: The robot as it is believed, N joints.
+        errors: Standard deviations of what goes into it.
+    """
+
+    def __init__(self, robot: RobotModel, errors: LinkErrors) -> None:
+        n = robot.dimension
+        self._n, self._errors = n, errors
+        elastic = robot.elastic_joints
+        self._compliance = ca.DM(np.where(elastic, 1.0 / robot.K_s, 0.0))
+        self._jacobian = _tool_jacobian(robot)
+        self.inputs = {"joint_state": Port(4 * n, "rad, rad/s or m, m/s")}
+        self.outputs = {"position_deviation": Port(n, "rad or m"), "tool_deviation": Port(3, "m")}
+        if errors.of_sensors:
+            self.outputs["velocity_deviation"] = Port(n, "rad/s or m/s")
+        self.states = {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        errors = self._errors
+        q_J, v_J, q_M, v_M = ca.vertsplit(u.joint_state, self._n)
+        noise_q, noise_v = (ca.DM(noise) for noise in errors.noise)
+        squares = noise_q**2 + (errors.share * (q_M - q_J)) ** 2
+        if not errors.of_sensors:
+            slip = ca.tanh(v_M / SMOOTH)
+            friction = (ca.DM(errors.coulomb) * slip) ** 2 + (ca.DM(errors.viscous) * v_M) ** 2
+            held = ca.DM(errors.stuck) * (1.0 - slip**2)
+            squares += (errors.lag * (v_M - v_J)) ** 2
+            squares += self._compliance**2 * (friction + held**2 / 3.0)
+        found = {
+            "position_deviation": ca.sqrt(squares),
+            "tool_deviation": ca.sqrt(self._jacobian(q_J) ** 2 @ squares),
+        }
+        if errors.of_sensors:
+            found["velocity_deviation"] = ca.sqrt(noise_v**2 + (errors.share * (v_M - v_J)) ** 2)
+        return found
+
+
+@once_per_content()
+def _tool_jacobian(robot: RobotModel) -> ca.Function:
+    """Return ``q_J -> dy_t / dq_J``, shapes (N,) and (3, N)."""
+    q = ca.SX.sym("q", robot.dimension)
+    y_t = pose_function(robot)(q)[:3]
+    return ca.Function("tool_jacobian", [q], [ca.cse(ca.densify(ca.jacobian(y_t, q)))])
