@@ -30,9 +30,9 @@ from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.length import way_on_surface
-from pfsc_drake.geometry.surfaces.point import SurfaceTarget
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport, surface_report
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem

@@ -17,8 +17,8 @@ from pfsc_drake.geometry.foot import FootFinder
 from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import Frame
-from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.table import Continuation, PathTable, continuations, tabulate
+from pfsc_drake.geometry.point import PathPointLayout
 
 # Of the domain.
 _LONGEST_STEP = 1.0 / 32.0

@@ -13,9 +13,9 @@ from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.foot import Foot, FootFinder, first_and_bend, largest_eigenvalue
 from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
+from pfsc_drake.geometry.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
-from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.product import checked_product
 from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, GlobalProjector, SurfaceProjection
 from pfsc_drake.geometry.surfaces.surface import Surface, partial_count
