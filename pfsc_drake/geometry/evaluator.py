@@ -8,6 +8,7 @@ from typing import Generic, Literal, TypeVar
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pfsc_drake.compiled.bound_function import BoundFunction
 from pfsc_drake.compiled.content import once_per_content
@@ -63,7 +64,7 @@ class ManifoldEvaluator(ABC, Generic[Layout]):
         """``y_t -> memory``, the nearest place of the whole manifold, on the first lap."""
         return self._function("place")
 
-    def __call__(self, point: Sequence[float], *memory: float | Sequence[float]) -> np.ndarray:
+    def __call__(self, point: ArrayLike, *memory: ArrayLike) -> np.ndarray:
         """Return the manifold's point next to a point, new array [layout.size].
 
         Args:
