@@ -1,7 +1,7 @@
 """Layouts of what a path or a surface tells the controller at each tick."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from pfsc_drake.errors import InputError
@@ -21,12 +21,23 @@ class PointLayout(ABC):
         order: Relative degree r of the law that reads it, 1..5.
         oriented: True if there is an orientation of its own.
 
+    Attributes:
+        size: Length of the whole array.
+
     Raises:
         InputError: order out of range.
     """
 
     order: int
     oriented: bool
+
+    theta: slice = field(init=False, repr=False, compare=False)
+    eta: slice = field(init=False, repr=False, compare=False)
+    alpha: slice = field(init=False, repr=False, compare=False)
+    status: slice = field(init=False, repr=False, compare=False)
+    position: slice = field(init=False, repr=False, compare=False)
+    quaternion: slice = field(init=False, repr=False, compare=False)
+    size: int = field(init=False, repr=False, compare=False)
 
     kind: ClassVar[str]
 
@@ -36,56 +47,20 @@ class PointLayout(ABC):
                 f"order of {self.kind} point: {self.order};"
                 f" an integer from 1 to {_MAX_ORDER} is required"
             )
-
-    @property
-    def theta(self) -> slice:
-        """Slice of theta*, [p]."""
-        return self._place("theta")
-
-    @property
-    def eta(self) -> slice:
-        """Slice of the tangential coordinates, [p], m."""
-        return self._place("eta")
-
-    @property
-    def alpha(self) -> slice:
-        """Slice of alpha, [1]."""
-        return self._place("alpha")
-
-    @property
-    def status(self) -> slice:
-        """Slice of the status, [1]."""
-        return self._place("status")
-
-    @property
-    def position(self) -> slice:
-        """Slice of the derivatives of sigma_t."""
-        return self._place("position")
-
-    @property
-    def quaternion(self) -> slice:
-        """Slice of the derivatives of q, or empty."""
-        return self._place("quaternion")
-
-    @property
-    def size(self) -> int:
-        """Length of the whole array."""
-        return sum(self._lengths.values())
+        end = 0
+        for name, length in self._lengths().items():
+            begin, end = end, end + length
+            object.__setattr__(self, name, slice(begin, end))
+        object.__setattr__(self, "size", end)
 
     @property
     @abstractmethod
     def memory(self) -> slice:
         """Slice of what the next projection begins with."""
 
-    @property
     @abstractmethod
     def _lengths(self) -> dict[str, int]:
         """Lengths of all fields, in their order."""
-
-    def _place(self, field: str) -> slice:
-        lengths = self._lengths
-        begin = sum(list(lengths.values())[: list(lengths).index(field)])
-        return slice(begin, begin + lengths[field])
 
 
 @dataclass(frozen=True)
@@ -122,24 +97,16 @@ class PathPointLayout(PointLayout):
 
     turning: bool = False
 
+    normal: slice = field(init=False, repr=False, compare=False)
+    turn: slice = field(init=False, repr=False, compare=False)
+
     kind: ClassVar[str] = "path"
-
-    @property
-    def normal(self) -> slice:
-        """Slice of e_perp, [3]."""
-        return self._place("normal")
-
-    @property
-    def turn(self) -> slice:
-        """Slice of the derivatives of psi, [order], or empty."""
-        return self._place("turn")
 
     @property
     def memory(self) -> slice:
         """Slice of what the next projection begins with, theta*, [1]."""
         return self.theta
 
-    @property
     def _lengths(self) -> dict[str, int]:
         r = self.order
         lengths = {"theta": 1, "eta": 1, "alpha": 1, "status": 1, "normal": 3}
@@ -181,7 +148,6 @@ class SurfacePointLayout(PointLayout):
         """Slice of what the next projection begins with, theta and eta, [4]."""
         return slice(0, self.eta.stop)
 
-    @property
     def _lengths(self) -> dict[str, int]:
         position, quaternion = (partial_count(n) for n in (self.order + 1, self.order))
         lengths = {"theta": 2, "eta": 2, "alpha": 1, "status": 1, "position": 3 * position}

@@ -8,12 +8,12 @@ from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
 from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
 from pfsc_drake.geometry.curves.spline import UniformKnots, check_smoothness
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals, residuals, smoothest_within
-from pfsc_drake.geometry.surfaces.product import ProductSurface
-from pfsc_drake.geometry.surfaces.regularity import check_regular
-from pfsc_drake.geometry.surfaces.spline_surface import (
+from pfsc_drake.geometry.surfaces.product import (
+    ProductSurface,
     interpolated_surface,
     uniform_spline_surface,
 )
+from pfsc_drake.geometry.surfaces.regularity import check_regular
 
 # Points of a closed direction.
 _FEWEST_CLOSED = 3

@@ -25,9 +25,8 @@ from pfsc_drake.geometry.surfaces.penalized_surface import (
     residuals,
     smoothest_within,
 )
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.product import ProductSurface, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.spline_surface import uniform_spline_surface
 from pfsc_drake.geometry.surfaces.surface import Interval
 
 FEWEST_POINTS, MOST_POINTS = 50, 100_000
