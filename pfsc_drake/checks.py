@@ -1,5 +1,6 @@
 """Checks of values that people write."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,8 @@ from pfsc_drake.errors import require as require
 from pfsc_drake.errors import require_positive as require_positive
 
 LARGEST_ANGLE = 3600.0  # deg; ten turns
+# Text that is a number. Python's float() would take more: underscores, the digits of all scripts.
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _ROUNDING = 1e-6
 
 

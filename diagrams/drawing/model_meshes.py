@@ -4,10 +4,8 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from xml.dom import expatbuilder
-from xml.dom.minidom import Document, Element, Text
 from xml.etree import ElementTree
-from xml.parsers.expat import ExpatError
+from xml.sax.saxutils import escape
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Mesh, Meshcat, MeshcatParams, Rgba, Shape, Sphere
@@ -25,6 +23,13 @@ from pydrake.multibody.tree import (
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.mesh_files import read_stl
+from pfsc_drake.robot.models.model_text import (
+    Edit,
+    distinct_materials,
+    edited_text,
+    with_attributes,
+)
+from pfsc_drake.robot.models.model_xml import Element, read_model_xml
 from pfsc_drake.systems.drawing.robot_visualizer import BodyPart, Triangles
 
 _DRAWN = "obj, gltf, dae and stl"
@@ -133,70 +138,36 @@ def drawable_text(file: FilePath, resolve: Resolve) -> tuple[str, list[NotDrawn]
         The text, and what cannot be drawn.
 
     Raises:
-        InputError: If the file is no XML.
+        InputError: If the file cannot be read as a model.
     """
-    try:
-        # without namespaces, since URDF files often do not declare the prefix "drake:"
-        document = expatbuilder.parseString(file.read_bytes(), namespaces=False)
-    except (ExpatError, ValueError, OSError) as error:
-        raise InputError(f"{file}: {error}") from None
-    for collision in list(document.getElementsByTagName("collision")):
-        _remove(collision)
-    _part_materials(document)
-    missing = []
-    for visual in list(document.getElementsByTagName("visual")):
-        for mesh in visual.getElementsByTagName("mesh"):
+    model, missing = read_model_xml(file), list[NotDrawn]()
+    edits = list(distinct_materials(model))
+    every = list(model.root.within())
+    edits += [(element, "") for element in every if element.name in ("collision", "texture")]
+    for link in (element for element in every if element.name == "link"):
+        for visual in link.all("visual"):
             try:
-                _locate(mesh, resolve)
+                edits += [_located(mesh, resolve) for mesh in visual.all("geometry", "mesh")]
             except InputError as error:
-                missing.append(NotDrawn(_name_of_link(visual), str(error)))
-                _remove(visual)
-                break
-    return document.toxml(), missing
+                missing.append(NotDrawn(link.attributes.get("name", ""), str(error)))
+                edits.append((visual, ""))
+    return edited_text(model, edits), missing
 
 
-def _locate(mesh: Element, resolve: Resolve) -> None:
-    """Replace a mesh's address by its file.
+def _located(mesh: Element, resolve: Resolve) -> Edit:
+    """Return the edit that replaces a mesh's address by its file.
 
     Raises:
         InputError: If that cannot be drawn.
     """
-    addresses = mesh.getElementsByTagName("uri")  # SDF; URDF has an attribute
-    text = addresses[0].firstChild if addresses else None
-    written = text.data if isinstance(text, Text) else mesh.getAttribute("filename")
+    uri = mesh.first("uri")  # SDF; URDF has an attribute
+    written = mesh.attributes.get("filename", "") if uri is None else uri.text
     file = resolve(written.strip())
     check_mesh_file(file)
-    if isinstance(text, Text):
-        text.data = f"file://{file.resolve()}"  # text has no folder for relative names
-    else:
-        mesh.setAttribute("filename", f"file://{file.resolve()}")
-
-
-def _part_materials(document: Document) -> None:
-    """Give a material that differs from an earlier one of its name a name of its own."""
-    for texture in list(document.getElementsByTagName("texture")):
-        _remove(texture)
-    known: dict[str, str] = {}
-    for number, material in enumerate(list(document.getElementsByTagName("material"))):
-        name, colors = material.getAttribute("name"), material.getElementsByTagName("color")
-        if not name or not colors:
-            continue
-        content = colors[0].getAttribute("rgba")
-        if name in known and material.parentNode is document.documentElement:
-            _remove(material)  # Drake takes each name once there, even with equal contents
-        elif known.setdefault(name, content) != content:
-            material.setAttribute("name", f"{name}#{number}")
-
-
-def _name_of_link(visual: Element) -> str:
-    link = visual.parentNode
-    return link.getAttribute("name") if isinstance(link, Element) else ""
-
-
-def _remove(element: Element) -> None:
-    if element.parentNode is not None:
-        element.parentNode.removeChild(element)
-        element.unlink()
+    address = f"file://{file.resolve()}"  # text has no folder for relative names
+    if uri is None:
+        return with_attributes(mesh, filename=address)
+    return uri, f"<uri>{escape(address)}</uri>"
 
 
 _STICK_COLOR = Rgba(0.55, 0.58, 0.62)

@@ -122,9 +122,8 @@ def build_replay(
     positions = add_motion(builder, manifold, motion, workpiece, meshcat, period)
     if mounting is not None:
         _add_mounting(builder, mounting, motion, meshcat, period)
-    body = builder.AddNamedSystem(
-        "robot_visualizer", RobotVisualizer(robot.plant, robot.parts, meshcat, period)
-    )
+    visualizer = RobotVisualizer(robot.plant, robot.parts, meshcat, period)
+    body = builder.AddNamedSystem("robot_visualizer", visualizer)
     builder.Connect(positions, body.GetInputPort("positions"))
     return builder.Build()
 

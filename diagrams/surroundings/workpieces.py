@@ -22,8 +22,8 @@ from diagrams.scenario.workpiece import NotchParameters, SoftBall, WorkpiecePara
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import Path, PathPointLayout, zyx_to_matrix
+from pfsc_drake.geometry.surfaces.curvature import surface_axes
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
-from pfsc_drake.geometry.surfaces.point import surface_axes
 from pfsc_drake.geometry.surfaces.surface import Surface
 from pfsc_drake.geometry.workpieces import surface_mesh, swept_surface
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL

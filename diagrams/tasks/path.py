@@ -33,17 +33,15 @@ from pfsc_drake.geometry import (
     interpolate_orientation,
     path_from_waypoints,
     read_waypoints,
-    zyx_to_quaternion,
-    zyz_to_quaternion,
 )
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
 from pfsc_drake.geometry.surfaces.surface import Surface
 
 _GIVE_ORIENTATION = (
     "give the orientation too: columns zyx_deg_1, zyx_deg_2, zyx_deg_3 of the waypoint file, or "
     "path.orientation.keyframes: [{angles_deg: [0, 0, 0]}], one being kept everywhere"
 )
-_EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
 def make_path(
@@ -185,7 +183,7 @@ def _orientation(
     keyframes = parameters.keyframes
     if not keyframes:
         return None
-    to_quaternion = _EULER[parameters.convention]
+    to_quaternion = EULER_TO_QUATERNION[parameters.convention]
     quaternions = to_quaternion(np.deg2rad([keyframe.angles_deg for keyframe in keyframes]))
     if len(keyframes) == 1:
         return OrientationCurve.fixed(quaternions[0], position.domain)

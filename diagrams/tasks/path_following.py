@@ -23,7 +23,6 @@ from diagrams.tasks.surface import followed_angles, require_joints
 from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import rest_to_rest
-from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.moving_point import MovingPoint, TrajectoryPoint
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.errors import InputError
@@ -31,11 +30,10 @@ from pfsc_drake.geometry import (
     ProjectionStatus,
     quaternion_to_matrix,
     shape_report,
-    zyx_to_matrix,
 )
+from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.path import PathTarget
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.systems.block_system import BlockSystem
 
 # m, between the points of the way along the path
@@ -60,6 +58,7 @@ class PathTask(Task):
         InputError: If the path or the motion along it cannot be made.
     """
 
+    projector_name = "path_projector"
     _law_manifold: type[PathManifold] = PathManifold
     place: PathManifold
 
@@ -124,7 +123,12 @@ class PathTask(Task):
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """Return the point of the true place's manifold next to a tool, shape (size,)."""
-        return self.path.evaluator(self.relative_degree)(y_t.tolist(), memory[0])
+        return self.evaluator(y_t.tolist(), memory[0])
+
+    @property
+    def evaluator(self) -> PathEvaluator:
+        """What finds places on the true place's manifold."""
+        return self.path.evaluator(self.relative_degree)
 
     @property
     def drawing(self) -> PathDrawing:
@@ -155,27 +159,12 @@ class PathTask(Task):
         rounding = 1e-9 * self.path.length
         return self.path.closed or -rounding <= eta <= self.path.length + rounding
 
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold."""
-        projector = builder.AddNamedSystem(
-            "path_projector",
-            BlockSystem(Projector(self.path.evaluator(self.relative_degree)), period),
-        )
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
-
     def start(self, shift: np.ndarray) -> StartPoint:
         """Return where the tool starts."""
         start, eta, max_alpha = self._start_parameters, self._points[0], self._max_alpha
         theta = self.path.arc_length.parameter(eta)
         layout = self.place.layout
-        evaluator = self.path.evaluator(layout.order)
+        evaluator = self.evaluator
         on_path = evaluator.evaluate_at(theta)
         axes = self.place.axes(on_path).full()
         beside = start.offset[0] * axes[:, 1], start.offset[1] * axes[:, 2]
@@ -188,17 +177,15 @@ class PathTask(Task):
                 f"{np.round(y_t, 6).tolist()} m, is outside the feasible neighbourhood of the path"
                 f", alpha = {alpha:.3g}; alpha must be below {max_alpha:g}"
             )
-        R_e = None
+        R_d = None
         if self.path.orientation is not None:
-            deviation = zyx_to_matrix(np.deg2rad(start.rotation_deg))
-            R_e = quaternion_to_matrix(on_path[layout.quaternion][:4]) @ deviation
-        tool = self.place.tool
-        target = ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis)
+            R_d = quaternion_to_matrix(on_path[layout.quaternion][:4])
+        target = self._tool_target(y_t, R_d, start.rotation_deg)
         return StartPoint(target, point[layout.memory])
 
     def point(self, start: StartPoint) -> np.ndarray:
         """Return the point of the manifold that the law acts on at the start."""
-        return self.path.evaluator(self.relative_degree)(start.target.y_t.tolist(), start.place[0])
+        return self.evaluator(start.target.y_t.tolist(), start.place[0])
 
     def way(self) -> Iterator[tuple[np.ndarray, str]]:
         """Yield positions along the way of the tool [m], each (3,), with what to call them."""
@@ -249,4 +236,4 @@ class TrajectoryTask(PathTask):
 
     def point(self, start: StartPoint) -> np.ndarray:
         """Return the point of the manifold that the law acts on at the start."""
-        return self.path.evaluator(self.relative_degree).evaluate_at(start.place[0])
+        return self.evaluator.evaluate_at(start.place[0])

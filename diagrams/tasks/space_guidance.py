@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import StartParameters
 from diagrams.scenario.checks import require
@@ -13,17 +12,14 @@ from diagrams.tasks.drawing import SpaceDrawing
 from diagrams.tasks.fixtures import make_fixtures
 from diagrams.tasks.manifold_warnings import euler_warnings
 from diagrams.tasks.surface import followed_angles, given_quaternion, require_joints
-from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.fixtures.lead import Lead
 from pfsc_drake.control.fixtures.parameters import Admittance
-from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.space import SpaceManifold
 from pfsc_drake.following.followed import Guided
-from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix, zyx_to_matrix
+from pfsc_drake.geometry import PiecewisePolynomialCurve, quaternion_to_matrix
 from pfsc_drake.geometry.progress import Progress
 from pfsc_drake.physics.hand_way import Place
-from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 
 class SpaceTask(Task):
@@ -47,6 +43,7 @@ class SpaceTask(Task):
         InputError: If a region cannot be made, or the start is missing or forbidden.
     """
 
+    projector_name = "tool_place"
     place: SpaceManifold
     manifold: SpaceManifold
     shape = None
@@ -88,34 +85,22 @@ class SpaceTask(Task):
         return self.place.point(y_t.tolist())
 
     @property
+    def evaluator(self) -> SpaceManifold:
+        """What finds places on the true place's manifold."""
+        return self.place
+
+    @property
     def drawing(self) -> SpaceDrawing:
         """How the manifold is drawn."""
         return SpaceDrawing(self.fixtures, self.place)
 
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold."""
-        projector = builder.AddNamedSystem(
-            "tool_place",
-            BlockSystem(Projector(self.place), period),
-        )
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
-
     def start(self, shift: np.ndarray) -> StartPoint:
         """Return where the tool starts."""
-        y_t, R_e = self._start + shift, None
+        y_t, R_d = self._start + shift, None
         if self.place.is_oriented:
-            deviation = zyx_to_matrix(np.deg2rad(self._rotation_deg))
             quaternion = self.place.point(y_t)[self.place.layout.quaternion]
-            R_e = quaternion_to_matrix(quaternion) @ deviation
-        tool = self.place.tool
-        return StartPoint(ToolTarget(y_t, R_e, tool.tool_axis, tool.yaw_axis), y_t)
+            R_d = quaternion_to_matrix(quaternion)
+        return StartPoint(self._tool_target(y_t, R_d, self._rotation_deg), y_t)
 
     def point(self, start: StartPoint) -> np.ndarray:
         """Return the point of the manifold that the law acts on at the start."""

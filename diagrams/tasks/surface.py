@@ -24,12 +24,11 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry import (
     quaternion_to_matrix,
     rotation_to_axis,
-    zyx_to_quaternion,
-    zyz_to_quaternion,
 )
 from pfsc_drake.geometry.curves.polynomial import PiecewisePolynomialCurve
 from pfsc_drake.geometry.curves.spline import interpolate
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION
 from pfsc_drake.geometry.surfaces.choose_base import Axis, BaseChoice
 from pfsc_drake.geometry.surfaces.generated import extruded_surface, surface_of_revolution
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
@@ -48,8 +47,6 @@ from pfsc_drake.geometry.surfaces.shapes import (
 )
 from pfsc_drake.geometry.surfaces.sheets import check_single_sheet
 from pfsc_drake.geometry.surfaces.surface import Surface
-
-_EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
 @dataclass(frozen=True)
@@ -132,12 +129,12 @@ def given_quaternion(orientation: SurfaceOrientationParameters) -> np.ndarray | 
     """Return the quaternion of an orientation that is the same everywhere, or None."""
     if orientation.kind != "given":
         return None
-    return _EULER[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
+    return EULER_TO_QUATERNION[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
 
 
 def normal_offset(orientation: SurfaceOrientationParameters) -> np.ndarray:
     """Return the rotation of the tool away from the surface's frame, shape (3, 3)."""
-    turn = _EULER[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
+    turn = EULER_TO_QUATERNION[orientation.convention](np.deg2rad([orientation.angles_deg]))[0]
     return quaternion_to_matrix(turn)
 
 

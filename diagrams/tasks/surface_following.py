@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario import (
     ControllerParameters,
@@ -22,20 +21,18 @@ from diagrams.tasks.surface import (
     make_surface_manifold,
     require_joints,
 )
-from diagrams.tasks.task import ManifoldProjector, StartPoint, Task
+from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.law.linearization import RELATIVE_DEGREE
 from pfsc_drake.control.law.reference import straight_lines, together
-from pfsc_drake.control.manifolds.manifold import Projector
 from pfsc_drake.control.manifolds.surface import SurfaceManifold
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry import PiecewisePolynomialCurve, zyx_to_matrix
+from pfsc_drake.geometry import PiecewisePolynomialCurve
 from pfsc_drake.geometry.progress import Progress
+from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
 from pfsc_drake.geometry.surfaces.evaluator import SurfaceEvaluator
 from pfsc_drake.geometry.surfaces.length import way_on_surface
-from pfsc_drake.geometry.surfaces.point import SurfaceTarget
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport, surface_report
 from pfsc_drake.robot.inverse_kinematics import ToolTarget
-from pfsc_drake.systems.block_system import BlockSystem
 
 # s, between the places of the way along the surface
 _SPACING = 0.02
@@ -56,6 +53,7 @@ class SurfaceTask(Task):
         InputError: If the surface or the motion along it cannot be made.
     """
 
+    projector_name = "surface_projector"
     place: SurfaceManifold
     manifold: SurfaceManifold
 
@@ -97,27 +95,17 @@ class SurfaceTask(Task):
 
     def evaluate(self, y_t: np.ndarray, memory: np.ndarray) -> np.ndarray:
         """Return the point of the true place's manifold next to a tool, shape (size,)."""
-        return self._evaluator(y_t.tolist(), memory[:2].tolist(), memory[2:].tolist())
+        return self._evaluator(y_t.tolist(), memory)
+
+    @property
+    def evaluator(self) -> SurfaceEvaluator:
+        """What finds places on the true place's manifold."""
+        return self._evaluator
 
     @property
     def drawing(self) -> SurfaceDrawing:
         """How the manifold is drawn."""
         return SurfaceDrawing(self.surface, self.place)
-
-    def add_place(
-        self,
-        builder: DiagramBuilder,
-        tool_pose: OutputPort,
-        reference: OutputPort | None,
-        period: float,
-    ) -> ManifoldProjector:
-        """Add what finds the place on the manifold."""
-        projector = builder.AddNamedSystem(
-            "surface_projector",
-            BlockSystem(Projector(self._evaluator), period),
-        )
-        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
-        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
 
     def _find_start(self) -> np.ndarray:
         """Return the tool point at the start [m], shape (3,)."""
@@ -167,13 +155,10 @@ class SurfaceTask(Task):
             )
         eta = self.motion.derivatives(np.zeros(1), 0)[0, 0]
         place = np.append(foot.theta, eta)
-        target = ToolTarget(y_t)
+        R_d = None
         if self.place.is_oriented:
-            point = self.evaluate(y_t, place)
-            deviation = zyx_to_matrix(np.deg2rad(self._start_parameters.rotation_deg))
-            R_d = self.place.orientation(point[None])[0]
-            tool = self.place.tool
-            target = ToolTarget(y_t, R_d @ deviation, tool.tool_axis, tool.yaw_axis)
+            R_d = self.place.orientation(self.evaluate(y_t, place)[None])[0]
+        target = self._tool_target(y_t, R_d, self._start_parameters.rotation_deg)
         return StartPoint(target, place)
 
     def inverted(self, start: StartPoint) -> tuple[ToolTarget, str] | None:

@@ -1,15 +1,21 @@
 """What a robot's tool is to do, whichever robot it is, and what that asks of the drives."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.tasks.drawing import ManifoldDrawing
-from pfsc_drake.control.manifolds.manifold import Manifold, PlaceManifold
-from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport
+from pfsc_drake.control.manifolds.manifold import (
+    Manifold,
+    PlaceEvaluator,
+    PlaceManifold,
+    Projector,
+)
+from pfsc_drake.geometry import PiecewisePolynomialCurve, ShapeReport, zyx_to_matrix
 from pfsc_drake.geometry.surfaces.penalized_surface import Residuals
 from pfsc_drake.geometry.surfaces.regularity import SurfaceReport
 from pfsc_drake.physics.hand_way import Place
@@ -108,7 +114,10 @@ class Task(ABC):
         fit: Where the points stand that the manifold was fitted to, if it was.
         warnings: What is out of proportion in it, one sentence each.
         drive_plan: What the motion asks of the drives, once that has been found out.
+        projector_name: Name of what finds the place on the manifold.
     """
+
+    projector_name: ClassVar[str]
 
     place: PlaceManifold
     manifold: Manifold
@@ -164,7 +173,6 @@ class Task(ABC):
     def drawing(self) -> ManifoldDrawing:
         """How the manifold is drawn."""
 
-    @abstractmethod
     def add_place(
         self,
         builder: DiagramBuilder,
@@ -181,6 +189,25 @@ class Task(ABC):
                 leads the tool.
             period: Sampling time [s].
         """
+        projector = builder.AddNamedSystem(
+            self.projector_name, BlockSystem(Projector(self.evaluator), period)
+        )
+        builder.Connect(tool_pose, projector.GetInputPort("tool_pose"))
+        return ManifoldProjector(projector, projector.GetOutputPort("manifold_point"))
+
+    @property
+    @abstractmethod
+    def evaluator(self) -> PlaceEvaluator:
+        """What finds places on the true place's manifold."""
+
+    def _tool_target(
+        self, y_t: np.ndarray, R_d: np.ndarray | None, rotation_deg: Sequence[float]
+    ) -> ToolTarget:
+        """Return where a tool starts whose reference orientation is R_d, if there is one."""
+        tool = self.place.tool
+        if R_d is not None:
+            R_d = R_d @ zyx_to_matrix(np.deg2rad(rotation_deg))
+        return ToolTarget(y_t, R_d, tool.tool_axis, tool.yaw_axis)
 
     @abstractmethod
     def start(self, shift: np.ndarray) -> StartPoint:

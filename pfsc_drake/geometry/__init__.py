@@ -16,7 +16,6 @@ from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.evaluator import PathEvaluator
 from pfsc_drake.geometry.paths.frame import ParallelTransportFrame
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
-from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.projection import Projection, Projector
 from pfsc_drake.geometry.paths.shape_report import ShapeReport, shape_report
 from pfsc_drake.geometry.paths.taught import Picking, pick_waypoints
@@ -27,6 +26,7 @@ from pfsc_drake.geometry.paths.waypoints import (
     read_waypoints,
     waypoints_text,
 )
+from pfsc_drake.geometry.point import PathPointLayout, SurfacePointLayout
 from pfsc_drake.geometry.rotation import (
     angle_between,
     check_rotation_matrix,
@@ -52,7 +52,6 @@ from pfsc_drake.geometry.surfaces.generated import (
     translated_surface,
 )
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
-from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.point_file import read_surface_points
 from pfsc_drake.geometry.surfaces.product import ProductSurface
 from pfsc_drake.geometry.surfaces.projection import (

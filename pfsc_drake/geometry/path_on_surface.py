@@ -17,7 +17,7 @@ from pfsc_drake.geometry.rotation import (
     matrix_to_quaternion,
     quaternion_to_matrix,
 )
-from pfsc_drake.geometry.surfaces.point import surface_axes
+from pfsc_drake.geometry.surfaces.curvature import surface_axes
 from pfsc_drake.geometry.surfaces.projection import GlobalProjector
 from pfsc_drake.geometry.surfaces.surface import Surface, partial_index, partial_orders
 from pfsc_drake.jets import Jet

@@ -155,6 +155,10 @@ def zyz_to_quaternion(angles: ArrayLike) -> np.ndarray:
     return matrix_to_quaternion(zyz_to_matrix(angles))
 
 
+# quaternions of Euler angles, by convention
+EULER_TO_QUATERNION = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
+
+
 def quaternion_to_zyx(quaternion: ArrayLike) -> np.ndarray:
     """ZYX angles [..., 3], rad, of quaternions [..., 4], see `matrix_to_zyx`."""
     return matrix_to_zyx(quaternion_to_matrix(quaternion))

@@ -13,14 +13,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from pfsc_drake.checks import NUMBER
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.yaml.reading import TAG_KEY
 
 REQUIRED = {"required": True}  # metadata of a field whose key may not be left out
 
-# Text that is a number: YAML 1.1 reads 1e-3 as text. Python's float() would take more, '1_0' or
-# digits of other scripts.
-_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _INFINITY = re.compile(r"[-+]?inf(inity)?", re.IGNORECASE)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,19}")
 _LONG_INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -176,8 +174,11 @@ def _is_scalar(schema: Any, value: Any) -> bool:
 
 
 def is_number(value: float | str) -> bool:
-    """Whether a number, or text that is one, fits a float; infinity does, NaN does not."""
-    if isinstance(value, str) and not _NUMBER.fullmatch(value):
+    """Whether a number, or text that is one, fits a float; infinity does, NaN does not.
+
+    YAML 1.1 reads 1e-3 as text.
+    """
+    if isinstance(value, str) and not NUMBER.fullmatch(value):
         return bool(_INFINITY.fullmatch(value))
     try:
         number = float(value)
@@ -190,7 +191,7 @@ def is_number(value: float | str) -> bool:
 def _range(schema: Any, value: Any) -> str:
     """What numbers a field allows, where a number was refused for its size."""
     if isinstance(value, str):
-        beyond = bool((_NUMBER if schema is float else _LONG_INTEGER).fullmatch(value))
+        beyond = bool((NUMBER if schema is float else _LONG_INTEGER).fullmatch(value))
     else:
         beyond = type(value) is int or (type(value) is float and value.is_integer())
     if schema is float and beyond:

@@ -1,6 +1,7 @@
-"""Splines through waypoints."""
+"""Splines: through waypoints, and on equally spaced knots."""
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -166,7 +167,7 @@ def _periodic_spline(
         starts = np.append(parameters[0], base)
     index = np.arange(-degree, count + degree + 1)
     knots = base[index % count] + period * (index // count)
-    folded = fold_columns(BSpline.design_matrix(sites, knots, degree), count)
+    folded = _fold_columns(BSpline.design_matrix(sites, knots, degree), count)
     if count <= _DENSE:
         coefficients = np.linalg.solve(folded.toarray(), values)
     else:
@@ -174,19 +175,78 @@ def _periodic_spline(
     return BSpline(knots, coefficients[np.arange(count + degree) % count], degree), starts
 
 
-def fold_columns(matrix: csr_array, period: int) -> csr_array:
-    """Sum of the columns that are whole periods apart, for periodic splines.
-
-    Args:
-        matrix: Design matrix [rows, columns].
-        period: Number of distinct coefficients.
-
-    Returns:
-        Matrix [rows, period].
-    """
+def _fold_columns(matrix: csr_array, period: int) -> csr_array:
+    """Sum of the columns that are whole periods apart, [rows, period]."""
     entries = matrix.tocoo()
     place = (entries.row, entries.col % period)
     return csr_array((entries.data, place), shape=(matrix.shape[0], period))
+
+
+@dataclass(frozen=True)
+class UniformKnots:
+    """Equally spaced simple knots of a B-spline in one direction.
+
+    Attributes:
+        begin: Begin of the domain.
+        end: End of the domain.
+        intervals: Number of knot intervals.
+        degree: Degree of the polynomials.
+        closed: True for a periodic spline.
+    """
+
+    begin: float
+    end: float
+    intervals: int
+    degree: int
+    closed: bool
+
+    @property
+    def step(self) -> float:
+        """Distance of neighbouring knots."""
+        return (self.end - self.begin) / self.intervals
+
+    @property
+    def knots(self) -> np.ndarray:
+        """All knots, those outside of the domain too, [intervals + 2 degree + 1]."""
+        places = np.arange(-self.degree, self.intervals + self.degree + 1)
+        return self.begin + self.step * places
+
+    @property
+    def count(self) -> int:
+        """Number of distinct coefficients."""
+        return self.intervals if self.closed else self.intervals + self.degree
+
+    @property
+    def linear(self) -> np.ndarray:
+        """Coefficients of the function theta itself, of an open direction, [count]."""
+        return self.begin + self.step * (np.arange(self.count) - (self.degree - 1) / 2.0)
+
+    def entries(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers and values of the B-splines not zero at parameters [n], [n, degree + 1] each."""
+        knots = self.knots
+        # Knots are multiples of a step: the ends are not exactly on them.
+        inside = np.clip(theta, knots[self.degree], knots[-self.degree - 1])
+        matrix = BSpline.design_matrix(inside, knots, self.degree)
+        shape = (len(theta), self.degree + 1)
+        return matrix.indices.reshape(shape) % self.count, matrix.data.reshape(shape)
+
+    def basis(self, theta: np.ndarray) -> csr_array:
+        """B-splines at parameters [n] within the domain, [n, count]."""
+        columns, values = self.entries(theta)
+        rows = np.broadcast_to(np.arange(len(theta))[:, None], columns.shape)
+        place = (rows.ravel(), columns.ravel())
+        return csr_array((values.ravel(), place), shape=(len(theta), self.count))
+
+    def unfolded(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients of all knots from the distinct ones, along the first axis."""
+        return coefficients[np.arange(self.intervals + self.degree) % self.count]
+
+    def curve(self, coefficients: np.ndarray) -> PiecewisePolynomialCurve:
+        """The spline in this direction, [count, dimension], as a curve of polynomials."""
+        knots = self.knots
+        spline = BSpline(knots, self.unfolded(coefficients), self.degree)
+        starts = knots[self.degree : -self.degree - 1]
+        return piecewise(spline, starts, self.end, closed=self.closed)
 
 
 def accumulate(chords: np.ndarray, parametrization: Parametrization) -> np.ndarray:

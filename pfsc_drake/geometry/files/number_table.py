@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pfsc_drake.checks import NUMBER
 from pfsc_drake.errors import InputError, shortened
 from pfsc_drake.geometry.progress import Progress
 
@@ -52,8 +53,6 @@ def unreadable(name: str | FilePath, kind: str, reason: str | None = None) -> In
 MAX_ROWS = 1_000_000
 _ROWS_PER_REPORT = 50_000
 _LARGEST = 1e12
-# float() also takes underscores and the digits of all scripts
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class NumberTable(NamedTuple):
@@ -116,6 +115,26 @@ def read_numbers(
     return NumberTable(lines, header, np.array(rows))
 
 
+def read_columns(name: str, what: str, columns: list[str]) -> tuple[list[int], np.ndarray]:
+    """Read a CSV file that must have certain columns, in any order, and no others.
+
+    Args:
+        name: Name of the file.
+        what: What rows are, for messages.
+        columns: Names of the columns.
+
+    Returns:
+        Where in the file the rows stand, [n], and the columns in the order asked for, [n, columns].
+
+    Raises:
+        InputError: As :func:`read_numbers`, or columns are unknown, there twice or missing.
+    """
+    table = read_numbers(
+        name, what, lambda place, header: check_columns(place, header, columns, columns)
+    )
+    return table.lines, table.rows[:, [table.header.index(label) for label in columns]]
+
+
 def check_columns(place: str, header: list[str], known: list[str], required: list[str]) -> None:
     """Refuse columns that are unknown, there twice, or missing.
 
@@ -131,7 +150,7 @@ def check_columns(place: str, header: list[str], known: list[str], required: lis
     for label in header:
         if label not in known:
             hint = "; separate columns by commas" if re.search("[;\t]", label) else ""
-            if _NUMBER.fullmatch(label):
+            if NUMBER.fullmatch(label):
                 hint = "; the first line names the columns"
             raise InputError(
                 f"{place}: column '{quote(label)}' is unknown; allowed: {', '.join(known)}{hint}"
@@ -163,7 +182,7 @@ def _contents(name: str) -> Iterator[tuple[int, str, float]]:
 
 
 def _number(name: str, line: int, label: str, cell: str) -> float:
-    value = float(cell) if _NUMBER.fullmatch(cell) else np.nan
+    value = float(cell) if NUMBER.fullmatch(cell) else np.nan
     if not abs(value) <= _LARGEST:
         raise InputError(
             f"{name}, line {line}, column {label}: '{quote(cell)}'; a finite number is required"

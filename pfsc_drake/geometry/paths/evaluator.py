@@ -1,7 +1,6 @@
 """What a path tells the controller at each tick."""
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 
 import casadi as ca
@@ -13,12 +12,13 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import Curve
 from pfsc_drake.geometry.curves.orientation import OrientationCurve
 from pfsc_drake.geometry.curves.polynomial import PieceTable
+from pfsc_drake.geometry.evaluator import ManifoldEvaluator, alpha_function
 from pfsc_drake.geometry.foot import FootFinder
-from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
+from pfsc_drake.geometry.nearest import nearest_samples
 from pfsc_drake.geometry.paths.arc_length import ArcLength
 from pfsc_drake.geometry.paths.frame import Frame
-from pfsc_drake.geometry.paths.point import PathPointLayout
 from pfsc_drake.geometry.paths.table import Continuation, PathTable, continuations, tabulate
+from pfsc_drake.geometry.point import PathPointLayout
 
 # Of the domain.
 _LONGEST_STEP = 1.0 / 32.0
@@ -31,14 +31,12 @@ _VALLEY = 1.0 / 16.0
 _ROUNDING = 1e-9
 
 
-class PathEvaluator:
+class PathEvaluator(ManifoldEvaluator[PathPointLayout]):
     """Projects a point on a path and evaluates everything a law of one order needs there.
 
     All quantities of the path point are polynomials on the pieces of one table. The foot is found
     by `FootFinder` on the table's position; an open path goes on beyond its ends, see
-    `paths.run_out`. There is no memory: the same input gives the same output.
-
-    Calling the object evaluates ``evaluate``. `Path.evaluator` makes it.
+    `paths.table`. Its memory is the parameter. `Path.evaluator` makes it.
 
     Args:
         position: Curve sigma_t in R^3.
@@ -46,13 +44,6 @@ class PathEvaluator:
         arc_length: Arc length of `position`.
         frame: Frame along `position`.
         order: Relative degree r of the law.
-
-    Attributes:
-        layout: Where the quantities lie in the path point.
-        evaluate: ``(y_t, memory) -> manifold_point``, the path next to a point [m], shape (3,);
-            memory is the unwrapped parameter of the last tick. All values but ``status`` are NaN if
-            either is not finite.
-        at: ``memory -> manifold_point``, the path at an unwrapped parameter, with alpha zero.
     """
 
     def __init__(
@@ -63,11 +54,11 @@ class PathEvaluator:
         frame: Frame,
         order: int,
     ) -> None:
-        self._made_of = position, orientation, arc_length, frame, order
-        self.layout = PathPointLayout(order, orientation is not None, frame.turns)
+        layout = PathPointLayout(order, orientation is not None, frame.turns)
+        made_of = position, orientation, arc_length, frame, order
+        super().__init__(layout, [position.domain], [position.closed], *made_of)
         table = _whole_table(position, orientation, arc_length, frame, self.layout)
         self._table = PieceTable(table.breakpoints, table.rows)
-        self._domain, self._closed = position.domain, position.closed
         # Of the table, which may be one or two laps long.
         self._begin, self._end = float(table.breakpoints[0]), float(table.breakpoints[-1])
         laps = round((self._end - self._begin) / position.period)
@@ -76,54 +67,17 @@ class PathEvaluator:
         self._finder = FootFinder(
             self._position_terms, [(self._begin, self._end)], [position.closed], _LONGEST_STEP
         )
-        self.evaluate, self.at = self._functions()
 
-    def __content__(self) -> object:
-        """Return what decides over it."""
-        return self._made_of
-
-    @once_per_content()
-    def _functions(self) -> tuple[ca.Function, ca.Function]:
-        """Return :attr:`evaluate` and :attr:`at`."""
-        y, theta = ca.MX.sym("y_t", 3), ca.MX.sym("memory")
-        evaluate = ca.Function(
-            "path_point",
-            [y, theta],
-            [self._at_foot(y, theta)],
-            ["y_t", "memory"],
-            ["manifold_point"],
-        )
-        at = ca.Function("path_at", [theta], [self._on_path(theta)], ["memory"], ["manifold_point"])
-        return evaluate, at
-
-    @cached_property
-    def find(self) -> ca.Function:
-        """``y_t -> memory``, the nearest point of the whole path, on the first lap if closed."""
-        return self._find_function()
-
-    @once_per_content()
-    def _find_function(self) -> ca.Function:
-        y, apart = ca.MX.sym("y_t", 3), np.array([_VALLEY * self._position.period])
+    def _nearest(self, y: ca.MX) -> ca.MX:
+        """Parameter of the nearest point of the whole path, on the first lap if closed."""
+        apart = np.array([_VALLEY * self._position.period])
         starts = nearest_samples(y, *_samples(self._position), apart)
         nearest = self._finder.nearest(y, starts)
-        if self._closed:
-            (begin, _), period = self._domain, self._position.period
+        if self._position.closed:
+            begin, period = self._position.domain[0], self._position.period
             # the beginning is not the end of the lap before
             nearest -= period * ca.floor((nearest - begin) / period + _ROUNDING)
-        return ca.Function("path_place", [y], [nearest], ["y_t"], ["memory"])
-
-    def __call__(self, point: Sequence[float], theta_guess: float) -> np.ndarray:
-        """Return the path point next to a point, new array [layout.size].
-
-        Args:
-            point: y_t, [3], m.
-            theta_guess: Unwrapped parameter of the last tick.
-        """
-        function = self._bound_evaluate
-        function.arguments["y_t"][:] = point
-        function.arguments["memory"][0] = theta_guess
-        function.evaluate()
-        return function.results["manifold_point"].copy()
+        return nearest
 
     def evaluate_at(self, theta: float) -> np.ndarray:
         """Return the path point at a point on the path, for set-up.
@@ -137,8 +91,8 @@ class PathEvaluator:
         Raises:
             InputError: theta is not finite or lies outside the domain of an open path.
         """
-        begin, end = self._domain
-        if not math.isfinite(theta) or (not self._closed and not begin <= theta <= end):
+        begin, end = self._position.domain
+        if not math.isfinite(theta) or (not self._position.closed and not begin <= theta <= end):
             raise InputError(f"theta: {theta:.9g}; the path is defined on [{begin:.9g}, {end:.9g}]")
         function = self._bound_at
         function.arguments["memory"][0] = theta
@@ -146,16 +100,12 @@ class PathEvaluator:
         return function.results["manifold_point"].copy()
 
     @cached_property
-    def _bound_evaluate(self) -> BoundFunction:
-        return BoundFunction(self.evaluate)
-
-    @cached_property
     def _bound_at(self) -> BoundFunction:
         return BoundFunction(self.at)
 
     def _wrapped(self, theta: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Parameter within the table, and the number of the table's lap."""
-        if not self._closed:
+        if not self._position.closed:
             return theta, ca.MX(0.0)
         period = self._end - self._begin
         laps = ca.floor((theta - self._begin) / period)
@@ -166,11 +116,11 @@ class PathEvaluator:
         values = self._table(self._wrapped(theta)[0], self.layout.position.start, 9)
         return ca.reshape(values, 3, 3)
 
-    def _on_path(self, theta: ca.MX) -> ca.MX:
+    def _on(self, theta: ca.MX) -> ca.MX:
         """Path point at an unwrapped parameter, with alpha zero and status OK."""
         wrapped, laps = self._wrapped(theta)
         point = self._table(wrapped)
-        if not self._closed:
+        if not self._position.closed:
             return ca.vertcat(theta, point[1:])
         normal = point[self.layout.normal]
         if abs(self._turn) > _NO_TURN:
@@ -182,24 +132,13 @@ class PathEvaluator:
     def _at_foot(self, y: ca.MX, guess: ca.MX) -> ca.MX:
         """Path point at the foot of a point."""
         foot = self._finder.find(y, guess)
-        point = self._on_path(foot.theta)
+        point = self._on(foot.theta)
         terms = ca.reshape(point[self.layout.position][:9], 3, 3)
-        alpha = _bend_function()(y, terms)
-        begin, end = self._domain
-        beyond = ca.MX(0.0)
-        if not self._closed:
-            beyond = ca.logic_or(foot.theta < begin, foot.theta > end)
-            beyond = ca.logic_or(beyond, foot.beyond_end)
+        alpha = alpha_function(1)(y, terms)
+        if not self._position.closed:
             point = ca.if_else(foot.beyond_end, self._straight_on(point, y), point)
-        status = ca.if_else(
-            foot.converged,
-            ca.if_else(beyond, float(ProjectionStatus.BEYOND_END), float(ProjectionStatus.OK)),
-            float(ProjectionStatus.NOT_CONVERGED),
-        )
         alpha = ca.if_else(foot.beyond_end, 0.0, alpha)
-        # What is not finite has no foot.
-        place = ca.if_else(foot.known, ca.vertcat(point[:2], alpha, point[4:]), math.nan)
-        return ca.vertcat(place[:3], status, place[3:])
+        return self._told(ca.vertcat(point[:2], alpha, point[4:]), foot, foot.known)
 
     def _straight_on(self, point: ca.MX, y: ca.MX) -> ca.MX:
         """Path point beyond the last end: eta goes on along the tangent, the rest stays."""
@@ -234,14 +173,6 @@ def _samples(position: Curve) -> tuple[np.ndarray, np.ndarray]:
     count = max(_FEWEST_SAMPLES, _SAMPLES_PER_SEGMENT * (len(position.breakpoints) - 1))
     theta = np.linspace(*position.domain, count, endpoint=not position.closed)
     return theta[:, None], position.derivatives(theta, 0)[:, 0]
-
-
-def _bend_function() -> ca.Function:
-    """``(y, terms) -> alpha`` (3.9)."""
-    y, terms = ca.SX.sym("y", 3), ca.SX.sym("terms", 3, 3)
-    sigma, slope, bend = ca.horzsplit(terms)
-    alpha = ca.dot(y - sigma, bend) / ca.dot(slope, slope)
-    return ca.Function("alpha", [y, terms], [alpha])
 
 
 def _turn_function() -> ca.Function:

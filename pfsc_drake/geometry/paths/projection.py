@@ -1,7 +1,7 @@
 """Closest point on a curve."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,7 +50,7 @@ class Projector:
         self.curve = curve
         self._begin, self._end = curve.domain
         self._closed = curve.closed
-        self._terms = _terms_3(curve) if curve.dimension == 3 else _terms_any(curve)
+        self._sample = curve.sampler(2)
 
     def project(self, point: Sequence[float], theta_guess: float) -> Projection:
         """Closest point near the guess.
@@ -64,7 +64,7 @@ class Projector:
             guess is not finite.
         """
         begin, end, closed = self._begin, self._end, self._closed
-        terms = self._terms
+        y = np.asarray(point, dtype=float)
         length = end - begin
         tolerance, coarse, limit = _TOLERANCE * length, _COARSE * length, _MAX_STEP * length
         theta = theta_guess
@@ -74,7 +74,17 @@ class Projector:
             theta = min(max(theta, begin), end)
         origin, step, least, alpha = theta, 0.0, math.inf, math.nan
         for iteration in range(1, _MAX_ITERATIONS + 1):
-            cost, slope, square, bend = terms(theta, point)
+            sigma, first, second = self._sample(theta)
+            error = y - sigma
+            cost, slope, square, bend = (
+                float(one @ other)
+                for one, other in (
+                    (error, error),
+                    (error, first),
+                    (first, first),
+                    (error, second),
+                )
+            )
             if not cost < math.inf:
                 return Projection(theta_guess, math.nan, False, iteration, False)
             if cost > least and (step > coarse or step < -coarse):
@@ -100,42 +110,3 @@ class Projector:
         # Near alpha = 1 rounding errors of the slope can exceed the tolerance.
         stalled = abs(step) < _STALLED * length and alpha < 1.0
         return Projection(theta, alpha, False, _MAX_ITERATIONS, stalled)
-
-
-Terms = Callable[[float, Sequence[float]], tuple[float, float, float, float]]
-
-
-def _terms_3(curve: Curve) -> Terms:
-    """J, -J'/2, |sigma'|^2 and (y - sigma) . sigma'' in R^3, in scalars for speed."""
-    sample = curve.flat_sampler(2)
-
-    def terms(theta: float, point: Sequence[float]) -> tuple[float, float, float, float]:
-        x, y, z, dx, dy, dz, cx, cy, cz = sample(theta).tolist()
-        x = point[0] - x
-        y = point[1] - y
-        z = point[2] - z
-        return (
-            x * x + y * y + z * z,
-            x * dx + y * dy + z * dz,
-            dx * dx + dy * dy + dz * dz,
-            x * cx + y * cy + z * cz,
-        )
-
-    return terms
-
-
-def _terms_any(curve: Curve) -> Terms:
-    """The same in any dimension."""
-    sample = curve.sampler(2)
-
-    def terms(theta: float, point: Sequence[float]) -> tuple[float, float, float, float]:
-        sigma, first, second = sample(theta)
-        error = np.asarray(point) - sigma
-        return (
-            float(error @ error),
-            float(error @ first),
-            float(first @ first),
-            float(error @ second),
-        )
-
-    return terms

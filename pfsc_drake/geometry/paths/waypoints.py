@@ -25,7 +25,7 @@ from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
 from pfsc_drake.geometry.paths.path import Path, PathWaypoints
 from pfsc_drake.geometry.paths.smoothing import smooth_orientation, smooth_positions
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.geometry.rotation import matrix_to_quaternion, zyx_to_quaternion, zyz_to_quaternion
+from pfsc_drake.geometry.rotation import EULER_TO_QUATERNION, matrix_to_quaternion
 
 # rad; two turns
 _LARGEST_ANGLE = 4.0 * np.pi
@@ -41,7 +41,6 @@ _ORIENTATIONS = {
     "quaternion": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
 }
-_EULER = {"zyx": zyx_to_quaternion, "zyz": zyz_to_quaternion}
 
 
 @dataclass(frozen=True)
@@ -141,8 +140,8 @@ def _check_header(place: str, header: list[str]) -> None:
 def _to_quaternions(name: str, lines: list[int], kind: str, values: np.ndarray) -> np.ndarray:
     """Unit quaternions [n, 4] from the columns of one kind of orientation."""
     convention = kind.removesuffix("_deg")
-    if convention in _EULER:
-        return _EULER[convention](_angles(name, lines, kind, values))
+    if convention in EULER_TO_QUATERNION:
+        return EULER_TO_QUATERNION[convention](_angles(name, lines, kind, values))
     if kind == "quaternion":
         norm = np.linalg.norm(values, axis=1, keepdims=True)
         bad = np.flatnonzero(norm[:, 0] < 1e-6)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
+from pfsc_drake.geometry.curves.spline import UniformKnots
 from pfsc_drake.geometry.surfaces.surface import rotation_from_axes
 
 # Sites per knot interval at which a circle is fitted by a spline.

@@ -1,4 +1,4 @@
-"""Fundamental forms and curvatures of surfaces (section 4.3)."""
+"""Frames, fundamental forms and curvatures of surfaces (section 4.3), and a point beside one."""
 
 from dataclasses import dataclass
 
@@ -88,3 +88,55 @@ def mean_and_spread(
     mixed = (M - F * along) / np.sqrt(determinant)
     across = (N * E - 2.0 * F * M + F * F * along) / determinant
     return 0.5 * (along + across), np.hypot(0.5 * (along - across), mixed)
+
+
+def surface_axes(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return ``[t_1, e_perp x t_1, e_perp]`` as columns, (4.2), (4.3).
+
+    Sigma of (4.15) holds the components of both slopes along the first two.
+
+    Args:
+        first: ``sigma_1``, in world axes, [3].
+        second: ``sigma_2``, [3].
+
+    Returns:
+        Rotation matrix [3, 3]; not finite where the surface is not regular.
+    """
+    cross = np.cross(first, second)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        t_1, normal = first / np.linalg.norm(first), cross / np.linalg.norm(cross)
+    return np.column_stack([t_1, np.cross(normal, t_1), normal])
+
+
+class SurfaceTarget:
+    """The point ``p = sigma(theta) + xi e_perp(theta)``, and its velocity.
+
+    ``p' = (sigma_1 + xi e_perp,1) theta_1' + (sigma_2 + xi e_perp,2) theta_2' + xi' e_perp`` with
+    the Weingarten equations (4.6).
+
+    Args:
+        surface: The surface. Beyond the ends of open directions theta is clamped.
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        self._surface = surface
+
+    def __call__(self, coordinates: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return p [m] and p' [m/s], world axes, shape (3,) each.
+
+        Args:
+            coordinates: ``(theta_1, theta_2, xi)``, shape (3,), xi in m.
+            rates: Their derivatives, shape (3,).
+        """
+        theta, xi = np.array(coordinates[:2], dtype=float), float(coordinates[2])
+        for k, (ends, closed) in enumerate(
+            zip(self._surface.domain, self._surface.closed, strict=True)
+        ):
+            if not closed:
+                theta[k] = min(max(theta[k], ends.begin), ends.end)
+        sigma, *tangents = self._surface.partials(theta, 1)
+        forms = fundamental_forms(self._surface, theta)
+        S = np.array(tangents)
+        turning = forms.weingarten @ S
+        p_rate = (S + xi * turning).T @ rates[:2] + rates[2] * forms.normal
+        return sigma + xi * forms.normal, p_rate

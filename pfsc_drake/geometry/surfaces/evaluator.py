@@ -2,20 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pfsc_drake.compiled.bound_function import BoundFunction
-from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.errors import InputError
-from pfsc_drake.geometry.foot import Foot, FootFinder, first_and_bend, largest_eigenvalue
+from pfsc_drake.geometry.evaluator import ManifoldEvaluator, alpha_function
+from pfsc_drake.geometry.foot import Foot, FootFinder
 from pfsc_drake.geometry.nearest import ProjectionStatus, nearest_samples
+from pfsc_drake.geometry.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.extended import ExtendedSurface, SurfaceTable
 from pfsc_drake.geometry.surfaces.length import TangentialLength
-from pfsc_drake.geometry.surfaces.point import SurfacePointLayout
 from pfsc_drake.geometry.surfaces.product import checked_product
 from pfsc_drake.geometry.surfaces.projection import LONGEST_STEP, GlobalProjector, SurfaceProjection
 from pfsc_drake.geometry.surfaces.surface import Surface, partial_count
@@ -30,15 +28,14 @@ _MOST_SAMPLES = 24
 _VALLEY = 1.0 / 8.0
 
 
-class SurfaceEvaluator:
+class SurfaceEvaluator(ManifoldEvaluator[SurfacePointLayout]):
     """Projects a point on a surface and evaluates everything a law of one order needs there.
 
     The foot is found by `FootFinder` from the last tick's parameters; what is far from there, or
     not found, is looked for on the whole surface. Beyond an end of an open direction the surface
     goes on as `ExtendedSurface`, and the status tells; where that ends too, the border's closest
-    point is the foot. There is no memory: the same input gives the same output.
-
-    Calling the object evaluates ``evaluate``.
+    point is the foot. Its memory is theta and eta: eta goes on by the integral of Sigma (4.15)
+    along the straight line of the parameters, of fourth order.
 
     Args:
         surface: Surface of class C^(order + 1), at least C^2.
@@ -46,13 +43,7 @@ class SurfaceEvaluator:
         orientation: Constant quaternion (w, x, y, z) of the reference orientation, [4], or None.
 
     Attributes:
-        layout: Where the quantities lie in the surface point.
         surface: The surface.
-        evaluate: ``(y_t, memory) -> manifold_point``, the surface next to a point [m], shape (3,);
-            memory is theta (unwrapped) and eta [m] of the last tick. eta goes on by the integral of
-            Sigma (4.15) along the straight line of the parameters, of fourth order. All values but
-            ``status`` are NaN if point or memory is not finite.
-        at: ``memory -> manifold_point``, the surface at parameters, with alpha zero.
 
     Raises:
         InputError: A surface that is not smooth enough or not regular, or an orientation that is
@@ -60,8 +51,8 @@ class SurfaceEvaluator:
     """
 
     def __init__(self, surface: Surface, order: int, orientation: ArrayLike | None = None) -> None:
-        self._made_of = surface, order, orientation
-        self.layout = SurfacePointLayout(order, orientation is not None)
+        layout = SurfacePointLayout(order, orientation is not None)
+        super().__init__(layout, surface.domain, surface.closed, surface, order, orientation)
         if surface.smoothness < order + 1:
             raise InputError(
                 f"surface: class C^{surface.smoothness:g}; C^{order + 1} or smoother is required"
@@ -77,65 +68,24 @@ class SurfaceEvaluator:
         self._finder = FootFinder(self._terms, whole.domain, whole.closed, LONGEST_STEP)
         self._lengths = np.array([ends.length for ends in surface.domain])
         self._way = TangentialLength(self._terms, self._lengths)
-        self.evaluate, self.at = self._functions(order)
 
-    def __content__(self) -> object:
-        """Return what decides over it."""
-        return self._made_of
-
-    @once_per_content()
-    def _functions(self, order: int) -> tuple[ca.Function, ca.Function]:
-        """Return :attr:`evaluate` and :attr:`at`."""
-        y, memory = ca.MX.sym("y_t", 3), ca.MX.sym("memory", 4)
-        evaluate = ca.Function(
-            "surface_point",
-            [y, memory],
-            [self._at_foot(y, memory)],
-            ["y_t", "memory"],
-            ["manifold_point"],
-        )
-        rows = ca.vec(self._table(memory[:2], order + 1))
-        point = ca.vertcat(memory, 0.0, float(ProjectionStatus.OK), rows, self._quaternion)
-        at = ca.Function("surface_at", [memory], [point], ["memory"], ["manifold_point"])
-        return evaluate, at
-
-    @cached_property
-    def find(self) -> ca.Function:
-        """``y_t -> memory``, the nearest place of the whole surface, with eta zero."""
-        return self._find_function()
-
-    @once_per_content()
-    def _find_function(self) -> ca.Function:
-        y, grid = ca.MX.sym("y_t", 3), self._global.grid
+    def _nearest(self, y: ca.MX) -> ca.MX:
+        """Parameters of the nearest point of the whole surface, on the first laps, and zeros."""
+        grid = self._global.grid
         starts = nearest_samples(
             y, grid.theta.reshape(-1, 2), grid.position.reshape(-1, 3), _VALLEY * self._lengths
         )
         theta = self._finder.nearest(y, starts)
         wrapped = []
-        for k, ((begin, _), length) in enumerate(
-            zip(self.surface.domain, self._lengths, strict=True)
-        ):
-            laps = ca.floor((theta[k] - begin) / length) if self.surface.closed[k] else 0.0
+        for k, ((begin, _), length) in enumerate(zip(self._domain, self._lengths, strict=True)):
+            laps = ca.floor((theta[k] - begin) / length) if self._closed[k] else 0.0
             wrapped.append(theta[k] - laps * length)
-        memory = ca.vertcat(*wrapped, 0.0, 0.0)
-        return ca.Function("surface_place", [y], [memory], ["y_t"], ["memory"])
+        return ca.vertcat(*wrapped, 0.0, 0.0)
 
-    def __call__(
-        self, point: Sequence[float], theta_guess: Sequence[float], eta_last: Sequence[float]
-    ) -> np.ndarray:
-        """Return the surface point next to a point, new array [layout.size].
-
-        Args:
-            point: y_t, [3], m.
-            theta_guess: Unwrapped parameters of the last tick, [2].
-            eta_last: Tangential coordinates there, [2], m.
-        """
-        function = self._bound_evaluate
-        function.arguments["y_t"][:] = point
-        function.arguments["memory"][:2] = theta_guess
-        function.arguments["memory"][2:] = eta_last
-        function.evaluate()
-        return function.results["manifold_point"].copy()
+    def _on(self, memory: ca.MX) -> ca.MX:
+        """Surface point at unwrapped parameters, with alpha zero and status OK."""
+        rows = ca.vec(self._table(memory[:2], self.layout.order + 1))
+        return ca.vertcat(memory, 0.0, float(ProjectionStatus.OK), rows, self._quaternion)
 
     def evaluate_at(self, theta: Sequence[float], eta: Sequence[float] = (0.0, 0.0)) -> np.ndarray:
         """Return the surface point at a point on the surface, for set-up.
@@ -157,10 +107,6 @@ class SurfaceEvaluator:
         """The closest point of the whole surface, see `GlobalProjector.project`."""
         return self._global.project(point)
 
-    @cached_property
-    def _bound_evaluate(self) -> BoundFunction:
-        return BoundFunction(self.evaluate)
-
     def _terms(self, theta: ca.MX) -> ca.MX:
         return self._table(theta, 2)
 
@@ -175,21 +121,9 @@ class SurfaceEvaluator:
         terms = rows[:, : partial_count(2)]
         begin = self._finder.clamped(guess)
         eta = eta + self._way(begin, foot.theta, self._terms(begin), terms)
-        beyond = foot.beyond_end
-        for k, (first, last) in enumerate(self.surface.domain):
-            if not self.surface.closed[k]:
-                outside = ca.logic_or(foot.theta[k] < first, foot.theta[k] > last)
-                beyond = ca.logic_or(beyond, outside)
-        place = ca.vertcat(foot.theta, eta, _alpha_function()(y, terms))
+        place = ca.vertcat(foot.theta, eta, alpha_function(2)(y, terms))
         known = ca.logic_and(foot.known, ca.fabs(ca.sum1(memory)) < math.inf)
-        status = ca.if_else(
-            ca.logic_and(known, foot.converged),
-            ca.if_else(beyond, float(ProjectionStatus.BEYOND_END), float(ProjectionStatus.OK)),
-            float(ProjectionStatus.NOT_CONVERGED),
-        )
-        point = ca.vertcat(place, ca.vec(rows), self._quaternion)
-        point = ca.if_else(known, point, math.nan)
-        return ca.vertcat(point[:5], status, point[5:])
+        return self._told(ca.vertcat(place, ca.vec(rows), self._quaternion), foot, known)
 
     def _search(self) -> ca.Function:
         """``(is_lost, state, y, guess) -> state`` of the foot that is nearest on all the surface.
@@ -206,7 +140,7 @@ class SurfaceEvaluator:
         best, found = self._finder.find(y, starts[0]), Foot(state, self._finder.lengths)
         nearer = best.rank < found.rank * (1.0 - _NOT_NEARER)
         laps = ca.floor((guess - best.theta) / self._lengths + 0.5) * self._lengths
-        theta = best.theta + laps * np.array(self.surface.closed, dtype=float)
+        theta = best.theta + laps * np.array(self._closed, dtype=float)
         other = ca.vertcat(theta, best.state[2:])
         arguments = [state, y, guess]
         return ca.Function.if_else(
@@ -214,14 +148,6 @@ class SurfaceEvaluator:
             ca.Function("search", arguments, [ca.if_else(nearer, other, state)]),
             ca.Function("stay", arguments, [state]),
         )
-
-
-def _alpha_function() -> ca.Function:
-    """``(y, terms) -> alpha``, see `SurfacePointLayout`."""
-    y, terms = ca.SX.sym("y", 3), ca.SX.sym("terms", 3, partial_count(2))
-    first, bend = first_and_bend(y, terms, 2)
-    alpha = largest_eigenvalue(first, bend)
-    return ca.Function("alpha", [y, terms], [alpha], {"cse": True})
 
 
 def _checked_quaternion(values: ArrayLike) -> np.ndarray:

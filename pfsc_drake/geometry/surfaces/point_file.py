@@ -8,7 +8,7 @@ import numpy as np
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import FARTHEST
 from pfsc_drake.geometry.files.mesh_files import read_obj_vertices, read_ply_vertices, read_stl
-from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
+from pfsc_drake.geometry.files.number_table import read_columns
 
 Unit = Literal["m", "cm", "mm", "inch"]
 
@@ -73,18 +73,15 @@ def read_surface_points(file: str | FilePath, unit: Unit = "m") -> np.ndarray:
 
 def _read_csv(name: str) -> tuple[np.ndarray, list[str]]:
     """Points [n, 3] in the file's unit, and where they stand."""
-    table = read_numbers(
-        name, "points", lambda place, header: check_columns(place, header, _AXES, _AXES)
-    )
-    points = table.rows[:, [table.header.index(axis) for axis in _AXES]]
+    lines, points = read_columns(name, "points", _AXES)
     first: dict[tuple[float, ...], int] = {}
-    for line, row in zip(table.lines, map(tuple, points.tolist()), strict=True):
+    for line, row in zip(lines, map(tuple, points.tolist()), strict=True):
         if first.setdefault(row, line) != line:
             raise InputError(
                 f"{name}, line {line}: the same point as in line {first[row]}; each once is"
                 " required"
             )
-    return points, [f"line {line}" for line in table.lines]
+    return points, [f"line {line}" for line in lines]
 
 
 def read_profile(file: str | FilePath, columns: list[str]) -> np.ndarray:
@@ -102,15 +99,12 @@ def read_profile(file: str | FilePath, columns: list[str]) -> np.ndarray:
             number or beyond 1e4 m.
     """
     name = str(file)
-    table = read_numbers(
-        name, "points", lambda place, header: check_columns(place, header, columns, columns)
-    )
-    points = table.rows[:, [table.header.index(label) for label in columns]]
+    lines, points = read_columns(name, "points", columns)
     far = np.argwhere(np.abs(points) > FARTHEST)
     if far.size:
         row, column = far[0]
         raise InputError(
-            f"{name}, line {table.lines[row]}, column {columns[column]}: {points[row, column]:g} m;"
+            f"{name}, line {lines[row]}, column {columns[column]}: {points[row, column]:g} m;"
             f" at most {FARTHEST:g} m are allowed"
         )
     return points

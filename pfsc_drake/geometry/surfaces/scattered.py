@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.curves.curve import FARTHEST, SHORTEST
-from pfsc_drake.geometry.curves.spline import check_smoothness
+from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
+from pfsc_drake.geometry.curves.spline import UniformKnots, check_smoothness
 from pfsc_drake.geometry.surfaces.base import Base
 from pfsc_drake.geometry.surfaces.choose_base import (
     BaseChoice,
@@ -18,16 +19,14 @@ from pfsc_drake.geometry.surfaces.choose_base import (
     neighbourhoods,
     stand,
 )
-from pfsc_drake.geometry.surfaces.grid import smoothest_within
 from pfsc_drake.geometry.surfaces.penalized_surface import (
-    PenalizedSurface,
     Residuals,
     check_scatter,
     residuals,
+    smoothest_within,
 )
-from pfsc_drake.geometry.surfaces.product import ProductSurface
+from pfsc_drake.geometry.surfaces.product import ProductSurface, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.regularity import sample_grid
-from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots, uniform_spline_surface
 from pfsc_drake.geometry.surfaces.surface import Interval
 
 FEWEST_POINTS, MOST_POINTS = 50, 100_000
@@ -104,7 +103,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     """Fit a surface to scattered points.
 
     The points are projected on a plane, or on a cylinder where they bend over; their heights over
-    it are smoothed by a `PenalizedSurface`, with weights that make residuals distances along the
+    it are smoothed by a `PenalizedSpline`, with weights that make residuals distances along the
     normal of the surface instead of that of the base.
 
     Args:
@@ -129,7 +128,7 @@ def fit_scattered(points: ArrayLike, options: ScatteredFitOptions | None = None)
     cloud = cloud[kept]
     theta = base.parameters(cloud)
     knots = _knots(domain, near.spacing, options.smoothness + 1, base.closed)
-    spline = PenalizedSurface(theta, base.heights(cloud), *knots)
+    spline = PenalizedSpline(theta, base.heights(cloud), *knots)
 
     def surface_of(coefficients: np.ndarray) -> ProductSurface:
         heights = coefficients.reshape(knots[0].count, knots[1].count)
@@ -256,17 +255,14 @@ def _slopes(surface: ProductSurface, theta: np.ndarray, directions: np.ndarray) 
 
 
 def _uncertainty(
-    spline: PenalizedSurface,
+    spline: PenalizedSpline,
     exponent: float,
     noise: float,
     near: Neighbourhoods,
     tolerance: float | None,
 ) -> float:
     """Largest standard error of heights; refuses what the points leave open."""
-    sides = [
-        np.linspace(knots.begin, knots.end, _ERROR_SAMPLES)
-        for knots in (spline.first, spline.second)
-    ]
+    sides = [np.linspace(knots.begin, knots.end, _ERROR_SAMPLES) for knots in spline.knots]
     theta = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     errors = noise * spline.standard_errors(theta, exponent)
     worst = int(np.argmax(errors))

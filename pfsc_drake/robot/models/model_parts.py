@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
+from pfsc_drake.checks import NUMBER
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
 MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
@@ -74,7 +74,7 @@ class ModelPart:
         """
         written = "" if text is None else text.strip()
         value = np.nan
-        if _NUMBER.fullmatch(written) or _INFINITE.fullmatch(written):
+        if NUMBER.fullmatch(written) or _INFINITE.fullmatch(written):
             value = float(written)
         valid = {
             ANY: abs(value) <= LARGEST,

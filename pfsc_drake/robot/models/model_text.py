@@ -2,14 +2,17 @@
 
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 from pfsc_drake.robot.models.joint_edits import mimic_elements
 from pfsc_drake.robot.models.model_xml import Element, ModelXml
+
+# an element and the text that it becomes
+Edit = tuple[Element, str]
 
 
 def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None:
@@ -25,7 +28,7 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
         model: The model.
         without_springs: Whether to set the stiffness of its joints to zero.
     """
-    edits = list(_distinct_materials(model)) if model.root.name == "robot" else []
+    edits = list(distinct_materials(model))
     edits += [(mimic, "") for _, mimic in mimic_elements(model)]
     if without_springs:
         edits += [
@@ -33,18 +36,34 @@ def usable_text(model: ModelXml, *, without_springs: bool = False) -> str | None
             for element in model.root.within()
             if element.name == "spring_stiffness"
         ]
-    if not edits:
-        return None
-    edits += absolute_names(model)
-    content = model.content
-    for element, text in sorted(edits, key=lambda edit: -edit[0].start):
-        # as many line breaks as before, so that messages name the right line
-        lost = content[element.start : element.end].count(b"\n")
-        content = content[: element.start] + text.encode() + b"\n" * lost + content[element.end :]
-    return content.decode("utf-8")
+    return edited_text(model, [*edits, *absolute_names(model)]) if edits else None
 
 
-def _distinct_materials(model: ModelXml) -> Iterator[tuple[Element, str]]:
+def edited_text(model: ModelXml, edits: Iterable[Edit]) -> str:
+    """Return the text of a model with other text for some elements; lines stay where they are.
+
+    Args:
+        model: The model.
+        edits: Elements and what they become. Those within another one go with it.
+    """
+    parts, begin = [], 0
+    for element, text in sorted(edits, key=lambda edit: (edit[0].start, -edit[0].end)):
+        if element.start >= begin:
+            # as many line breaks as before, so that messages name the right line
+            lost = model.content[element.start : element.end].count(b"\n")
+            parts += [model.content[begin : element.start], text.encode(), b"\n" * lost]
+            begin = element.end
+    return b"".join([*parts, model.content[begin:]]).decode("utf-8")
+
+
+def distinct_materials(model: ModelXml) -> Iterator[Edit]:
+    """Yield materials of a URDF model that are told again, to be named apart or left out.
+
+    Args:
+        model: The model.
+    """
+    if model.root.name != "robot":
+        return
     known: dict[str, object] = {}
     at_root = list(model.root.all("material"))
     for material in [*at_root, *model.root.all("link", "visual", "material")]:
@@ -56,7 +75,9 @@ def _distinct_materials(model: ModelXml) -> Iterator[tuple[Element, str]]:
         elif material in at_root:
             yield material, ""
         elif known[name] != look:
-            yield material, _tag(material, {"name": f"{name}_{material.start}"})
+            # its first tag alone
+            head = replace(material, end=material.children[0].start)
+            yield head, f"<material name={quoteattr(f'{name}_{material.start}')}>"
 
 
 def _look(material: Element) -> tuple[tuple[str, ...], ...]:
@@ -67,7 +88,7 @@ def _look(material: Element) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def absolute_names(model: ModelXml) -> Iterator[tuple[Element, str]]:
+def absolute_names(model: ModelXml) -> Iterator[Edit]:
     """Yield elements with relative file names, and what they are with absolute ones.
 
     Args:
@@ -77,19 +98,23 @@ def absolute_names(model: ModelXml) -> Iterator[tuple[Element, str]]:
     for element in model.root.within():
         address = element.attributes.get("filename", "")
         if element.name == "mesh" and address and "://" not in address:
-            yield element, _tag(element, {"filename": str((folder / address).resolve())})
+            yield with_attributes(element, filename=str((folder / address).resolve()))
         if element.name == "uri" and "://" not in element.text:
             path = Path(folder / element.text.strip()).resolve()
             yield element, f"<uri>{escape(str(path))}</uri>"
 
 
-def _tag(element: Element, changed: dict[str, str]) -> str:
-    """Return an element as text in one line, with changed attributes."""
+def with_attributes(element: Element, **changed: str) -> Edit:
+    """Return the edit of an element without children that changes attributes.
+
+    Args:
+        element: The element.
+        **changed: Attributes by name.
+    """
     attributes = "".join(
         f" {name}={quoteattr(value)}" for name, value in (element.attributes | changed).items()
     )
-    inside = "".join(_tag(child, {}) for child in element.children)
-    return f"<{element.name}{attributes}>{inside}</{element.name}>"
+    return element, f"<{element.name}{attributes}/>"
 
 
 # where in Drake's own sources a condition failed; of no use to who wrote the input

@@ -191,6 +191,20 @@ def test_materials_of_one_name_keep_their_colours(draw):
     assert not drawing.warnings
 
 
+def test_textures_go_also_from_materials_that_are_named_apart(draw):
+    looks_of = [
+        visual(
+            PLATE,
+            f'<material name="m">\n<color rgba="{rgba}"/><texture filename="no.png"/></material>',
+        )
+        for rgba in ("1 0 0 1", "0 1 0 1")
+    ]
+    drawing = draw(urdf("".join(looks_of), visual(PLATE)))
+    drawn = {(p.color.r(), p.color.g(), p.color.b()) for p in looks(drawing, "link_1")}
+    assert drawn == {(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)}
+    assert not drawing.warnings
+
+
 def test_materials_that_a_robot_repeats(draw):
     grey = '<material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>'
     drawing = draw(urdf(visual(PLATE, '<material name="grey"/>'), top=grey * 3))

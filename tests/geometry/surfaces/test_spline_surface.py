@@ -5,7 +5,7 @@ import pytest
 
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.surfaces.grid import smooth_surface_near_grid, surface_through_grid
-from pfsc_drake.geometry.surfaces.spline_surface import (
+from pfsc_drake.geometry.surfaces.product import (
     UniformKnots,
     interpolated_surface,
     uniform_spline_surface,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.point import SurfaceTarget
+from pfsc_drake.geometry.surfaces.curvature import SurfaceTarget
 from pfsc_drake.geometry.surfaces.shapes import cylinder, paraboloid
 
 

@@ -1,12 +1,12 @@
-"""Penalized tensor-product splines."""
+"""Penalized splines of two parameters."""
 
 import math
 
 import numpy as np
 import pytest
 
-from pfsc_drake.geometry.surfaces.penalized_surface import PenalizedSurface
-from pfsc_drake.geometry.surfaces.spline_surface import UniformKnots
+from pfsc_drake.geometry.curves.penalized_spline import PenalizedSpline
+from pfsc_drake.geometry.curves.spline import UniformKnots
 
 RNG = np.random.default_rng(8)
 KNOTS = UniformKnots(0.0, 0.3, 9, 6, False), UniformKnots(-0.1, 0.1, 7, 6, False)
@@ -28,7 +28,7 @@ def cubic(theta):
 @pytest.mark.parametrize("exponent", [-6.0, 0.0, 6.0])
 def test_what_costs_no_energy_is_reproduced_whatever_the_penalty(exponent):
     theta = places()
-    spline = PenalizedSurface(theta, cubic(theta), *KNOTS)
+    spline = PenalizedSpline(theta, cubic(theta), *KNOTS)
     assert np.abs(spline.residuals(spline.fit(exponent))).max() < 1e-9
 
 
@@ -39,7 +39,7 @@ def test_the_penalty_is_the_energy_of_a_thin_plate():
         basis = KNOTS[axis].basis(axes[axis]).toarray()
         return np.linalg.lstsq(basis, axes[axis] ** exponent)[0]
 
-    differences = PenalizedSurface(places(), np.zeros(600), *KNOTS)._differences
+    differences = PenalizedSpline(places(), np.zeros(600), *KNOTS)._differences
     energies = [
         float(np.sum((differences @ np.outer(power(0, 4 - a), power(1, a)).ravel()) ** 2))
         for a in range(5)
@@ -55,11 +55,11 @@ def test_the_penalty_is_the_energy_of_a_thin_plate():
 
 def test_cross_validation_finds_the_noise_and_nearly_the_best_penalty():
     theta, noise = places(1200), 0.01
-    spline = PenalizedSurface(theta, wavy(theta) + noise * RNG.normal(size=1200), *KNOTS)
+    spline = PenalizedSpline(theta, wavy(theta) + noise * RNG.normal(size=1200), *KNOTS)
     exponent, found = spline.best_predicting()
     np.testing.assert_allclose(found, noise, rtol=0.06)
     fresh = places(4000)
-    truth = PenalizedSurface(fresh, wavy(fresh), *KNOTS)
+    truth = PenalizedSpline(fresh, wavy(fresh), *KNOTS)
 
     def error(exponent):
         return np.sqrt(np.mean(truth.residuals(spline.fit(exponent)) ** 2))
@@ -75,7 +75,7 @@ def test_cross_validation_finds_the_noise_and_nearly_the_best_penalty():
 def test_weights_say_how_near_the_spline_comes():
     theta = places()
     values = wavy(theta) + 0.1 * RNG.normal(size=len(theta))
-    spline = PenalizedSurface(theta, values, *KNOTS)
+    spline = PenalizedSpline(theta, values, *KNOTS)
     before = np.abs(spline.residuals(spline.fit(2.0)))
     weights = np.ones(len(theta))
     weights[5] = 1e6
@@ -87,6 +87,6 @@ def test_periodic_splines_reproduce_constants_and_fit_waves():
     turn = UniformKnots(0.0, 1.0, 12, 6, True)
     theta = np.stack([RNG.uniform(0.0, 1.0, 900), RNG.uniform(-0.1, 0.1, 900)], axis=1)
     values = np.stack([np.cos(2.0 * np.pi * theta[:, 0]), np.ones(900)], axis=1)
-    spline = PenalizedSurface(theta, values, turn, KNOTS[1])
+    spline = PenalizedSpline(theta, values, turn, KNOTS[1])
     assert np.abs(spline.residuals(spline.fit(-8.0))).max() < 1e-4
     assert np.abs(spline.residuals(spline.fit(8.0))[:, 1]).max() < 1e-7
