@@ -29,8 +29,7 @@ from diagrams.tasks.following import Following, add_place
 from pfsc_drake.drivers.messages import ControlMode
 from pfsc_drake.following.law import make_law
 from pfsc_drake.robot.robot_model import gravity_function
-from pfsc_drake.systems.block_access import BlockAccess
-from pfsc_drake.systems.fuse import fuse_blocks
+from pfsc_drake.systems.fuse import BlockAccess, fuse_blocks
 
 
 @dataclass

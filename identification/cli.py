@@ -250,7 +250,7 @@ def consistent_command(
     """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
     from identification.consistency.bounds import bounds_from_geometry
     from identification.consistency.nearest import refuse_far
-    from identification.estimation.plausibility import refuse_implausible
+    from identification.estimation.validation import refuse_implausible
     from identification.steps import (
         bounds_of,
         consistent_set,

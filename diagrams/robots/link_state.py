@@ -9,11 +9,11 @@ from diagrams.robots.sensors import add_torque_sensor
 from diagrams.scenario.checks import require
 from pfsc_drake.blocks.block import Block
 from pfsc_drake.blocks.wiring_blocks import Constant, Sum
-from pfsc_drake.control.estimation.link_state import LinkState
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
+from pfsc_drake.control.estimation.robot_state import LinkState
 from pfsc_drake.following.law import Coefficients
 from pfsc_drake.following.options.controller import ControllerParameters
-from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
 from pfsc_drake.systems.block_system import BlockSystem
 

@@ -14,8 +14,7 @@ from pfsc_drake.physics.force_torque_sensor import (
     ForceTorqueSensor,
     SensorFailure,
 )
-from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
-from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
+from pfsc_drake.physics.joint_sensors import EncoderOptions, JointEncoders, JointTorqueSensor
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise

@@ -18,9 +18,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand
-from pfsc_drake.physics.operator_hand import OperatorHand
+from pfsc_drake.physics.operator_hand import OperatorHand, ToolMotion
 from pfsc_drake.physics.suction import SuctionGripper, holding_cups
-from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.plants.external_forces import AppliedForces

@@ -33,7 +33,7 @@ from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
 from pfsc_drake.systems.physics.joint_friction import JointFriction
-from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,9 @@ from pfsc_drake.control.manifolds.manifold import Projector, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import ControllerAccess, FollowingController
-from pfsc_drake.systems.fuse import fuse, fuse_blocks
+from pfsc_drake.systems.fuse import BlockAccess, fuse, fuse_blocks
 
 PERIOD = 1e-3
 THETA = 0.6
