@@ -19,13 +19,13 @@ from experiments.preparation import PreparedRun
 from experiments.results.drives import (
     DriveLimitsOfRun,
     friction_metrics,
+    link_metrics,
     plan_metrics,
     saturation_warnings,
 )
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
-from experiments.results.link import link_metrics
 from experiments.results.mounting import mounting_metrics
-from experiments.results.path import path_following_metrics, shape_metrics
+from experiments.results.path import path_following_metrics, press_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.promises import (
     GuidanceRules,
@@ -34,7 +34,6 @@ from experiments.results.promises import (
     set_promises,
     unpromised_distance,
 )
-from experiments.results.pushes import press_metrics
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log

@@ -1,4 +1,7 @@
-"""The schema of a scenario file, and what is left of one where the robot stands elsewhere."""
+"""The schema of a scenario file, and what is left of one where the robot stands elsewhere.
+
+Lengths in m, angles in rad unless a name ends in ``_deg``, times in s.
+"""
 
 import dataclasses as dc
 from copy import deepcopy
