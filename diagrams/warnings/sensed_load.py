@@ -12,7 +12,7 @@ from diagrams.scenario import (
     ServoParameters,
 )
 from diagrams.warnings.law_warnings import least_of, slope_at_rest
-from pfsc_drake.control.compliance.taring import TARING_BLOCK
+from pfsc_drake.control.compliance.measured_wrench import TARING_BLOCK
 from pfsc_drake.control.compliance.tuned_impedance import (
     bearable_share,
     carried_share,

@@ -10,7 +10,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Gain, MatrixGain
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import ImpedanceStatus
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw

@@ -6,7 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.taring import Taring
+from pfsc_drake.control.compliance.measured_wrench import Taring
 from pfsc_drake.control.compliance.tool_compensation import (
     SensorFault,
     ToolCompensation,
