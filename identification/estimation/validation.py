@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from identification.estimation.information import SLOW, Information, MeasuredMotion, information
+from identification.estimation.information import MeasuredMotion, information
 from identification.estimation.least_squares import Estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
@@ -73,8 +73,6 @@ def predict(
     estimate: Estimate,
     regressor: Regressor,
     motion: MeasuredMotion,
-    slow: float = SLOW,
-    adapt_friction: bool = False,
 ) -> PredictedTorque:
     """Return what an estimate predicts of another motion.
 
@@ -82,19 +80,12 @@ def predict(
         estimate: Estimate of the robot.
         regressor: That the estimate was made with, or one like it.
         motion: The motion; need not excite all parameters.
-        slow: Part of a joint's largest velocity below which its torques do not count where noise
-            is compared with.
-        adapt_friction: Whether the sizes of Coulomb and viscous friction, which are not the same
-            every day, are fitted to the motion.
 
     Raises:
-        InputError: If the motion or the regressor do not fit the estimate, or friction is to be
-            adapted and the regressor is without.
+        InputError: If the motion or the regressor do not fit the estimate.
     """
-    system = information(regressor, estimate.robot_base, motion, estimate.friction, slow)
+    system = information(regressor, estimate.robot_base, motion, estimate.friction)
     predicted = system.matrix @ estimate.base_parameters
-    if adapt_friction:
-        predicted = predicted + _further_friction(system, predicted)
     deviation = system.matrix @ np.linalg.cholesky(_regular(estimate.covariance))
     return PredictedTorque(
         estimate.joint_names,
@@ -106,22 +97,6 @@ def predict(
         np.asarray(motion.mean_torque_variance),
         np.sqrt(np.mean(np.sum(deviation**2, axis=2), axis=0)),
     )
-
-
-def _further_friction(system: Information, predicted: np.ndarray) -> np.ndarray:
-    """Return the Coulomb and viscous friction that residuals ask for, shape (K, N)."""
-    names, further = system.base.short_names, np.zeros_like(predicted)
-    for j in range(predicted.shape[1]):
-        own = [f"joint_{j + 1}.{name}" for name in ("f_c", "f_v")]
-        if not set(own) <= set(names):
-            raise InputError(
-                "prediction: friction is to be adapted; a regressor with it is required"
-            )
-        columns = system.matrix[:, j, [names.index(name) for name in own]]
-        used = system.used[:, j]
-        residuals = system.torques[used, j] - predicted[used, j]
-        further[:, j] = columns @ np.linalg.lstsq(columns[used], residuals, rcond=None)[0]
-    return further
 
 
 def _regular(covariance: np.ndarray) -> np.ndarray:
