@@ -9,8 +9,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.robots.part import RobotPart
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.mounting import Mounting, tool_transform
-from diagrams.surroundings.plate_plant import add_plate_plant
+from diagrams.surroundings.mounting import Mounting, add_plate_plant, tool_transform
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
