@@ -18,10 +18,10 @@ from diagrams.robots.drives import (
     add_friction,
     believed_friction,
 )
-from diagrams.robots.link_state import add_link_state
+from diagrams.robots.force_sensor import add_sensor
+from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
-from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.signal_log import add_log

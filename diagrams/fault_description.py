@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.scenario.wording import coordinate_text, listed, posture_text
+from diagrams.scenario.checks import coordinate_text, listed, posture_text
 from diagrams.signal_log import SignalLog
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw

@@ -10,9 +10,10 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.builder import find_rest, find_start
 from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.force_sensor import add_force_sensor
+from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import add_force_sensor, add_joint_state, add_torque_sensor
 from diagrams.scenario import DriverParameters, Scenario
 from diagrams.scenario.checks import require
 from diagrams.station_parts import (

@@ -13,7 +13,7 @@ from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import Scenario
-from diagrams.scenario.wording import posture_text
+from diagrams.scenario.checks import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.drives import (

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.scenario.wording import coordinate_text
+from diagrams.scenario.checks import coordinate_text
 from diagrams.station import Station
 from diagrams.tasks.task import DrivePlan
 from experiments.results.run_log import FloatArray, RunLog
