@@ -68,7 +68,6 @@ class ConsistentParameters:
         base_names: Names of the n_b base parameters, in words.
         base_values: ``K_b rho``, shape (n_b,).
         deviations: ``K_b rho - rho_b`` in standard deviations of each, shape (n_b,).
-        prior_weight: Prior weight of what decides on parameters without effect.
     """
 
     names: list[str]
@@ -77,7 +76,6 @@ class ConsistentParameters:
     base_names: list[str]
     base_values: np.ndarray
     deviations: np.ndarray
-    prior_weight: float
 
 
 def nearest_consistent(
@@ -128,7 +126,6 @@ def nearest_consistent(
         base_names=base.names,
         base_values=base.projection @ rho,
         deviations=residual / np.linalg.norm(L, axis=1),
-        prior_weight=prior_weight,
     )
 
 
@@ -249,5 +246,4 @@ def estimate_consistent(
         base_names=base.names,
         base_values=values,
         deviations=change / estimate.standard_deviation,
-        prior_weight=prior_weight,
     )
