@@ -11,6 +11,15 @@ from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
 from pfsc_drake.errors import InputError
 
+_NEVER_NEGATIVE = ("f_c", "f_v", "I_M")
+# standard deviations below zero from which on a parameter cannot be; the torque that it makes has
+# to be this part of the noise of a measurement, too
+_SURE, _MATERIAL = 5.0, 0.2
+# RMS of residuals in units of the noise of a measurement, and of the torques about their mean,
+# above both of which a model does not explain them
+_MOST_NOISE, _MOST_TORQUE = 4.0, 0.3
+_SPEEDS = 50  # at which friction of several terms is looked at
+
 
 @dataclass(frozen=True, eq=False)
 class PredictedTorque:
@@ -183,16 +192,6 @@ def checked_truth(estimate: Estimate, truth: np.ndarray) -> np.ndarray:
     return values
 
 
-_NEVER_NEGATIVE = ("f_c", "f_v", "I_M")
-# standard deviations below zero from which on a parameter cannot be; the torque that it makes has
-# to be this part of the noise of a measurement, too
-SURE, MATERIAL = 5.0, 0.2
-# RMS of residuals in units of the noise of a measurement, and of the torques about their mean,
-# above both of which a model does not explain them
-_MOST_NOISE, _MOST_TORQUE = 4.0, 0.3
-_SPEEDS = 50  # at which friction of several terms is looked at
-
-
 def refuse_implausible(estimate: Estimate) -> None:
     """Refuse an estimate that no robot has, or that does not explain the torques.
 
@@ -247,8 +246,8 @@ def never_negative(
         if name.split(".")[1] in _NEVER_NEGATIVE
         and not (name.split(".")[0] in (but or []) and ".f_" in name)
         and np.count_nonzero(row) == 1
-        and parameters[i] < -SURE * deviation[i]
-        and -parameters[i] * sizes[i] > MATERIAL
+        and parameters[i] < -_SURE * deviation[i]
+        and -parameters[i] * sizes[i] > _MATERIAL
     ]
     if not below:
         return None
@@ -288,7 +287,7 @@ def _driving_friction(estimate: Estimate, spread: float) -> tuple[str, str, floa
         covariance = estimate.covariance[np.ix_(own, own)]
         deviation = spread * np.sqrt(np.einsum("kp,pq,kq->k", A, covariance, A))
         noise = float(np.sqrt(estimate.motion.torque_variance[j]))
-        drives = (braking < -SURE * deviation) & (-braking > MATERIAL * noise)
+        drives = (braking < -_SURE * deviation) & (-braking > _MATERIAL * noise)
         if drives.any():
             k = int(np.argmax(drives))
             unit = "Nm" if estimate.joint_units[j] == "rad" else "N"

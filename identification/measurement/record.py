@@ -12,6 +12,18 @@ from pfsc_drake.errors import InputError
 SIGNALS = ("q", "tau", "v", "a", "q_motor")
 REQUIRED_SIGNALS = ("q", "tau")
 _FEWEST_SAMPLES = 10
+_JITTER = 0.1  # of the sampling time, by which samples may be off an even grid
+_DEGREES = 180.0 / np.pi
+# by which positions and velocities may be beyond their limits: part of them, plus
+_BEYOND, _SLACK = 0.02, 0.02  # rad or m
+_STRETCH = 0.02  # s, over which difference quotients are compared with velocity limits
+# a number beyond its limit by more than this has another unit
+_OTHER_UNIT = 5.0
+_FAR = 3.0  # times the largest limit, from where on another unit is thought of
+_REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
+# samples at the extreme value that make a plateau, and how much longer than the steps next to it;
+# the top of a parabola that is rounded to steps is up to 5 times as long as these
+_PLATEAU, _FLAT = 5, 10.0
 
 
 class MeasuredRobot(Protocol):
@@ -131,20 +143,6 @@ class Record:
         return self.t.size * self.sampling_time
 
 
-_JITTER = 0.1  # of the sampling time, by which samples may be off an even grid
-_DEGREES = 180.0 / np.pi
-# by which positions and velocities may be beyond their limits: part of them, plus
-_BEYOND, _SLACK = 0.02, 0.02  # rad or m
-_STRETCH = 0.02  # s, over which difference quotients are compared with velocity limits
-# a number beyond its limit by more than this has another unit
-_OTHER_UNIT = 5.0
-_FAR = 3.0  # times the largest limit, from where on another unit is thought of
-_REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
-# samples at the extreme value that make a plateau, and how much longer than the steps next to it;
-# the top of a parabola that is rounded to steps is up to 5 times as long as these
-_PLATEAU, _FLAT = 5, 10.0
-
-
 def check_record(record: Record, robot: MeasuredRobot, still: bool = False) -> None:
     """Refuse a record that is not sound or cannot be of the robot.
 
@@ -173,14 +171,7 @@ def check_record(record: Record, robot: MeasuredRobot, still: bool = False) -> N
 
 
 def check_sampling(record: Record) -> None:
-    """Refuse gaps in time, and samples that are not evenly spaced.
-
-    Args:
-        record: The record.
-
-    Raises:
-        InputError: Where the first gap or the largest deviation is.
-    """
+    """Refuse gaps in time and samples that are not evenly spaced; says where."""
     t, steps = record.t, np.diff(record.t)
     usual = float(np.median(steps))
     k = int(np.argmax(steps > 1.5 * usual))
