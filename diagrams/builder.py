@@ -18,10 +18,10 @@ from diagrams.robots.drives import (
     add_friction,
     believed_friction,
 )
-from diagrams.robots.link_state import add_link_state
+from diagrams.robots.force_sensor import add_sensor
+from diagrams.robots.joint_state import add_joint_state, add_link_state, states_to_log
 from diagrams.robots.part import RobotPart
 from diagrams.robots.remote_arm import RemoteArm
-from diagrams.robots.sensors import add_joint_state, add_sensor, states_to_log
 from diagrams.robots.workpiece import Workpiece
 from diagrams.scenario import Scenario
 from diagrams.signal_log import add_log
@@ -51,7 +51,7 @@ from pfsc_drake.control.planning.course import CourseStart
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.geometry.progress import Progress
-from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.systems.following_controller import ControllerAccess
 from pfsc_drake.systems.fuse import fuse_blocks
 
@@ -80,7 +80,7 @@ def build_station(
             are symbols: such a station is not simulated, but its blocks' networks differentiated.
         remote: Whether the robot stands elsewhere: the station has a
             :class:`~diagrams.robots.remote_arm.RemoteArm` for it, and the scenario must tell
-            nothing of its surroundings, see :func:`~diagrams.scenario.driven.driven`.
+            nothing of its surroundings, see :func:`~diagrams.scenario.schema.driven`.
 
     Returns:
         The station; everything in the scenario that can be wrong has been checked.

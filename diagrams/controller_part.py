@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, System
 
-from diagrams.robots.link_state import DEVIATION
+from diagrams.robots.joint_state import DEVIATION
 from diagrams.station import Station
 from pfsc_drake.blocks.network import Network, Wiring
 from pfsc_drake.blocks.wiring_blocks import Hold

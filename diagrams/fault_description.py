@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import Context
 
-from diagrams.scenario.wording import coordinate_text, listed, posture_text
+from diagrams.scenario.checks import coordinate_text, listed, posture_text
 from diagrams.signal_log import SignalLog
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -18,7 +18,7 @@ from pfsc_drake.geometry import euler_margin
 from pfsc_drake.robot.robot_model import RobotModel, largest_speeds
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.singular_posture import SingularPosture, singular_posture, singularity_name
-from pfsc_drake.systems.block_access import BlockAccess
+from pfsc_drake.systems.fuse import BlockAccess
 
 _STATE = ("q_J", "v_J", "q_M", "v_M")
 # m, from which on a distance from the path is worth a word where an arm becomes singular

@@ -13,9 +13,8 @@ from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.delta import DeltaPart
 from diagrams.station import Station
 from diagrams.tasks.drawing import draw_workpiece
-from pfsc_drake.systems.drawing.force_arrows import ForceArrows
 from pfsc_drake.systems.drawing.robot_visualizer import DeltaVisualizer, RobotVisualizer
-from pfsc_drake.systems.drawing.tool_visualizer import ToolVisualizer, TrailVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import ForceArrows, ToolVisualizer, TrailVisualizer
 
 _WAY = Rgba(0.9, 0.25, 0.1, 1.0)
 _PIECES = 400  # of the tool's way that stay

@@ -10,9 +10,10 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.builder import find_rest, find_start
 from diagrams.robots.drives import add_drives, add_friction
+from diagrams.robots.force_sensor import add_force_sensor
+from diagrams.robots.joint_state import add_joint_state, add_torque_sensor
 from diagrams.robots.model import is_delta
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import add_force_sensor, add_joint_state, add_torque_sensor
 from diagrams.scenario import DriverParameters, Scenario
 from diagrams.scenario.checks import require
 from diagrams.station_parts import (
@@ -29,8 +30,7 @@ from diagrams.tasks.following import Following, add_place
 from pfsc_drake.drivers.messages import ControlMode
 from pfsc_drake.following.law import make_law
 from pfsc_drake.robot.robot_model import gravity_function
-from pfsc_drake.systems.block_access import BlockAccess
-from pfsc_drake.systems.fuse import fuse_blocks
+from pfsc_drake.systems.fuse import BlockAccess, fuse_blocks
 
 
 @dataclass

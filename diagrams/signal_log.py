@@ -7,8 +7,8 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from pfsc_drake.blocks.wiring_blocks import Collect, Hold
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
+from pfsc_drake.systems.fuse import BlockAccess
 
 _SIGNALS = "log_signals"
 

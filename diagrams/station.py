@@ -19,8 +19,8 @@ from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.geometry import Path
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.following_controller import ControllerAccess
+from pfsc_drake.systems.fuse import BlockAccess
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess
 
 

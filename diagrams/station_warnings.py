@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
+from diagrams.robots.force_sensor import taring_warnings
 from diagrams.robots.part import RobotPart
-from diagrams.robots.sensors import taring_warnings
 from diagrams.scenario import Scenario
 from diagrams.tasks.space_guidance import SpaceTask
 from diagrams.tasks.task import Task

@@ -13,20 +13,20 @@ from diagrams.builder import build_station_replay
 from diagrams.drawing.block_diagram import block_diagram_svg
 from diagrams.drawing.replay import RecordedMotion, record
 from diagrams.scenario import Scenario
-from diagrams.scenario.wording import posture_text
+from diagrams.scenario.checks import posture_text
 from experiments.figures.all import render_figures
 from experiments.preparation import PreparedRun
 from experiments.results.drives import (
     DriveLimitsOfRun,
     friction_metrics,
+    link_metrics,
     plan_metrics,
     saturation_warnings,
 )
 from experiments.results.found_links import found_links_metrics
 from experiments.results.guidance import guidance_metrics, guidance_warnings, limit_metrics
-from experiments.results.link import link_metrics
 from experiments.results.mounting import mounting_metrics
-from experiments.results.path import path_following_metrics, shape_metrics
+from experiments.results.path import path_following_metrics, press_metrics, shape_metrics
 from experiments.results.posture import posture_metrics
 from experiments.results.promises import (
     GuidanceRules,
@@ -35,7 +35,6 @@ from experiments.results.promises import (
     set_promises,
     unpromised_distance,
 )
-from experiments.results.pushes import press_metrics
 from experiments.results.recorded_motion import collect_motion
 from experiments.results.run_log import RunLog
 from experiments.results.run_signals import collect_log

@@ -15,7 +15,6 @@ from rich.console import Console
 
 from identification.consistency.printed import printed_command
 from identification.elastic.command import elastic_command
-from identification.excitation.command import information_command
 from identification.options import (
     Bounds,
     Excitation,
@@ -82,12 +81,8 @@ def excite_command(
     from identification.steps import RECORDING, check_duration, save_excitation
 
     with interruptible():
-        _quiet()
-        console = Console()
         check_duration(period, periods)
-        subject = _load(robot, tool)
-        folder = out or Path("out") / f"{subject.name}_excitation"
-        check_folder(folder)
+        console, subject, folder = _begin(robot, tool, out, "excitation")
         within = chosen_limits(
             subject,
             {
@@ -98,15 +93,7 @@ def excite_command(
         numbers = [read_integer(number, "--harmonics") for number in harmonics.split(",")]
         with fraction_display(console, "excitation") as progress:
             found = search(
-                subject,
-                criterion,
-                numbers,
-                period,
-                starts,
-                seed,
-                within,
-                cell,
-                progress=progress,
+                subject, criterion, numbers, period, starts, seed, within, cell, progress=progress
             )
         save_excitation(subject, found, folder, periods, within)
         console.print(
@@ -144,11 +131,7 @@ def simulate_command(
     from identification.steps import load_excitation, simulate_runs
 
     with interruptible():
-        _quiet()
-        console = Console()
-        subject = _load(robot, tool)
-        folder = out or Path("out") / f"{subject.name}_runs"
-        check_folder(folder)
+        console, subject, folder = _begin(robot, tool, out, "runs")
         trajectory = load_excitation(subject, excitation)
         faults = shipped_imperfections(subject.family)
         faults = faults.realistic() if realistic else faults
@@ -189,11 +172,7 @@ def estimate_command(
     from reporting.terminal import print_table
 
     with interruptible():
-        _quiet()
-        console = Console()
-        subject = _load(robot, tool)
-        folder = out or Path("out") / f"{subject.name}_identification"
-        check_folder(folder)
+        console, subject, folder = _begin(robot, tool, out, "identification")
         reading = read_reading(names, units, scales)
         with fraction_display(console, subject.name) as progress:
             findings, other = estimate_files(
@@ -208,15 +187,8 @@ def estimate_command(
                 simulated=simulated,
                 progress=progress,
             )
-        report = write_identification(
-            subject,
-            findings,
-            other,
-            folder,
-            [*records, *([validation] if validation else [])],
-            bounds,
-            excitation,
-        )
+        inputs = [*records, *([validation] if validation else [])]
+        report = write_identification(subject, findings, other, folder, inputs, bounds, excitation)
         print_table(console, parameter_table(findings, words=False), most=12)
         print_table(console, torque_table(findings))
         for note in findings.notes:
@@ -250,20 +222,11 @@ def consistent_command(
     """Find the physically consistent parameters, and write parameter file, SDF and URDF."""
     from identification.consistency.bounds import bounds_from_geometry
     from identification.consistency.nearest import refuse_far
-    from identification.estimation.plausibility import refuse_implausible
-    from identification.steps import (
-        bounds_of,
-        consistent_set,
-        stored_findings,
-        write_consistent,
-    )
+    from identification.estimation.validation import refuse_implausible
+    from identification.steps import bounds_of, consistent_set, stored_findings, write_consistent
 
     with interruptible():
-        _quiet()
-        console = Console()
-        subject = _load(robot, tool)
-        folder = out or Path("out") / f"{subject.name}_model"
-        check_folder(folder)
+        console, subject, folder = _begin(robot, tool, out, "model")
         findings = stored_findings(subject, identification, None, simulated=False)
         refuse_implausible(findings.estimate)
         if total_mass is None:
@@ -296,7 +259,6 @@ def report_command(
     from identification.pages import write_stored
 
     with interruptible():
-        _quiet()
         subject = _load(robot, tool)
         target = out or folder.with_name(f"{folder.name}_report")
         report = write_stored(subject, folder, validation, bounds, excitation, simulated, target)
@@ -305,7 +267,39 @@ def report_command(
 
 app.command("elastic")(elastic_command)
 app.command("printed")(printed_command)
-app.command("information")(information_command)
+
+
+@app.command("information")
+def information_command(
+    robot: Robot,
+    excitations: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="excitation.yaml of motions. Default: all that are shipped with the robot"
+        ),
+    ] = None,
+    tool: Tool = False,
+) -> None:
+    """Tell log det(X'X) and condition number of motions, of 1,000 samples of a period."""
+    from identification.excitation.criterion import information
+    from identification.excitation.fourier import FourierTrajectory
+    from identification.model.base import base_parameters
+    from identification.model.regressor import Regressor
+    from identification.model.subject import load_subject
+    from identification.steps import shipped_excitations
+
+    with interruptible():
+        console, subject = Console(), load_subject(robot, tool=tool)
+        regressor = Regressor(subject)
+        base = base_parameters(regressor)
+        for file in excitations or shipped_excitations(subject):
+            found = information(regressor, base, FourierTrajectory.load(file))
+            console.print(
+                f"{file.name}: log det {found.log_determinant:.1f}, condition number "
+                f"{found.condition_number:.0f}, {found.base_parameters} parameters",
+                soft_wrap=True,
+                highlight=False,
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -320,15 +314,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_app(app, "python -m identification", arguments)
 
 
+def _begin(
+    robot: str, tool: bool, out: Path | None, results: str
+) -> tuple[Console, "Subject", Path]:
+    """Return a console, the robot, and the folder for results, which can take them."""
+    subject = _load(robot, tool)
+    folder = out or Path("out") / f"{subject.name}_{results}"
+    check_folder(folder)
+    return Console(), subject, folder
+
+
 def _load(robot: str, tool: bool) -> "Subject":
     """Return the robot, and say what of its model is taken otherwise than its file says."""
     from identification.model.subject import load_subject
 
+    logging.getLogger("drake").setLevel(logging.CRITICAL)
     subject = load_subject(robot, tool=tool)
     if subject.note:
         Console().print(f"[yellow]note:[/] {subject.note}", soft_wrap=True, highlight=False)
     return subject
-
-
-def _quiet() -> None:
-    logging.getLogger("drake").setLevel(logging.CRITICAL)

@@ -12,7 +12,8 @@ from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.recording import record_excitation
 from identification.excitation.scene import cell_of
 from identification.findings import Findings
-from identification.measurement.experiment import read_motion
+from identification.measurement.experiment import prepare_motion
+from identification.measurement.files import read_record
 from identification.measurement.periods import AveragedMotion, friction_trend
 from identification.model.regressor import Regressor
 from identification.model.subject import Subject
@@ -76,7 +77,9 @@ def write_stored(
         simulated: Whether the robot's model is the truth.
         folder: Where to write.
     """
-    other = None if validation is None else read_motion(validation, Regressor(subject))
+    other = None
+    if validation is not None:
+        other = prepare_motion(read_record(validation, subject), Regressor(subject))
     findings = stored_findings(subject, source, other, simulated)
     with open_results(folder, "identification") as results:
         content = PageContent(

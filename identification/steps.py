@@ -7,11 +7,10 @@ from pathlib import Path
 from identification.consistency.bounds import PhysicalBounds, load_bounds
 from identification.consistency.nearest import ConsistentParameters, estimate_consistent
 from identification.consistency.writing import WrittenModel, write_model
-from identification.estimation.plausibility import refuse_implausible
 from identification.estimation.repetitions import Repetitions
 from identification.estimation.residuals import choose_bandwidth
 from identification.estimation.results import FILE_NAME, StoredIdentification, load_estimate
-from identification.estimation.validation import predict
+from identification.estimation.validation import predict, refuse_implausible
 from identification.estimation.wiring import unchecked
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import JointLimits

@@ -172,22 +172,20 @@ def _from_json(entry: dict[str, Any]) -> Metric:
     return Metric(value, entry["unit"], entry.get("target"), entry.get("source"))
 
 
-def format_quantity(value: float, unit: str, scale_by: float | None = None) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """Formats a value with its unit, e.g. ``0.0000432``, ``"m"`` as ``43.2 µm``.
 
     Args:
         value: In ``unit``.
         unit: ``"m"``, ``"rad"``, ``"m/s"``, ``"s"``, ``"N"`` get an SI prefix, others stay as is;
             ``"1"``, ``"-"`` and ``""`` are no unit.
-        scale_by: Value [unit] that chooses the prefix, so that several values share it; by
-            default ``value`` itself.
 
     Returns:
         Text with a narrow no-break space before the unit; an en dash for NaN and infinity.
     """
     if not math.isfinite(value):
         return NOT_A_NUMBER
-    exponent = _prefix_exponent(value if scale_by is None else scale_by, unit)
+    exponent = _prefix_exponent(value, unit)
     number = _format_number(value / 10.0**exponent)
     symbol = _PREFIXES[exponent] + _SPELLINGS.get(unit, unit)
     return f"{number}{NARROW_SPACE}{symbol}" if symbol else number

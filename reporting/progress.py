@@ -1,6 +1,7 @@
-"""Progress of a run on the terminal: a bar, or plain lines where there is no terminal."""
+"""Progress of a run, or of many, on the terminal: a bar, or plain lines where there is none."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
@@ -21,6 +22,7 @@ from rich.progress import (
 PLAIN_LINES = 10  # plain lines per run of known length
 ROUNDING = 1e-9  # relative
 _PLAIN_STEP = 0.1  # of the whole, between plain lines of one phase
+_UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
 
 
 def make_bar(console: Console, *further: ProgressColumn) -> Progress:
@@ -51,7 +53,37 @@ class ProgressListener(Protocol):
         """Told the simulated time [s] and what goes on, e.g. ``simulating``."""
 
 
-class ProgressDisplay:
+class _Display:
+    """A bar while something is under way; none where there is no terminal."""
+
+    def __init__(self, console: Console, title: str) -> None:
+        self._console, self._title = console, title
+        self._bar: Progress | None = None
+        self._task = TaskID(0)
+
+    def _show_bar(
+        self, total: float | None, *further: ProgressColumn, completed: int = 0, status: str = ""
+    ) -> bool:
+        """Start the bar, and return whether there is one."""
+        if self._console.is_terminal:
+            self._bar = make_bar(self._console, *further)
+            self._task = self._bar.add_task(
+                escape(self._title), total=total, completed=completed, status=status
+            )
+            self._bar.start()
+        return self._bar is not None
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+
+class ProgressDisplay(_Display):
     """Shows simulated time, real-time factor and remaining time; call it with each advance.
 
     Attributes:
@@ -70,32 +102,17 @@ class ProgressDisplay:
             paced: Whether the time is simulated step by step, so that its pace tells something;
                 else it is where the work is, and each phase begins anew.
         """
+        super().__init__(console, title)
         self.simulated_time = 0.0
-        self._console = console
-        self._title = title
         self._duration = duration
         self._paced = paced
         self._phase = ""
         self._phase_start = (time.monotonic(), 0.0)
         self._next_line = 0.0
-        self._bar: Progress | None = None
-        self._task = TaskID(0)
 
     def __enter__(self) -> Self:
-        if self._console.is_terminal:
-            self._bar = make_bar(self._console, TimeRemainingColumn())
-            self._task = self._bar.add_task(escape(self._title), total=self._duration, status="")
-            self._bar.start()
+        self._show_bar(self._duration, TimeRemainingColumn())
         return self
-
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _traceback: TracebackType | None,
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
 
     def expect(self, duration: float) -> None:
         """Takes the simulated time at the end [s], once it is known."""
@@ -136,6 +153,83 @@ class ProgressDisplay:
             return f"{self._phase}, t = {self.simulated_time:.2f}{total} s"
         factor = advanced / wall
         return f"{self._phase} {self.simulated_time:.2f}{total} s, {factor:.1f} x real time"
+
+
+class CountDisplay(_Display):
+    """Shows how many runs are done and how they ended: a bar on a terminal, ten lines elsewhere."""
+
+    def __init__(self, console: Console, title: str, total: int, done: int, usual: str) -> None:
+        """Starts with what earlier sessions have done.
+
+        Args:
+            console: Where to write.
+            title: Name of it all.
+            total: Number of runs.
+            done: Number of those that are there already.
+            usual: The end that needs no word.
+        """
+        super().__init__(console, title)
+        self._total, self._usual = total, usual
+        self._before = self._done = self._said = done
+        self._processes = 0
+        self._begin = time.monotonic()
+        self._ends: Counter[str] = Counter()
+
+    def __enter__(self) -> Self:
+        if not self._show_bar(self._total, completed=self._done, status=self._status()):
+            self._say()
+        return self
+
+    def advance(self, status: str) -> None:
+        """Takes the end of one run."""
+        self._done += 1
+        self._ends[status] += 1
+        is_due = self._done - self._said >= self._total / PLAIN_LINES or self._done == self._total
+        if self._bar is None and is_due:
+            self._said = self._done
+            self._say()
+        self._show()
+
+    def processes(self, number: int) -> None:
+        """Takes the number of processes that run."""
+        if not number and self._processes != number and self._bar is None:
+            self._console.print(f"{self._title}: no worker is left; waiting for one")
+        if not self._processes:
+            # starting them is no part of a run's time, nor are runs from before
+            self._begin, self._before = time.monotonic(), self._done
+        self._processes = number
+        self._show()
+
+    def _show(self) -> None:
+        if self._bar is not None:
+            self._bar.update(self._task, completed=self._done, status=self._status())
+
+    def _say(self) -> None:
+        self._console.print(
+            f"{self._title}: {self._status()}", highlight=False, markup=False, soft_wrap=True
+        )
+
+    def _status(self) -> str:
+        """Runs done and how, and the time left."""
+        parts = [f"{self._done} of {self._total} runs"]
+        parts += [f"{n} {end}" for end, n in sorted(self._ends.items()) if end != self._usual]
+        fresh = self._done - self._before
+        if fresh > 0 and self._done < self._total:
+            left = (time.monotonic() - self._begin) / fresh * (self._total - self._done)
+            parts.append(f"{spoken_time(left)} left")
+        elif not fresh and self._done < self._total:
+            parts.append("starting" if not self._processes else f"{self._processes} at a time")
+        return ", ".join(parts)
+
+
+def spoken_time(seconds: float) -> str:
+    """Returns a time in its two largest units, e.g. ``1 h 20 min``; seconds below a minute."""
+    for i, (length, unit) in enumerate(_UNITS):
+        if seconds >= length:
+            whole, rest = divmod(seconds, length)
+            smaller, name = _UNITS[i + 1] if i + 1 < len(_UNITS) else (1.0, "s")
+            return f"{whole:.0f} {unit} {rest // smaller:.0f} {name}"
+    return f"{seconds:.0f} s"
 
 
 @contextmanager

@@ -8,8 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.mounting import Mounting
-from diagrams.surroundings.plate_plant import PAD, pin_shape
+from diagrams.surroundings.mounting import PAD, Mounting, pin_shape
 from pfsc_drake.geometry.workpieces import bore_wedges
 from pfsc_drake.robot.delta.shapes import ACCENT, METAL
 from pfsc_drake.systems.drawing.robot_visualizer import Triangles

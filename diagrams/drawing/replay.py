@@ -19,14 +19,13 @@ from diagrams.drawing.robot_geometry import RobotDrawing
 from diagrams.robots.workpiece import WorkpieceLook
 from diagrams.tasks.drawing import ManifoldDrawing, add_workpiece_drawing, look_down_at
 from pfsc_drake.robot.delta.delta_robot import DeltaRobot
-from pfsc_drake.systems.drawing.force_arrows import ForceArrows
+from pfsc_drake.systems.drawing.manifold_visualizer import signed_color
 from pfsc_drake.systems.drawing.robot_visualizer import (
     DeltaVisualizer,
     RobotVisualizer,
     turn_scene_over,
 )
-from pfsc_drake.systems.drawing.surface_visualizer import signed_color
-from pfsc_drake.systems.drawing.tool_visualizer import TrailVisualizer
+from pfsc_drake.systems.drawing.tool_visualizer import ForceArrows, TrailVisualizer
 
 # towards the camera if the path is in front of the robot, and its distance beside what is seen
 _VIEW = np.array([0.53, -0.79, 0.31])

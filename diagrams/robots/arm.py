@@ -38,8 +38,8 @@ from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, state_at_rest
 from pfsc_drake.robot.serial.rotor_coupling import mounts_from_parameters
 from pfsc_drake.robot.tool_load import ToolLoad
+from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
 from pfsc_drake.systems.plants.external_forces import LinkPushes
-from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
 from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
 
 _ROUNDING = 1e-6  # m

@@ -19,7 +19,7 @@ from pfsc_drake.robot.serial.chain import SerialChain, ToolMass, believed_chain
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates, chain_from_plant
 from pfsc_drake.robot.serial.link_places import link_frames
 from pfsc_drake.robot.tool_load import ToolLoad
-from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
+from pfsc_drake.systems.plants.reactions import tool_load_from_plant
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from diagrams.scenario import RobotParameters
 from diagrams.scenario.model_error import ModelErrorParameters
 from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import Believed, Coefficients
-from pfsc_drake.physics.joint_encoders import EncoderOptions, encoder_resolution
+from pfsc_drake.physics.joint_sensors import EncoderOptions, encoder_resolution
 from pfsc_drake.robot.model_error import ModelError
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.serial.chain import ParametricChain, SerialChain, chain_parameters

@@ -43,8 +43,7 @@ from pfsc_drake.robot.inverse_kinematics import ToolTarget
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.robot.tool_load import ToolLoad
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
-from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index
-from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
+from pfsc_drake.systems.plants.reactions import ContactWrench, reaction_index, tool_load_from_plant
 
 TOOL, SENSOR_JOINT, TOOL_POINT = "tool", "weld_tool", "tool_point"
 _ROUNDING = 1e-9

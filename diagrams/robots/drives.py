@@ -26,7 +26,7 @@ from pfsc_drake.following.options.controller import ControllerParameters
 from pfsc_drake.following.options.follower import FaultParameters
 from pfsc_drake.physics.driver import DriveLowPass
 from pfsc_drake.physics.friction import BristleFriction, bristles_for_step
-from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.velocity_servo import BusDelay, VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.robot_model import RobotModel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagrams.scenario.wording import posture_text
+from diagrams.scenario.checks import posture_text
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, middle_posture, solve_pose
 from pfsc_drake.robot.robot_model import pose_function

@@ -36,7 +36,7 @@ from pfsc_drake.following.options.controller import (
 from pfsc_drake.following.options.follower import BrakeParameters, FaultParameters
 from pfsc_drake.following.options.friction import JointFrictionParameters
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
-from pfsc_drake.physics.joint_encoders import EncoderOptions
+from pfsc_drake.physics.joint_sensors import EncoderOptions
 from pfsc_drake.physics.link_forces import LinkHandParameters
 from pfsc_drake.physics.scripted_force import ForcePulse
 

@@ -14,7 +14,7 @@ from diagrams.scenario.checks import (
     require_positive,
     require_whole_ticks,
 )
-from pfsc_drake.control.compliance.taring import STILL_TIME
+from pfsc_drake.control.compliance.measured_wrench import STILL_TIME
 from pfsc_drake.control.compliance.tool_compensation import ToolCompensationParameters
 from pfsc_drake.geometry import zyx_to_matrix
 from pfsc_drake.physics.force_torque_sensor import ForceTorqueParameters

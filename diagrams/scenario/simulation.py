@@ -8,7 +8,7 @@ from pydrake.systems.analysis import GetIntegrationSchemes
 from diagrams.scenario.checks import require, require_between, require_positive
 from pfsc_drake.control.compliance.tuned_impedance import TuningParameters
 from pfsc_drake.physics.force_torque_sensor import KINDS
-from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.yaml.reading import FILE
 
 # the integrator that is chosen for a robot before it runs

@@ -1,26 +1,29 @@
-"""Everything that acts on the robot."""
+"""Everything that acts on the robot, at its tool and on its links."""
 
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder
 
-from diagrams.robots.arm import Arm
+from diagrams.robots.arm import Arm, CoupledArm
 from diagrams.robots.part import RobotPart
 from diagrams.scenario import ForcePulse, HandParameters, HoldBackParameters
 from diagrams.scenario.checks import require
 from diagrams.surroundings.mounting import Mounting
 from diagrams.surroundings.mounting_parts import add_hand, add_mounting
 from diagrams.surroundings.operator import Operator, add_live_hand
-from diagrams.surroundings.pushes import PushedLinks, add_pushes
 from diagrams.tasks.task import StartPoint, Task
-from pfsc_drake.blocks.wiring_blocks import Hold, Sum
+from pfsc_drake.blocks.wiring_blocks import Collect, Hold, Rows, Sum
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
-from pfsc_drake.physics.link_forces import LinkHandParameters
+from pfsc_drake.errors import InputError
+from pfsc_drake.physics.link_forces import LinkForces, LinkHand, LinkHandParameters
 from pfsc_drake.physics.scripted_force import DecoupledForce, ForceProfile, ScriptedForce
+from pfsc_drake.robot.serial.link_places import LinkPlace, place_on_link
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.surface_spring import SurfaceSpring
+from pfsc_drake.systems.plants.external_forces import LinkPushes
 
 
 @dataclass(frozen=True)
@@ -69,11 +72,12 @@ def add_surroundings(
         spring: What the tool touches in place of contact in the plant, if it does.
 
     Returns:
-        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there, what
-        :func:`add_pushes` returns of the links and :func:`add_mounting` of plates.
+        ``wrench_ext`` on the tool point, world axes, shape (6,), if anything can act there; if
+        something acts on K links ``push_wrench`` of shape (6K,), ``push_point`` of shape (3K,) and
+        ``push_torque`` of shape (N,); what :func:`add_mounting` returns of plates.
 
     Raises:
-        InputError: If a force does not suit the robot.
+        InputError: If a force does not suit the robot, or it has no such link.
     """
     period, joint_state = outside.period, ports["joint_state"]
     sources = _scripted(builder, part, task, outside, ports)
@@ -82,8 +86,7 @@ def add_surroundings(
         sources.append(add_hand(builder, part.robot, task, outside.hand, period, joint_state))
     if operator is not None:
         sources.append(add_live_hand(builder, part.robot, operator, joint_state))
-    pushed = PushedLinks(outside.forces, outside.pushes, outside.has_sensor)
-    pushes, signals = add_pushes(builder, part, task, pushed, period, ports)
+    pushes, signals = _add_pushes(builder, part, task, outside, ports)
     if mounting is not None:
         wrenches, mounted = add_mounting(
             builder, mounting, part, task, outside.hand, period, start, joint_state
@@ -150,12 +153,7 @@ def _scripted(
     period, sources = outside.period, []
     pulses = [pulse for pulse in outside.forces if not pulse.link]
     if pulses:
-        profile = ForceProfile(pulses)
-        operator = builder.AddNamedSystem(
-            "operator", BlockSystem(ScriptedForce(profile, task.manifold, period), period)
-        )
-        if profile.needs_manifold:
-            builder.Connect(ports["manifold_point"], operator.GetInputPort("manifold_point"))
+        operator = _add_script(builder, "operator", pulses, task, period, ports)
         sources.append(operator.GetOutputPort("wrench"))
     pulse = outside.hold_back
     if pulse.force != 0.0:
@@ -173,6 +171,23 @@ def _scripted(
             builder.Connect(ports[name], brake.GetInputPort(name))
         sources.append(brake.GetOutputPort("wrench"))
     return sources
+
+
+def _add_script(
+    builder: DiagramBuilder,
+    name: str,
+    pulses: list[ForcePulse],
+    task: Task,
+    period: float,
+    ports: dict[str, OutputPort],
+) -> BlockSystem:
+    """Add forces at one point that are written down beforehand."""
+    profile = ForceProfile(pulses)
+    script = BlockSystem(ScriptedForce(profile, task.manifold, period), period)
+    builder.AddNamedSystem(name, script)
+    if profile.needs_manifold:
+        builder.Connect(ports["manifold_point"], script.GetInputPort("manifold_point"))
+    return script
 
 
 def _sum(
@@ -200,3 +215,97 @@ def _sum_in_plant(builder: DiagramBuilder, *wrenches: OutputPort) -> OutputPort:
     for i, wrench in enumerate(wrenches):
         builder.Connect(wrench, total.get_input_port(i))
     return total.get_output_port()
+
+
+@dataclass
+class _Push:
+    """What acts at one point of a link: pulses, or a hand."""
+
+    place: LinkPlace
+    pulses: list[ForcePulse]
+    hand: LinkHandParameters | None = None
+
+
+def _add_pushes(
+    builder: DiagramBuilder,
+    part: RobotPart,
+    task: Task,
+    outside: Outside,
+    ports: dict[str, OutputPort],
+) -> tuple[LinkPushes | None, dict[str, OutputPort]]:
+    """Add forces on links, and return what is to be applied to the plant, if any, and signals."""
+    period, found = outside.period, _pushes(part, outside)
+    if not found or not isinstance(part, Arm):
+        return None, {}
+    system = LinkPushes(part.robot, [push.place for push in found])
+    builder.AddNamedSystem("link_pushes", system)
+    size = len(found)
+    told = LinkForces(part.robot, [(push.place.link, push.place.p_LQ) for push in found])
+    forces = builder.AddNamedSystem("link_forces", BlockSystem(told, period))
+    points = forces.GetOutputPort("points")
+    collect = Collect({f"wrench_{k + 1}": 6 for k in range(size)})
+    wrenches = builder.AddNamedSystem("link_wrenches", BlockSystem(collect, period))
+    # held over a tick, so that bodies and joints bear the same, and the integrator sees no more
+    hold = builder.AddNamedSystem("push_hold", BlockSystem(Hold(6 * size), period))
+    builder.Connect(wrenches.GetOutputPort("all"), hold.GetInputPort("value"))
+    for bearing in (system, forces):
+        builder.Connect(ports["joint_state"], bearing.GetInputPort("joint_state"))
+        builder.Connect(hold.GetOutputPort("held"), bearing.GetInputPort("wrenches"))
+    for k, push in enumerate(found):
+        if push.hand is not None:
+            source = builder.AddNamedSystem(
+                f"link_hand_{k + 1}", BlockSystem(LinkHand(push.hand, period), period)
+            )
+            own = Rows(3 * size, range(3 * k, 3 * k + 3))
+            point = builder.AddNamedSystem(f"pushed_point_{k + 1}", BlockSystem(own, period))
+            builder.Connect(points, point.GetInputPort("whole"))
+            builder.Connect(point.GetOutputPort("part"), source.GetInputPort("point"))
+        else:
+            source = _add_script(builder, f"link_script_{k + 1}", push.pulses, task, period, ports)
+        builder.Connect(source.GetOutputPort("wrench"), wrenches.GetInputPort(f"wrench_{k + 1}"))
+    return system, {
+        "push_wrench": hold.GetOutputPort("held"),
+        "push_point": points,
+        "push_torque": forces.GetOutputPort("tau_ext"),
+    }
+
+
+def _pushes(part: RobotPart, outside: Outside) -> list[_Push]:
+    """Return what acts on links, pulses at one point together."""
+    scripted: list[_Push] = []
+    for i, pulse in enumerate(outside.forces):
+        if not pulse.link:
+            continue
+        for push in scripted:
+            if push.place.name == pulse.link and np.array_equal(push.pulses[0].point, pulse.point):
+                push.pulses.append(pulse)
+                break
+        else:
+            place = _place(part, outside, f"forces[{i}]", pulse.link, pulse.point)
+            scripted.append(_Push(place, [pulse]))
+    hands = [
+        _Push(_place(part, outside, f"pushes[{i}]", hand.link, hand.point), [], hand)
+        for i, hand in enumerate(outside.pushes)
+    ]
+    return scripted + hands
+
+
+def _place(
+    part: RobotPart, outside: Outside, where: str, link: str, point: np.ndarray
+) -> LinkPlace:
+    if not isinstance(part, Arm):
+        raise InputError(
+            f"{where}.link = '{link}'; allowed: none, this robot is pushed at its tool"
+        )
+    try:
+        place = place_on_link(part.model, part.coordinates, link, point)
+    except InputError as error:
+        raise InputError(f"{where}.link = {error}") from None
+    # what a sensor behind the last joint bears is told for forces on the tool point alone
+    last = place.link == part.robot.dimension - 1
+    if last and outside.has_sensor and isinstance(part, CoupledArm):
+        raise InputError(
+            f"{where}.link = '{link}' with robot.rotor_coupling and a force sensor; allowed: links "
+            "before the last, or no link, for the tool point"
+        )
+    return place

@@ -9,8 +9,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.robots.part import RobotPart
 from diagrams.scenario.plate import PlateParameters
-from diagrams.surroundings.mounting import Mounting, tool_transform
-from diagrams.surroundings.plate_plant import add_plate_plant
+from diagrams.surroundings.mounting import Mounting, add_plate_plant, tool_transform
 from diagrams.tasks.task import StartPoint, Task
 from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
@@ -18,9 +17,8 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters
 from pfsc_drake.physics.hand_way import Place
 from pfsc_drake.physics.mounting_hand import MountingHand
-from pfsc_drake.physics.operator_hand import OperatorHand
+from pfsc_drake.physics.operator_hand import OperatorHand, ToolMotion
 from pfsc_drake.physics.suction import SuctionGripper, holding_cups
-from pfsc_drake.physics.tool_motion import ToolMotion
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.plants.external_forces import AppliedForces

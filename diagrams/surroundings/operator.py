@@ -12,7 +12,7 @@ from pfsc_drake.control.compliance.tuned_impedance import AS_GIVEN, KINDS, REQUE
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.geometry.files.number_table import check_columns, read_numbers
-from pfsc_drake.physics.live_hand import ASKED, LiveHand, LiveHandParameters
+from pfsc_drake.physics.operator_hand import ASKED, LiveHand, LiveHandParameters
 from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.operator_panel import OperatorPanel, RecordedControls

@@ -18,8 +18,8 @@ from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.geometry.path_on_surface import CurveOnSurface
 from pfsc_drake.geometry.regions.moving import MovingRegion
 from pfsc_drake.geometry.surfaces.surface import Surface
-from pfsc_drake.systems.drawing.path_visualizer import PathVisualizer
-from pfsc_drake.systems.drawing.surface_visualizer import (
+from pfsc_drake.systems.drawing.manifold_visualizer import (
+    PathVisualizer,
     RegionVisualizer,
     SurfaceVisualizer,
     draw_surface,

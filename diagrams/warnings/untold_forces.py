@@ -16,7 +16,7 @@ from pfsc_drake.control.law.stabilization import LoopGains
 from pfsc_drake.control.manifolds.coordinate import Kind
 from pfsc_drake.control.manifolds.manifold import indices
 from pfsc_drake.physics.hand_model import HandParameters
-from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 # s, for which a force is followed, and at how many instants it is looked at

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
-from experiments.results.pushes import PUSHED, TOUCHING, force_error, held_samples, push_size
+from experiments.results.path import TOUCHING, force_error, held_samples
+from experiments.results.posture import PUSHED, push_size
 from experiments.results.run_log import FloatArray, RunLog
 from reporting.style import (
     BROAD,

@@ -21,7 +21,6 @@ from reporting.style import (
 )
 
 _HEIGHT = 10.0  # inches, of the four rows of the use case
-_BEFORE, _AFTER = 1.5, 2.5  # s, around the insertion
 _PHASE_COLOURS = ("#DBEAFE", "#F3F4F6", "#FEF3C7", "#DCFCE7", "#FCE7F3", "#E5E7EB", "#FFFFFF")
 
 

@@ -6,8 +6,7 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.figures.drives import MOVERS, axis_labels, plural
 from experiments.figures.forces import shade_pushes
-from experiments.results.posture import has_spare_joints
-from experiments.results.pushes import elbow_shift
+from experiments.results.posture import elbow_shift, has_spare_joints
 from experiments.results.run_log import FloatArray, RunLog, Signal
 from reporting.style import (
     ALERT,

@@ -13,7 +13,7 @@ from diagrams.builder import build_station, draw_station
 from diagrams.integration import Integration
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.scenario import Scenario
-from diagrams.scenario.driven import driven
+from diagrams.scenario.schema import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import check_ready, listen
 from experiments.hardware.drive import Drive, DriveOptions, command_mode

@@ -13,7 +13,7 @@ from diagrams.scenario import Scenario
 from diagrams.station import FoundFault, Station
 from diagrams.surroundings.operator import PULL
 from experiments.simulation import SimulationResult, chunk_ticks, configure
-from pfsc_drake.physics.live_hand import ASKED, HOLD, TARGET
+from pfsc_drake.physics.operator_hand import ASKED, HOLD, TARGET
 from pfsc_drake.robot.robot_model import pose_function
 
 # the longest time between two looks at the controls [s]

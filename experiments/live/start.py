@@ -14,7 +14,7 @@ from experiments.live.take import TakeFolders
 from experiments.preparation import prepare
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.live_hand import LiveHandParameters
+from pfsc_drake.physics.operator_hand import LiveHandParameters
 from pfsc_drake.yaml.typed import load_typed
 from reporting.processes import noticed_interruption
 

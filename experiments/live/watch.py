@@ -10,7 +10,7 @@ import numpy as np
 from diagrams.builder import build_station, draw_station
 from diagrams.live_view import LiveFrame, LiveView
 from diagrams.scenario import Scenario
-from diagrams.scenario.driven import driven
+from diagrams.scenario.schema import driven
 from diagrams.station import Station
 from experiments.live.controls import Slider
 from experiments.live.pages import Pages

@@ -1,8 +1,8 @@
-"""Drives and joints of a run: how near they came to limits, what a reference asks of them.
+"""Drives and joints of a run: how near to limits, what a reference asks; what their link did.
 
 A simulated joint goes on beyond its limits, a real one does not. Signals used, as in the log:
 ``q_J``, ``v_J`` and ``tau_d`` [samples, axes], the latter with attribute ``limits``,
-``saturated_drives`` and ``fault`` [samples, 1].
+``saturated_drives`` and ``fault`` [samples, 1]; of a link ``status_age`` and ``clipped``.
 """
 
 import math
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.scenario.wording import coordinate_text
+from diagrams.scenario.checks import coordinate_text
 from diagrams.station import Station
 from diagrams.tasks.task import DrivePlan
 from experiments.results.run_log import FloatArray, RunLog
@@ -309,3 +309,22 @@ def _momentum(station: Station, state: FloatArray) -> FloatArray:
         return np.zeros((0, station.robot.dimension))
     function = drive_momentum(station.robot).function.map(len(state))
     return np.array(function(state.T)[0]).T
+
+
+def link_metrics(log: RunLog) -> Metrics:
+    """Return what the link did, if there was one.
+
+    Args:
+        log: Log of the run.
+    """
+    metrics = Metrics()
+    if "status_age" not in log:
+        return metrics
+    ages = log["status_age"].values[:, 0]
+    ages = ages[np.isfinite(ages)]
+    median, p99 = np.percentile(ages, [50, 99]) if len(ages) else (np.nan, np.nan)
+    metrics.add("link_answer_us", float(median))
+    metrics.add("link_answer_us_p99", float(p99))
+    metrics.add("missed_ticks", int(np.isnan(log["status_age"].values).sum()))
+    metrics.add("clipped_ticks", int(np.count_nonzero(log["clipped"].values)))
+    return metrics

@@ -15,7 +15,7 @@ from diagrams.scenario import Scenario
 from diagrams.station import Station
 from experiments.results.drives import DriveLimitsOfRun, plan_metrics
 from experiments.results.path import shape_metrics
-from experiments.results.pushes import is_redundant
+from experiments.results.posture import is_redundant
 from experiments.results.run_log import FloatArray, RunLog
 from experiments.results.run_signals import expected_signals
 from pfsc_drake.errors import InputError

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Canvas
 
 from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.worker import COMPLETED, RunRow
+from experiments.sweep.worker import RunRow
 from identification.consistency.nearest import ConsistentParameters
 from identification.estimation.results import FILE_NAME, save_estimate
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
@@ -232,14 +232,10 @@ def _said(
     circle: CircularRun, progress: Callable[[str], None]
 ) -> Callable[[tuple[str, str], RunRow], None]:
     def tell(case: tuple[str, str], row: RunRow) -> None:
-        value = _value(row, circle.drives[case[0]].metric)
+        value = row.value(circle.drives[case[0]].metric)
         progress(f"{case[0]:38s} {case[1]:20s} {row.reason or f'{value * 1e3:.4f} mm'}")
 
     return tell
-
-
-def _value(row: RunRow, metric: str) -> float:
-    return float(row.metrics[metric].value) if row.status == COMPLETED else float("nan")
 
 
 def _content(
@@ -253,7 +249,7 @@ def _content(
     metrics, table = Metrics(), []
     deviations = np.array(
         [
-            [_value(rows[name, belief], drive.metric) for belief in BELIEFS]
+            [rows[name, belief].value(drive.metric) for belief in BELIEFS]
             for name, drive in circle.drives.items()
         ]
     )

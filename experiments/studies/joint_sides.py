@@ -122,13 +122,8 @@ def write_joint_sides(
         metrics = Metrics()
         for (scenario, condition, source), row in rows.items():
             for name, when in ((_MOVING, "largest"), (_AT_REST, "at rest")):
-                value = row.metrics[name].value if row.status == COMPLETED else float("nan")
-                metrics.add(
-                    f"{scenario}, {condition}, {source}, {when}",
-                    value,
-                    "m",
-                    source=row.reason or None,
-                )
+                key = f"{scenario}, {condition}, {source}, {when}"
+                metrics.add(key, row.value(name), "m", source=row.reason or None)
         return write_study_page(
             results,
             title="Which sides of joints are measured",
@@ -164,7 +159,7 @@ def _scenarios(
 def _said(row: RunRow) -> str:
     if row.status != COMPLETED:
         return row.reason
-    largest, rest = (row.metrics[name].value * 1e3 for name in (_MOVING, _AT_REST))
+    largest, rest = (row.value(name) * 1e3 for name in (_MOVING, _AT_REST))
     return f"{largest:8.3f} mm, {rest:8.4f} mm at rest"
 
 
@@ -190,7 +185,7 @@ def _picture(rows: Mapping[Case, RunRow]) -> Figure:
                         across = panel.get_yaxis_transform()
                         panel.plot(0.96, y, "x", color=ALERT, ms=6, transform=across)
                         continue
-                    largest, rest = (row.metrics[name].value * 1e3 for name in (_MOVING, _AT_REST))
+                    largest, rest = (row.value(name) * 1e3 for name in (_MOVING, _AT_REST))
                     panel.plot([rest, largest], [y, y], color=colour, lw=1.0)
                     panel.plot(largest, y, "o", color=colour, ms=5)
                     panel.plot(rest, y, "o", color=colour, markerfacecolor="none", ms=5)

@@ -140,18 +140,15 @@ def write_robustness(
         rows = run_side_by_side(_scenarios(subjects, disturbances), tell)
         metrics = Metrics()
         for (scenario, disturbance, when), row in rows.items():
-            own = metric[scenario]
-            known = row.status == COMPLETED
-            value = row.metrics[own].value if known else float("nan")
-            metrics.add(f"{scenario}, {disturbance}, {when}", value, "m", source=row.reason or None)
-        figures = [_picture(rows, metric)]
+            key, value = f"{scenario}, {disturbance}, {when}", row.value(metric[scenario])
+            metrics.add(key, value, "m", source=row.reason or None)
         return write_study_page(
             results,
             title="Robots that are not their models",
             description=_DESCRIPTION,
             overrides=_listing(subjects, disturbances),
             metrics=metrics,
-            figures=figures,
+            figures=[_picture(rows, metric)],
         )
 
 
@@ -177,7 +174,7 @@ def _scenarios(
 def _said(row: RunRow, metric: str) -> str:
     if row.status != COMPLETED:
         return row.reason
-    return f"{row.metrics[metric].value * 1e3:8.3f} mm"
+    return f"{row.value(metric) * 1e3:8.3f} mm"
 
 
 def _listing(
@@ -206,7 +203,7 @@ def _picture(rows: Mapping[Case, RunRow], metric: Mapping[str, str]) -> Figure:
                 after, height = when == AFTER, names.index(name)
                 colour = COLOURS[0] if after else COLOURS[1]
                 if row.status == COMPLETED:
-                    value = row.metrics[metric[scenario]].value * 1e3
+                    value = row.value(metric[scenario]) * 1e3
                     face = colour if after else "none"
                     panel.plot(value, height, "o", color=colour, markerfacecolor=face, ms=7)
                 else:

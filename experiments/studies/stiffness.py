@@ -14,7 +14,7 @@ from diagrams.scenario import Scenario
 from experiments.scenario_file import ScenarioFile, read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.worker import COMPLETED, RunRow
+from experiments.sweep.worker import RunRow
 from pfsc_drake.robot.models.parameters import load_parameters
 from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.robot_model import joint_resonances
@@ -131,7 +131,8 @@ def _run_all(
 
         def take(case: tuple[float, str], row: RunRow) -> None:
             stiffness, law = case
-            point = points[case] = _point(law, stiffness, resonances[stiffness], row)
+            said = row.value("max_path_deviation"), row.reason or None
+            point = points[case] = StudyPoint(law, stiffness, resonances[stiffness], *said)
             result = point.fault or f"{point.deviation * 1e3:.3g} mm"
             progress(f"K_s,1 = {stiffness:9.3g} Nm/rad  {law:22s} {result}")
 
@@ -169,14 +170,6 @@ def _resonance(scenario: ScenarioFile) -> float:
     station = build_station(settings, scenario.path.parent)
     q_J = (station.part.coordinates.link_rows @ station.initial_state)[: station.robot.dimension]
     return float(joint_resonances(station.robot, q_J)[-1])
-
-
-def _point(law: str, stiffness: float, resonance: float, row: RunRow) -> StudyPoint:
-    """Return what one run says."""
-    if row.status != COMPLETED:
-        return StudyPoint(law, stiffness, resonance, np.nan, row.reason)
-    deviation = row.metrics["max_path_deviation"].value
-    return StudyPoint(law, stiffness, resonance, deviation, None)
 
 
 def _picture(points: Sequence[StudyPoint], laws: Sequence[str]) -> Figure:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Canvas
 from experiments.scenario_file import read_scenario
 from experiments.studies.study_page import write_study_page
 from experiments.sweep.many import run_side_by_side
-from experiments.sweep.worker import COMPLETED, RunRow
+from experiments.sweep.worker import RunRow
 from reporting.folder import open_results
 from reporting.metrics import Metrics
 from reporting.page import Report
@@ -82,9 +82,8 @@ def write_tracking(
         metrics = Metrics()
         for case, row in rows.items():
             for name, unit in METRICS.items():
-                source = row.reason or None
-                metrics.add(f"{', '.join(case)}: {name}", _value(row, name), unit, source=source)
-        figures = [_picture(rows)]
+                key, source = f"{', '.join(case)}: {name}", row.reason or None
+                metrics.add(key, row.value(name), unit, source=source)
         overrides = [" ".join(x) for x in (*forces.values(), *robots.values()) if x]
         return write_study_page(
             results,
@@ -92,17 +91,13 @@ def write_tracking(
             description=_DESCRIPTION,
             overrides=overrides,
             metrics=metrics,
-            figures=figures,
+            figures=[_picture(rows)],
         )
-
-
-def _value(row: RunRow, metric: str) -> float:
-    return row.metrics[metric].value if row.status == COMPLETED else float("nan")
 
 
 def _said(case: Case, row: RunRow) -> str:
     law, force, robot = case
-    result = row.reason or f"{_value(row, 'max_path_deviation') * 1e3:8.3f} mm"
+    result = row.reason or f"{row.value('max_path_deviation') * 1e3:8.3f} mm"
     return f"{law:26s} {force:32s} {robot:30s} {result}"
 
 
@@ -116,7 +111,7 @@ def _picture(rows: Mapping[Case, RunRow]) -> Figure:
         names = ("max_path_deviation", "max_orientation_error")
         for panel, metric, unit in zip(panels, names, ("mm", "mrad"), strict=True):
             for i, law in enumerate(LAWS):
-                values = [_value(rows[law, force, robot], metric) * 1e3 for force, robot in groups]
+                values = [rows[law, force, robot].value(metric) * 1e3 for force, robot in groups]
                 panel.barh(
                     places + 0.26 * (1 - i), values, height=0.24, color=COLOURS[i], label=law
                 )

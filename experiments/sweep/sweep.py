@@ -18,7 +18,6 @@ from experiments.sweep.definition import (
 )
 from experiments.sweep.figures import draw_sweep
 from experiments.sweep.many import count_cores, run_many
-from experiments.sweep.progress import SweepProgress
 from experiments.sweep.summary import (
     choose_metric,
     count_ends,
@@ -31,7 +30,7 @@ from experiments.sweep.summary import (
     to_parquet,
     units_of,
 )
-from experiments.sweep.worker import REFUSED, RunRow, RunTask, program_revision
+from experiments.sweep.worker import COMPLETED, REFUSED, RunRow, RunTask, program_revision
 from pfsc_drake.errors import InputError
 from pfsc_drake.yaml.reading import dump_yaml
 from pfsc_drake.yaml.typed import load_typed
@@ -39,6 +38,7 @@ from reporting.folder import ResultsFolder, check_folder, open_results
 from reporting.metrics import Metrics
 from reporting.page import report_page, write_report
 from reporting.processes import noticed_interruption
+from reporting.progress import CountDisplay
 from reporting.provenance import standard_attributes
 
 _KIND = "sweep"
@@ -173,7 +173,7 @@ def run_sweep(
         record = SweepRecord(results, sweep.definition)
         missing = record.missing(len(sweep.samples))
         title, done = sweep.scenario.name, len(sweep.samples) - len(missing)
-        with SweepProgress(console, title, len(sweep.samples), done) as progress:
+        with CountDisplay(console, title, len(sweep.samples), done, COMPLETED) as progress:
 
             def take(number: int, row: RunRow) -> None:
                 record.take(number, row)

@@ -59,6 +59,10 @@ class RunRow:
         """Whether the same run would end in the same way; not if the machine is to blame."""
         return self.status not in (FAILED, DIED)
 
+    def value(self, metric: str) -> float:
+        """Returns the value of a metric; NaN if the run did not complete."""
+        return self.metrics[metric].value if self.status == COMPLETED else math.nan
+
     def to_data(self) -> dict[str, Any]:
         """Returns the row as data for JSON; NaN is null."""
         return {

@@ -68,7 +68,6 @@ class ConsistentParameters:
         base_names: Names of the n_b base parameters, in words.
         base_values: ``K_b rho``, shape (n_b,).
         deviations: ``K_b rho - rho_b`` in standard deviations of each, shape (n_b,).
-        prior_weight: Prior weight of what decides on parameters without effect.
     """
 
     names: list[str]
@@ -77,7 +76,6 @@ class ConsistentParameters:
     base_names: list[str]
     base_values: np.ndarray
     deviations: np.ndarray
-    prior_weight: float
 
 
 def nearest_consistent(
@@ -128,7 +126,6 @@ def nearest_consistent(
         base_names=base.names,
         base_values=base.projection @ rho,
         deviations=residual / np.linalg.norm(L, axis=1),
-        prior_weight=prior_weight,
     )
 
 
@@ -209,74 +206,44 @@ def factor(base: BaseParameters, covariance: np.ndarray) -> np.ndarray:
     return sigma[:, None] * np.linalg.cholesky(R)
 
 
-@dataclass(frozen=True, eq=False)
-class ConsistentEstimate(ConsistentParameters):
-    """Consistent parameters that fit a motion best.
-
-    Beside :class:`~identification.consistency.nearest.ConsistentParameters`, whose chi squared is
-    by how much the weighted squares grow as the parameters are required to be consistent:
-
-    Attributes:
-        estimate: Base parameters that fit best without being consistent, from the same motion.
-    """
-
-    estimate: Estimate
-
-    @property
-    def robot_parameters(self) -> np.ndarray:
-        """Those of the robot without terms of friction beyond Coulomb's and viscous, shape (n,)."""
-        return self.parameters[: self.parameters.size - len(self.estimate.friction.terms)]
-
-    @property
-    def residuals(self) -> np.ndarray:
-        """Measured less predicted torques [Nm or N], shape (K, N)."""
-        system = self.estimate.system
-        return system.torques - system.matrix @ self.base_values
-
-    @property
-    def weighted_squares(self) -> float:
-        """Sum of squares of the residuals of torques that count, over their variances."""
-        return float(np.sum((self.residuals * self.estimate.system.weights) ** 2))
-
-
 def estimate_consistent(
     estimate: Estimate,
     bounds: PhysicalBounds,
-    prior: np.ndarray | None = None,
     prior_weight: float = PRIOR_WEIGHT,
-) -> ConsistentEstimate:
+) -> ConsistentParameters:
     """Return the consistent parameters with the least weighted squares (2.80) of the residuals.
 
     All torques that count enter by the factors of the weighted information matrix: with
     ``X = U F``, ``F = diag(values) V' diag(scale)``, ``|F K_b rho - U' b|^2`` and a constant are
     the weighted squares, see :func:`~identification.consistency.program.least_squares`. Noise is
     taken for white; for the metric of a covariance of coloured noise take
-    :func:`~identification.consistency.nearest.nearest_consistent`.
+    :func:`nearest_consistent`. Chi squared is by how much the weighted squares grow as the
+    parameters are required to be consistent.
 
     Args:
         estimate: What a motion tells about the base parameters.
         bounds: What is known of the bodies.
-        prior: What parameters without effect tend to, shape (n,); by default the middle of the
-            bounds.
-        prior_weight: Weight of the distance from the prior beside the weighted squares.
+        prior_weight: As of :func:`nearest_consistent`, beside the weighted squares.
 
     Raises:
-        InputError: If the bounds are of another robot or cannot be kept, or the prior does not fit.
+        InputError: If the bounds are of another robot or cannot be kept.
     """
     base, factors = estimate.base, estimate.factors
     F = factors.values[:, None] * factors.directions.T * factors.scale
     rho = least_squares(
-        F @ base.projection, factors.right_side, base.full_names, bounds, prior, prior_weight
+        F @ base.projection,
+        factors.right_side,
+        base.full_names,
+        bounds,
+        prior_weight=prior_weight,
     )
     values = base.values(rho)
     change = values - estimate.base_parameters
-    return ConsistentEstimate(
+    return ConsistentParameters(
         names=list(base.full_names),
         parameters=rho,
         chi_squared=float(np.sum((F @ change) ** 2)),
         base_names=base.names,
         base_values=values,
         deviations=change / estimate.standard_deviation,
-        prior_weight=prior_weight,
-        estimate=estimate,
     )

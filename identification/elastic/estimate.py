@@ -121,7 +121,7 @@ def check_estimate(where: str, estimate: JointEstimate) -> None:
             )
 
 
-KNOTS = 3e-3  # s, distance in the test function
+KNOTS = 3e-3  # s, distance in the test function, which passes what is below about 100 Hz
 _LEAST_KNOTS = 3.0  # sampling times
 _MEMORY = 0.1  # s, after which what the equation leaves over no longer correlates, or
 _STRETCHES, _FEWEST_STRETCHES = 40, 12  # of this length that there are to be
@@ -136,7 +136,6 @@ def estimate_joints(
     *,
     locked: bool = False,
     viscous: np.ndarray | None = None,
-    viscous_deviation: np.ndarray | None = None,
     coupling: bool = True,
 ) -> list[JointEstimate]:
     """Return the estimates of all joints of a robot from one record.
@@ -146,19 +145,17 @@ def estimate_joints(
         subject: Whose record it is.
         locked: Whether all links were held.
         viscous: ``f_v`` of the drives, for locked joints only, shape (N,).
-        viscous_deviation: Its standard deviation, shape (N,); 0 if omitted.
         coupling: Whether what turning links do to spinning rotors is known and taken off.
 
     Raises:
         InputError: As :func:`estimate_joint` and
             :func:`~identification.elastic.signals.joint_signals`.
     """
-    spread = np.zeros(subject.dimension) if viscous_deviation is None else viscous_deviation
     known = [None if viscous is None else float(f_v) for f_v in _each(viscous, subject)]
     return [
-        estimate_joint(signals, locked=locked, viscous=f_v, viscous_deviation=float(sd))
-        for signals, f_v, sd in zip(
-            joint_signals(record, subject, coupling and not locked), known, spread, strict=True
+        estimate_joint(signals, locked=locked, viscous=f_v)
+        for signals, f_v in zip(
+            joint_signals(record, subject, coupling and not locked), known, strict=True
         )
     ]
 
@@ -177,9 +174,7 @@ def estimate_joint(
     *,
     locked: bool = False,
     viscous: float | None = None,
-    viscous_deviation: float = 0.0,
     position_noise: tuple[float, float] | None = None,
-    knots: float | None = None,
 ) -> JointEstimate:
     """Return stiffness, damping, motor inertia and friction of a joint.
 
@@ -193,11 +188,8 @@ def estimate_joint(
         locked: Whether the link was held. The motor then feels the joint's damping and its own
             viscous friction as one, so that the latter has to be known from elsewhere.
         viscous: ``f_v`` [Nm s/rad or N s/m], for a locked joint only.
-        viscous_deviation: Its standard deviation.
         position_noise: Standard deviations of white noise on the positions of motor and link
             [rad or m]; taken from the signals if omitted.
-        knots: Distance of the knots of the test function [s]; by default 3 ms, which passes what
-            is below about 100 Hz, or three sampling times if these are longer.
 
     Raises:
         InputError: If signals are too short or not of one joint, the motion does not tell the
@@ -210,8 +202,7 @@ def estimate_joint(
             + ("for a locked joint (0 for damping and friction together)" if locked else "not")
         )
     (check_locked if locked else check_same_travel)(signals)
-    spacing = max(KNOTS, _LEAST_KNOTS * signals.step) if knots is None else knots
-    function = TestFunction.of_knots(spacing, signals.step)
+    function = TestFunction.of_knots(max(KNOTS, _LEAST_KNOTS * signals.step), signals.step)
     if signals.t.size < _FEWEST + 2 * function.half:
         raise InputError(
             f"{where}: {signals.t.size} samples; at least {_FEWEST + 2 * function.half} required"
@@ -230,7 +221,6 @@ def estimate_joint(
     covariance = inverse @ spread @ inverse
     if viscous is not None:
         values[1] -= viscous
-        covariance[1, 1] += viscous_deviation**2
     estimate = JointEstimate(
         signals.name,
         signals.unit,

@@ -18,7 +18,6 @@ from identification.measurement.record import Record
 from identification.measurement.servo import (
     Servo,
     add_curves,
-    add_lines,
     add_sines,
     add_sum,
     drive_inertia,
@@ -33,7 +32,7 @@ from pfsc_drake.physics.friction import bristles_for_step
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.rotor_coupling import RotorMount
 from pfsc_drake.systems.physics.joint_friction import JointFriction
-from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,36 +91,11 @@ def zippered_multisine(
     return Multisine(amplitude, frequency, random.uniform(0.0, 2.0 * np.pi, frequency.shape))
 
 
-def random_steps(
-    height: np.ndarray,
-    hold: float,
-    t: np.ndarray,
-    random: np.random.Generator,
-) -> np.ndarray:
-    """Return torques that jump between random levels, shape (K, N) [Nm or N].
-
-    Args:
-        height: Largest magnitudes [Nm or N], shape (N,).
-        hold: Time for which a level lasts [s].
-        t: Instants [s], shape (K,).
-        random: Generator of the levels.
-
-    Raises:
-        InputError: If a value is not positive.
-    """
-    size = np.asarray(height, dtype=float)
-    if not (np.all(size > 0.0) and 0.0 < hold < np.inf):
-        raise InputError(f"torque steps: height = {size.tolist()}, hold = {hold}; must be positive")
-    step = np.floor(t / hold + 1e-9).astype(int)
-    return np.asarray(random.uniform(-size, size, (step.max() + 1, size.size))[step])
-
-
 RATE = 1000.0  # samples per second
 _STEP = 0.25e-3  # s, of the integration
 _CHUNK = 0.25  # s, after which progress is told
 # RMS of what shakes locked joints, well above friction, and moving ones, of the largest torque
 _LOCKED, _MOVING = 0.2, 0.05
-_HOLD = 0.25  # s
 
 SetState = Callable[[Context], None]
 
@@ -131,21 +105,20 @@ def simulate_locked(
     faults: Imperfections,
     *,
     duration: float = 10.0,
-    steps: bool = False,
     share: float = _LOCKED,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Record:
     """Return what is measured while the links are held and the drives shake the joints.
 
-    All joints at once, each a motor with friction on a visco-elastic joint to a link at rest.
+    All joints at once, by sines of 4 to 90 Hz, each a motor with friction on a visco-elastic joint
+    to a link at rest.
 
     Args:
         subject: A robot with elastic joints; its friction has to be known.
         faults: Noise of the torques, encoders and noise of the positions.
         duration: [s].
-        steps: Whether torques jump between random levels, else sums of sines from 4 to 90 Hz.
-        share: Share of the drives' largest torques, RMS of the sines, highest of the steps.
+        share: Share of the drives' largest torques, RMS of the sines.
         seed: Seed of all random numbers.
         progress: Told the fraction done and what is done.
 
@@ -163,12 +136,8 @@ def simulate_locked(
     inputs = LinearSystem(A, B, np.eye(2 * n), np.zeros((2 * n, 2 * n)), 0.0)
     plant = builder.AddNamedSystem("motors", inputs)
     state = plant.get_output_port()
-    t = np.arange(round(duration * RATE) + 1) / RATE
     size = share * subject.effort_limit
-    if steps:
-        drive = add_lines(builder, "drive_torque", t, random_steps(size, _HOLD, t, random))
-    else:
-        drive = _add_multisine(builder, zippered_multisine(size, duration, random))
+    drive = _add_multisine(builder, zippered_multisine(size, duration, random))
     resistance = _add_friction(builder, chain, coulomb, viscous, state, np.eye(2 * n)[n:])
     both = builder.AddNamedSystem("torques", Multiplexer([n, n]))
     builder.Connect(drive, both.get_input_port(0))
@@ -187,8 +156,6 @@ def simulate_excited(
     faults: Imperfections,
     *,
     periods: int = 2,
-    share: float = _MOVING,
-    servo: Servo | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Record:
@@ -202,8 +169,6 @@ def simulate_excited(
         trajectory: Excitation, within the limits of the robot.
         faults: Noise of the torques, encoders and noise of the positions.
         periods: How often the excitation is run.
-        share: Share of the drives' largest torques, RMS of the sines.
-        servo: The controller.
         seed: Seed of all random numbers.
         progress: Told the fraction done and what is done.
 
@@ -212,7 +177,7 @@ def simulate_excited(
             or beyond its limits, or drives are asked for more than they have.
     """
     chain, coulomb, viscous = _elastic(subject, faults)
-    servo, n, random = servo or Servo(), subject.dimension, np.random.default_rng(seed)
+    servo, n, random = Servo(), subject.dimension, np.random.default_rng(seed)
     if trajectory.dimension != n:
         raise InputError(
             f"excitation: of {trajectory.dimension} joints; {subject.name} has {n} joints"
@@ -236,7 +201,7 @@ def simulate_excited(
     builder.Connect(reference, control.get_input_port_desired_state())
     known = add_feed_forward(builder, servo, t, v, rigid, (coulomb, viscous))
     shaking = _add_multisine(
-        builder, zippered_multisine(share * subject.effort_limit, trajectory.period, random)
+        builder, zippered_multisine(_MOVING * subject.effort_limit, trajectory.period, random)
     )
     drive = add_sum(builder, "servo_torque", control.get_output_port_control(), known)
     drive = add_sum(builder, "drive_torque", drive, shaking)

@@ -18,8 +18,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.signal import fftconvolve
 
-from identification.measurement.checks import check_sampling
-from identification.measurement.record import Record
+from identification.measurement.record import Record, check_sampling
 from identification.model.subject import Subject
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.rotor_coupling import rotor_momentum

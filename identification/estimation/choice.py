@@ -28,7 +28,7 @@ from identification.estimation.friction import (
     FrictionTerms,
 )
 from identification.estimation.identifiability import factorize
-from identification.estimation.information import SLOW, FurtherColumns, MeasuredMotion, information
+from identification.estimation.information import FurtherColumns, MeasuredMotion, information
 from identification.estimation.least_squares import estimate
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
@@ -91,7 +91,6 @@ def choose_friction(
     motion: MeasuredMotion,
     other: MeasuredMotion,
     kinds: Sequence[str] = KINDS,
-    slow: float = SLOW,
     progress: Progress | None = None,
 ) -> FrictionChoice:
     """Return the friction terms that predict a motion better that was not used.
@@ -102,7 +101,6 @@ def choose_friction(
         motion: That parameters are estimated on.
         other: That they are judged on, another trajectory; need not excite all parameters.
         kinds: Candidates for each joint, at least one.
-        slow: Part of a joint's largest velocity below which its torques do not count.
         progress: Told the fraction done and what is done.
 
     Raises:
@@ -118,7 +116,7 @@ def choose_friction(
             f"{subject.name}: regressor without friction; one with Coulomb and viscous friction is "
             "required to choose what else there is"
         )
-    systems = [information(regressor, base, data, None, slow) for data in (motion, other)]
+    systems = [information(regressor, base, data) for data in (motion, other)]
     for what, system in zip(("motion", "other motion"), systems, strict=True):
         if system.still.any():
             joint = subject.joint_names[int(np.argmax(system.still))]
@@ -132,7 +130,7 @@ def choose_friction(
 
     def deviations(model: FrictionTerms) -> float:
         """Return the factor of the last term in units of its standard deviation."""
-        found = estimate(regressor, base, motion, model, slow)
+        found = estimate(regressor, base, motion, model)
         return float(abs(found.base_parameters[-1]) / found.standard_deviation[-1])
 
     data = [

@@ -169,11 +169,6 @@ class Estimate:
         """In units of the magnitudes, shape (n_b,)."""
         return self.standard_deviation / np.abs(self.base_parameters)
 
-    @property
-    def regressor_matrix(self) -> np.ndarray:
-        """``Y_b`` at each instant (2.76), shape (K, N, n_b)."""
-        return self.system.matrix
-
     @cached_property
     def prediction(self) -> np.ndarray:
         """Torques of the model on the motion [Nm or N], shape (K, N)."""

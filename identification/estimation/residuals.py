@@ -48,14 +48,6 @@ class Whiteness:
     statistic: np.ndarray
     p_value: np.ndarray
 
-    def white(self, level: float = 0.01) -> np.ndarray:
-        """Return whether there is no reason to call the residuals coloured, shape (N,).
-
-        Args:
-            level: Probability to call white residuals coloured.
-        """
-        return self.p_value > level
-
 
 def whiteness(
     residuals: np.ndarray, used: np.ndarray, joint_names: Sequence[str], lags: int = LAGS
@@ -116,14 +108,6 @@ class Excess:
     freedom: float
     ratio: np.ndarray
     p_value: np.ndarray
-
-    def noise_only(self, level: float = 0.01) -> np.ndarray:
-        """Return whether there is no reason to think that the model lacks something, shape (N,).
-
-        Args:
-            level: Probability to think so of noise.
-        """
-        return self.p_value > level
 
 
 def excess(

@@ -15,8 +15,8 @@ import numpy as np
 
 from identification.estimation.information import standing_still
 from identification.estimation.least_squares import NormalEquations
-from identification.estimation.plausibility import describe_negative, never_negative
 from identification.estimation.signal_changes import SignalChange, likely_changes
+from identification.estimation.validation import describe_negative, never_negative
 from identification.measurement.periods import AveragedMotion
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor

@@ -80,22 +80,16 @@ class BaseRegressorKernels:
     adjoint: ca.Function
 
     @classmethod
-    def of(
-        cls, regressor: Regressor, base: BaseParameters, weights: np.ndarray | None = None
-    ) -> "BaseRegressorKernels":
+    def of(cls, regressor: Regressor, base: BaseParameters) -> "BaseRegressorKernels":
         """Return the kernels of a robot.
 
         Args:
             regressor: With a smooth sign of the velocities.
             base: The base parameters.
-            weights: Weights of the rows of each sample, such as inverse standard deviations of the
-                measured torques, shape (N,); all one by default.
         """
         n = regressor.subject.dimension
         q, v, a = (ca.SX.sym(name, n) for name in "qva")
         Y = regressor.function(q, v, a)[:, base.indices.tolist()]
-        if weights is not None:
-            Y = ca.diag(ca.DM(weights)) @ Y
         S = ca.SX.sym("S", n, base.rank)
         gradient = ca.gradient(ca.dot(S, Y), ca.vertcat(q, v, a))
         return cls(

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.excitation.fourier import fourier_basis
-from identification.excitation.problem import ExcitationProblem
-from identification.excitation.program import ExcitationProgram
+from identification.excitation.program import ExcitationProblem, ExcitationProgram
 
 # instants per period of the highest harmonic: at first, and where excesses are looked for
 _COARSE_JOINTS, _COARSE_POSTURES, _FINE = 10, 12, 100
@@ -66,25 +65,18 @@ class LocalSearch:
         self._torque = problem.torque.map(len(self._fine))
         self._posture = None if posture is None else posture.function.map(len(self._fine))
 
-    def run(
-        self,
-        seed: int,
-        iterations: int,
-        posture: np.ndarray | None = None,
-        near: np.ndarray | None = None,
-    ) -> LocalOptimum:
+    def run(self, seed: int, iterations: int, near: np.ndarray | None = None) -> LocalOptimum:
         """Return the optimum next to a random motion.
 
         Args:
             seed: Seed of the random motion.
             iterations: Iterations of the solver, at most; a quarter of them once instants have
                 been added.
-            posture: That the random motion is about [rad or m], shape (N,); or random, too.
             near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or nowhere.
         """
         random = np.random.default_rng(seed)
         for _ in range(_MOST_TRIALS):
-            start = random_motion_about(self.problem, random, posture)
+            start = random_start(self.problem, random)
             if near is not None:
                 start = near + _FROM_NEAR * (start - near)
             optimum = self.improve(start, seed, iterations)
@@ -149,18 +141,9 @@ class LocalSearch:
         return np.unique(np.concatenate(added))
 
 
-def random_motion_about(
-    problem: ExcitationProblem, random: np.random.Generator, posture: np.ndarray | None = None
-) -> np.ndarray:
-    """Return coefficients of a random motion within the joint limits, shape (N, 2M + 1).
-
-    Args:
-        problem: Problem of the robot.
-        random: Source of the numbers.
-        posture: Its middle [rad or m], shape (N,); by default a random one that is allowed.
-    """
-    limits = problem.limits
-    middle = _random_posture(problem, random) if posture is None else posture
+def random_start(problem: ExcitationProblem, random: np.random.Generator) -> np.ndarray:
+    """Return coefficients of a random motion within the joint limits, shape (N, 2M + 1)."""
+    limits, middle = problem.limits, _random_posture(problem, random)
     coefficients = np.empty(problem.shape)
     coefficients[:, 0] = middle
     coefficients[:, 1:] = random.normal(size=(problem.dimension, problem.shape[1] - 1))

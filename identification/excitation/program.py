@@ -1,21 +1,140 @@
-"""The optimization problem (2.79) for Drake's solvers, with exact first derivatives.
+"""The optimization problem (2.79) of a robot, for other processes and for Drake's solvers."""
 
-Limits hold at given instants only: those of the joints are linear in the coefficients, torques and
-postures are not. What happens in between is the business of who chooses the instants.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
-from identification.excitation.criterion import ExcitationCost
-from identification.excitation.fourier import fourier_basis
-from identification.excitation.problem import ExcitationProblem
+from identification.excitation.clearance import (
+    PostureLimits,
+    delta_posture_limits,
+    serial_posture_limits,
+)
+from identification.excitation.criterion import CRITERIA, BaseRegressorKernels, ExcitationCost
+from identification.excitation.fourier import check_harmonics, check_period, fourier_basis
+from identification.excitation.limits import JointLimits
 from identification.excitation.run_in import SampledFunction
+from identification.excitation.scene import Cell, RobotScene
+from identification.model.base import base_parameters
+from identification.model.parameters import true_parameters
+from identification.model.regressor import Regressor
+from identification.model.subject import Subject
+from pfsc_drake.errors import InputError
+
+# of the largest velocity; Coulomb friction passes smoothly within, so that gradients exist
+_SIGN_WIDTH = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationProblem:
+    """The optimization problem (2.79) of one robot.
+
+    Attributes:
+        period: T_f [s].
+        harmonics: Multiples of the fundamental frequency in use.
+        limits: Limits of the joints.
+        kernels: Kernels of the criterion.
+        torque: ``(q, v, a) -> tau``, predicted torques of the drives.
+        posture: What the joint positions must keep to; None for nothing but the limits.
+        criterion: ``D`` or ``condition``.
+    """
+
+    period: float
+    harmonics: tuple[int, ...]
+    limits: JointLimits
+    kernels: BaseRegressorKernels
+    torque: ca.Function
+    posture: PostureLimits | None
+    criterion: str
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints N."""
+        return self.limits.velocity.size
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Shape of the coefficients, (N, 2M + 1)."""
+        return self.dimension, 2 * len(self.harmonics) + 1
+
+
+def excitation_problem(
+    subject: Subject,
+    limits: JointLimits,
+    *,
+    period: float = 10.0,
+    harmonics: tuple[int, ...] = (1, 3, 5),
+    criterion: str = "D",
+    cell: Cell | None = None,
+    scene: RobotScene | None = None,
+) -> ExcitationProblem:
+    """Return the problem of a robot.
+
+    Args:
+        subject: The robot.
+        limits: Limits of its joints.
+        period: T_f [s].
+        harmonics: Multiples of the fundamental frequency in use.
+        criterion: ``D`` or ``condition``.
+        cell: What stands around a serial robot.
+        scene: The same for Drake; made anew if there is a cell alone.
+
+    Raises:
+        InputError: If a value is out of range.
+    """
+    check_period(period)
+    check_harmonics(harmonics)
+    if criterion not in CRITERIA:
+        raise InputError(f"criterion = {criterion!r}; must be one of {', '.join(CRITERIA)}")
+    n = subject.dimension
+    smooth = Regressor(subject, sign_width=_SIGN_WIDTH * float(limits.velocity.max()))
+    base = base_parameters(Regressor(subject))
+    believed = believed_parameters(subject)
+    q, v, a = (ca.SX.sym(name, n) for name in "qva")
+    tau = ca.densify(smooth.function(q, v, a) @ ca.DM(believed))
+    posture: PostureLimits | None = None
+    if subject.delta is not None:
+        posture = delta_posture_limits(subject.delta)
+    elif cell is not None:
+        posture = serial_posture_limits(subject, cell, scene or RobotScene(subject, cell))
+    return ExcitationProblem(
+        period,
+        tuple(harmonics),
+        limits,
+        BaseRegressorKernels.of(smooth, base),
+        ca.Function("torque", [q, v, a], [tau], ["q", "v", "a"], ["tau"]),
+        posture,
+        criterion,
+    )
+
+
+def believed_parameters(subject: Subject) -> np.ndarray:
+    """Return what a model says of a robot, with no friction where unknown, shape (n,)."""
+    return np.nan_to_num(true_parameters(subject))
+
+
+def tightened(
+    problem: ExcitationProblem, share: float, margins: Mapping[str, float], margin: float = 0.0
+) -> ExcitationProblem:
+    """Return the problem with narrower limits, for what solvers leave of them.
+
+    Args:
+        problem: Problem of a robot.
+        share: Share of the joint limits that is left.
+        margins: Least values of posture limits by name, instead of zero [m or 1].
+        margin: Margin at those that are not named [m or 1].
+    """
+    posture = problem.posture
+    if posture is not None:
+        q = ca.SX.sym("q", problem.dimension)
+        least = ca.DM([margins.get(name, margin) for name in posture.names])
+        g = posture.function(q) - least
+        posture = replace(posture, function=ca.Function("g", [q], [g], ["q"], ["g"]))
+    return replace(problem, limits=problem.limits.scaled(share), posture=posture)
+
 
 Evaluated = Callable[[np.ndarray], np.ndarray]
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from identification.excitation.criterion import InformationFigures, information
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.limits import Given, JointLimits, chosen_limits
 from identification.excitation.local_search import LocalOptimum, LocalSearch
-from identification.excitation.problem import (
+from identification.excitation.program import (
     ExcitationProblem,
     believed_parameters,
     excitation_problem,
@@ -23,7 +22,6 @@ from identification.excitation.verification import (
     Verification,
     check_excited,
     check_postures,
-    check_start_posture,
     verify,
 )
 from identification.model.base import base_parameters
@@ -87,9 +85,6 @@ def search(
     limits: JointLimits | Mapping[str, Given] | None = None,
     cell: Cell | str | Path | None = None,
     *,
-    posture: ArrayLike | None = None,
-    parameters: np.ndarray | None = None,
-    torque_noise: np.ndarray | None = None,
     iterations: int = 120,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -108,18 +103,14 @@ def search(
         limits: Limits of the joints where not those of the model, see
             :func:`~identification.excitation.limits.chosen_limits`.
         cell: What stands around a serial robot; None for what is shipped with it.
-        posture: That random motions are about [rad or m], shape (N,); random ones by default.
-        parameters: Believed ones, for the torques, shape (n,); those of the model by default.
-        torque_noise: Standard deviations of the measured torques, which weight the rows of the
-            regressor, shape (N,) [Nm or N]; all one by default.
         iterations: Iterations of the solver per start, at most; a quarter of them whenever it goes
             on.
         workers: Number of processes; one for each core by default, 1 for no others than this.
         progress: Told the fraction done and the best figure so far.
 
     Raises:
-        InputError: If a value is out of range, the harmonics do not show all parameters, the
-            posture is in collision, or no motion keeps all limits.
+        InputError: If a value is out of range, the harmonics do not show all parameters, or no
+            motion keeps all limits.
     """
     begin = time.perf_counter()
     if starts < 1 or iterations < 1:
@@ -138,15 +129,10 @@ def search(
         criterion=criterion,
         cell=cell if is_serial else None,
         scene=scene,
-        parameters=parameters,
-        torque_noise=torque_noise,
     )
     regressor = Regressor(subject)
     base = base_parameters(regressor)
-    believed = believed_parameters(subject, parameters)
-    about = None
-    if posture is not None:
-        about = check_start_posture(subject, problem, posture, cell, scene)
+    believed = believed_parameters(subject)
     check_postures(subject, problem)
     check_excited(subject, problem, base)
     narrower = tightened(problem, _SHARE, {}, _MARGIN)
@@ -155,8 +141,7 @@ def search(
         for count in (starts - 2 * (starts // 4), starts // 4, starts // 4):
             near: list[np.ndarray | None] = [o.coefficients for o in found[:_BEST]] or [None]
             tasks = [
-                _Start(seed + len(found) + i, iterations, about, near[i % len(near)])
-                for i in range(count)
+                _Start(seed + len(found) + i, iterations, near[i % len(near)]) for i in range(count)
             ]
             for optimum in run(_search_from, narrower, tasks):
                 found.append(optimum)
@@ -185,18 +170,16 @@ class _Start:
     Attributes:
         seed: Seed of the random motion.
         iterations: Iterations of the solver.
-        posture: That the motion is about, shape (N,); or None.
         near: Coefficients of a motion that it is near to, shape (N, 2M + 1); or None.
     """
 
     seed: int
     iterations: int
-    posture: np.ndarray | None
     near: np.ndarray | None
 
 
 def _search_from(problem: ExcitationProblem, start: _Start) -> LocalOptimum:
-    return LocalSearch(problem).run(start.seed, start.iterations, start.posture, start.near)
+    return LocalSearch(problem).run(start.seed, start.iterations, start.near)
 
 
 def _unchecked(subject: Subject, cell: Cell, scene: RobotScene | None) -> list[str]:

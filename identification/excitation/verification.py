@@ -7,18 +7,16 @@ the model with the sign of the velocities itself. Distances are those of Drake's
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from identification.excitation.balls import ends, points_of_last_link
 from identification.excitation.clearance import delta_posture_limits, height_of
 from identification.excitation.fourier import FourierTrajectory, fourier_basis
-from identification.excitation.limits import Given, JointLimits, chosen_limits, numbers, used_shares
-from identification.excitation.local_search import random_motion_about
-from identification.excitation.problem import ExcitationProblem, believed_parameters
-from identification.excitation.scene import Cell, RobotScene, cell_of
+from identification.excitation.limits import JointLimits, used_shares
+from identification.excitation.local_search import random_start
+from identification.excitation.program import ExcitationProblem
+from identification.excitation.scene import Cell, RobotScene
 from identification.excitation.swept_clearance import SweptClearance, swept_clearance
 from identification.model.base import BaseParameters
 from identification.model.regressor import Regressor
@@ -34,63 +32,18 @@ _NAMED = 6  # parameters in a message
 _TAKES_PART = 0.2  # of the largest element of a direction
 
 
-def check_start_posture(
-    subject: Subject,
-    problem: ExcitationProblem,
-    posture: ArrayLike,
-    cell: Cell,
-    scene: RobotScene | None,
-) -> np.ndarray:
-    """Return the posture that a motion is to be about, shape (N,).
-
-    Args:
-        subject: The robot.
-        problem: Its problem.
-        posture: Joint positions [rad or m], shape (N,).
-        cell: What stands around it.
-        scene: The same for Drake; None of a robot without.
-
-    Raises:
-        InputError: If it has another shape, is outside the limits or in collision.
-    """
-    q = numbers("posture", posture)
-    if q.shape != (subject.dimension,) or not np.isfinite(q).all():
-        raise InputError(f"posture = {q.tolist()}; must be {subject.dimension} finite numbers")
-    for name, value, (lower, upper) in zip(
-        subject.joint_names, q, problem.limits.position, strict=True
-    ):
-        if not lower < value < upper:
-            raise InputError(
-                f"posture: {name} = {value:g}; must be within its limits, {lower:g} to {upper:g}"
-            )
-    if scene is not None:
-        nearest = scene.clearance(q[None])
-        if nearest.least < cell.clearance:
-            raise InputError(
-                f"posture: {nearest.pair} are {nearest.least:.3g} m apart; must be at least "
-                f"{cell.clearance:g} m"
-            )
-    if problem.posture is not None:
-        values = problem.posture.values(q[None])[0]
-        for name, value in zip(problem.posture.names, values, strict=True):
-            if value < 0.0 and not name.startswith("clearance"):
-                raise InputError(f"posture: {name} falls short by {-value:.3g}; must be kept")
-    return q
-
-
-def check_postures(subject: Subject, problem: ExcitationProblem, seed: int = 0) -> None:
+def check_postures(subject: Subject, problem: ExcitationProblem) -> None:
     """Refuse limits that leave a robot nowhere to be.
 
     Args:
         subject: The robot.
         problem: Its problem.
-        seed: Seed of random postures.
 
     Raises:
         InputError: If none of many random postures keeps all limits; it names what is hardest.
     """
     lower, upper = problem.limits.position.T
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     q = random.uniform(lower, upper, (_POSTURES, subject.dimension))
     still = np.zeros_like(q)
     tau = np.array(problem.torque.map(len(q))(q.T, still.T, still.T)).T
@@ -110,16 +63,13 @@ def check_postures(subject: Subject, problem: ExcitationProblem, seed: int = 0) 
     )
 
 
-def check_excited(
-    subject: Subject, problem: ExcitationProblem, base: BaseParameters, seed: int = 0
-) -> None:
+def check_excited(subject: Subject, problem: ExcitationProblem, base: BaseParameters) -> None:
     """Refuse harmonics with which random motions do not show all parameters.
 
     Args:
         subject: The robot.
         problem: Its problem.
         base: Its base parameters.
-        seed: Seed of the random motions.
 
     Raises:
         InputError: If some are not shown; it names them.
@@ -129,7 +79,7 @@ def check_excited(
     forward = problem.kernels.forward.map(_SAMPLES)
     best, direction = -1.0, np.zeros(base.rank)
     for i in range(_MOTIONS):
-        coefficients = random_motion_about(problem, np.random.default_rng(seed + i))
+        coefficients = random_start(problem, np.random.default_rng(i))
         motion = [(basis @ coefficients.T).T for basis in bases]
         Y = np.array(forward(*motion)).reshape(subject.dimension, _SAMPLES, base.rank)
         X = Y.reshape(-1, base.rank)
@@ -193,8 +143,8 @@ def verify(
     parameters: np.ndarray,
     limits: JointLimits,
     trajectory: FourierTrajectory,
-    cell: Cell | None = None,
-    scene: RobotScene | None = None,
+    cell: Cell,
+    scene: RobotScene | None,
 ) -> Verification:
     """Return how much of the limits a motion takes.
 
@@ -204,8 +154,8 @@ def verify(
         parameters: Believed ones, for the torques, shape (n,).
         limits: Limits of the joints.
         trajectory: The motion.
-        cell: What stands around a serial robot; None to leave that out.
-        scene: The same for Drake; made anew if there is a cell alone.
+        cell: What stands around a serial robot.
+        scene: The same for Drake; None of a robot without shapes.
     """
     subject = regressor.subject
     t = np.arange(_INSTANTS) * trajectory.period / _INSTANTS
@@ -222,20 +172,18 @@ def verify(
         for j in np.flatnonzero(share > 1.0 + _ROUNDING)
     ]
     margins: dict[str, float] = {}
-    clearance = None
-    asked = 0.0 if cell is None else cell.clearance
+    clearance, asked = None, cell.clearance
     if subject.delta is not None:
         workspace = delta_posture_limits(subject.delta)
         least = workspace.values(motion[0]).min(axis=0)
         margins = dict(zip(workspace.names, least.tolist(), strict=True))
-    elif cell is not None and subject.chain is not None and subject.block is not None:
-        scene = scene or RobotScene(subject, cell)
+    elif scene is not None and subject.chain is not None:
         if np.isfinite(cell.tool_above):
             tips = ends(subject)
             places = points_of_last_link(subject.chain, list(tips.values())).sample(motion[0])
             heights = places[..., 2].min(axis=0) - cell.tool_above
             margins = dict(zip(map(height_of, tips), heights.tolist(), strict=True))
-        clearance = swept_clearance(subject.chain, scene, trajectory, cell.clearance, _UNSURE)
+        clearance = swept_clearance(subject.chain, scene, trajectory, asked, _UNSURE)
         if clearance.least < asked - _ROUNDING or clearance.guaranteed < asked - _UNSURE:
             problems.append(
                 f"distance of {clearance.pair}: {clearance.least:.4g} m at t = "
@@ -247,32 +195,6 @@ def verify(
         if margin < -_ROUNDING
     ]
     return Verification(shares, margins, clearance, asked, problems)
-
-
-def verify_excitation(
-    subject: Subject,
-    trajectory: FourierTrajectory,
-    limits: JointLimits | Mapping[str, Given] | None = None,
-    cell: Cell | str | Path | None = None,
-) -> Verification:
-    """Return how much of a robot's limits a motion takes.
-
-    Args:
-        subject: The robot.
-        trajectory: The motion.
-        limits: Limits of the joints where not those of the model, see
-            :func:`~identification.excitation.limits.chosen_limits`.
-        cell: What stands around a serial robot; None for what is shipped with it.
-
-    Raises:
-        InputError: If the motion has too few or too many joints, or a limit is out of range.
-    """
-    if trajectory.dimension != subject.dimension:
-        raise InputError(
-            f"excitation: of {trajectory.dimension} joints; {subject.name} has {subject.dimension}"
-        )
-    joints, around = chosen_limits(subject, limits), cell_of(subject, cell)
-    return verify(Regressor(subject), believed_parameters(subject), joints, trajectory, around)
 
 
 def _between_samples(trajectory: FourierTrajectory, step: float) -> np.ndarray:

@@ -1,7 +1,6 @@
-"""The experiment of App. C on a simulated robot, and a file of one, ready for an estimate."""
+"""The experiment of App. C on a simulated robot, and a record of one, ready for an estimate."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -9,8 +8,6 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from identification.estimation.wiring import find_mistake
 from identification.excitation.fourier import FourierTrajectory
 from identification.excitation.run_in import ExcitationRun, rest_to_rest
-from identification.measurement.columns import Reading
-from identification.measurement.files import read_record
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.periods import AveragedMotion, average
 from identification.measurement.record import Record
@@ -49,29 +46,6 @@ class SimulatedRun:
     reference: np.ndarray
     coulomb: np.ndarray
     viscous: np.ndarray
-
-
-def simulate_experiment(
-    subject: Subject,
-    trajectory: FourierTrajectory,
-    imperfections: Imperfections | None = None,
-    *,
-    periods: int = PERIODS,
-    servo: Servo | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Record:
-    """Return what would be measured of a robot, see :func:`run_experiment`."""
-    run = run_experiment(
-        subject,
-        trajectory,
-        imperfections,
-        periods=periods,
-        servo=servo,
-        seed=seed,
-        progress=progress,
-    )
-    return run.record
 
 
 def run_experiment(
@@ -224,33 +198,6 @@ def _simulate(
         if progress is not None:
             progress(tick / ticks, "simulating the experiment")
     return station.log.read(root)
-
-
-def read_motion(
-    path: str | Path,
-    regressor: Regressor,
-    period: float | None = None,
-    reading: Reading | None = None,
-    *,
-    skip: int = 1,
-    bandwidth_hz: float | None = None,
-) -> AveragedMotion:
-    """Return what a file holds as one period, averaged and differentiated.
-
-    Args:
-        path: Path of the file, see :mod:`~identification.measurement.files`.
-        regressor: Regressor of the robot whose record it is.
-        period: ``T_f`` [s], if the file does not state it.
-        reading: What the file says in other words or not at all.
-        skip: Periods at the start that are left out.
-        bandwidth_hz: ``f_g`` [Hz]; by default ``20 / T_f``.
-
-    Raises:
-        InputError: If the file cannot be read or anything is wrong with its signals, see
-            :func:`~identification.measurement.files.read_record` and :func:`prepare_motion`.
-    """
-    record = read_record(path, regressor.subject, period, reading)
-    return prepare_motion(record, regressor, skip=skip, bandwidth_hz=bandwidth_hz)
 
 
 def prepare_motion(

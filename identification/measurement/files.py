@@ -23,9 +23,8 @@ import h5py
 import numpy as np
 from scipy.io import loadmat, savemat
 
-from identification.measurement.checks import check_record
 from identification.measurement.columns import RawSignal, Reading, make_record, parse_name, si_unit
-from identification.measurement.record import SIGNALS, MeasuredRobot, Record
+from identification.measurement.record import SIGNALS, MeasuredRobot, Record, check_record
 from identification.measurement.synchronization import check_velocities
 from identification.options import write_bytes
 from pfsc_drake.errors import InputError, shortened
@@ -58,7 +57,7 @@ def read_record(
         still: Whether the links may stand still, as those of locked joints do.
 
     Returns:
-        The record in SI units, checked by :func:`~identification.measurement.checks.check_record`
+        The record in SI units, checked by :func:`~identification.measurement.record.check_record`
         and :func:`~identification.measurement.synchronization.check_velocities`.
 
     Raises:

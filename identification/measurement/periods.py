@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.measurement.checks import check_sampling
-from identification.measurement.record import Record
+from identification.measurement.record import Record, check_sampling
 from pfsc_drake.errors import InputError
 
 HARMONICS_KEPT = 20  # f_g = 20 / T_f, Sec. C.2

@@ -1,4 +1,4 @@
-"""What was measured of a robot while it moved."""
+"""What was measured of a robot while it moved, and whether that is sound."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +12,18 @@ from pfsc_drake.errors import InputError
 SIGNALS = ("q", "tau", "v", "a", "q_motor")
 REQUIRED_SIGNALS = ("q", "tau")
 _FEWEST_SAMPLES = 10
+_JITTER = 0.1  # of the sampling time, by which samples may be off an even grid
+_DEGREES = 180.0 / np.pi
+# by which positions and velocities may be beyond their limits: part of them, plus
+_BEYOND, _SLACK = 0.02, 0.02  # rad or m
+_STRETCH = 0.02  # s, over which difference quotients are compared with velocity limits
+# a number beyond its limit by more than this has another unit
+_OTHER_UNIT = 5.0
+_FAR = 3.0  # times the largest limit, from where on another unit is thought of
+_REACHES = 1e-3  # part of a limit by which a clipped torque may miss it
+# samples at the extreme value that make a plateau, and how much longer than the steps next to it;
+# the top of a parabola that is rounded to steps is up to 5 times as long as these
+_PLATEAU, _FLAT = 5, 10.0
 
 
 class MeasuredRobot(Protocol):
@@ -129,3 +141,189 @@ class Record:
     def duration(self) -> float:
         """Time that the samples stand for, each one sampling time [s]."""
         return self.t.size * self.sampling_time
+
+
+def check_record(record: Record, robot: MeasuredRobot, still: bool = False) -> None:
+    """Refuse a record that is not sound or cannot be of the robot.
+
+    That is: gaps in time, samples that are not evenly spaced, other joints than the robot's,
+    positions and velocities far beyond its limits (and whether degrees or millimetres explain
+    that), signals that are constant, and torques that are clipped. See
+    :mod:`~identification.measurement.synchronization` for signals that do not fit together.
+
+    Args:
+        record: The record.
+        robot: Whose it is said to be.
+        still: Whether the links may stand still, as those of locked joints do.
+
+    Raises:
+        InputError: The first that is found, with joint, time and value.
+    """
+    if list(record.joint_names) != list(robot.joint_names):
+        raise InputError(
+            f"{record.source}: joints {', '.join(record.joint_names)}; must be those of "
+            f"{robot.name}: {', '.join(robot.joint_names)}"
+        )
+    check_sampling(record)
+    _check_positions(record, robot, still)
+    _check_velocities(record, robot)
+    _check_torques(record, robot)
+
+
+def check_sampling(record: Record) -> None:
+    """Refuse gaps in time and samples that are not evenly spaced; says where."""
+    t, steps = record.t, np.diff(record.t)
+    usual = float(np.median(steps))
+    k = int(np.argmax(steps > 1.5 * usual))
+    if steps[k] > 1.5 * usual:
+        count = int(np.sum(steps > 1.5 * usual))
+        raise InputError(
+            f"{record.source}: gap of {steps[k]:.6g} s in t after {t[k]:.6g} s, about "
+            f"{round(steps[k] / usual) - 1} samples ({count} gaps in all); the samples must be "
+            f"{usual:.6g} s apart throughout"
+        )
+    even = np.linspace(t[0], t[-1], t.size)
+    worst = int(np.argmax(np.abs(t - even)))
+    if abs(t[worst] - even[worst]) > _JITTER * usual:
+        raise InputError(
+            f"{record.source}: samples are {steps.min():.6g} to {steps.max():.6g} s apart, and "
+            f"that at {t[worst]:.6g} s is {abs(t[worst] - even[worst]):.3g} s off an even grid; "
+            f"allowed: {_JITTER * usual:.3g} s, record at a fixed rate or resample"
+        )
+
+
+def _check_positions(record: Record, robot: MeasuredRobot, still: bool) -> None:
+    for name, positions in (("q", record.q), ("q_motor", record.q_motor)):
+        if positions is None:
+            continue
+        travel = np.ptp(positions, axis=0)
+        if not travel.any() and not (still and name == "q"):
+            raise InputError(
+                f"{record.source}: {name} of all joints is constant; a robot that moves is required"
+            )
+        lower, upper = np.asarray(robot.position_limits, dtype=float).T
+        excess = np.maximum(positions.max(axis=0) - upper, lower - positions.min(axis=0))
+        j = int(np.argmax(excess))
+        if excess[j] <= _BEYOND * (upper[j] - lower[j]) + _SLACK:
+            continue
+        far = positions[np.argmax(np.abs(positions[:, j])), j]
+        limit = max(abs(lower[j]), abs(upper[j]))
+        raise InputError(
+            f"{record.source}: {name} of {record.joint_names[j]} reaches {far:.5g} "
+            f"{robot.joint_units[j]}, {abs(far) / limit:.3g} times its limit; "
+            f"{_explanation(positions, lower, upper, robot, j)}"
+        )
+
+
+def _explanation(
+    positions: np.ndarray, lower: np.ndarray, upper: np.ndarray, robot: MeasuredRobot, joint: int
+) -> str:
+    """Return what may be the matter with positions beyond the limits."""
+    revolute = robot.joint_units[joint] == "rad"
+    factor, unit = (_DEGREES, "deg") if revolute else (1e3, "mm")
+    alike = np.array([u == robot.joint_units[joint] for u in robot.joint_units])
+    far = np.abs(positions[:, alike]).max() > _FAR * np.abs([lower, upper]).T[alike].max()
+    q, slack = positions[:, alike] / factor, _BEYOND * (upper - lower)[alike] + _SLACK
+    if far and np.all((q >= lower[alike] - slack) & (q <= upper[alike] + slack)):
+        return f"divided by {factor:.4g} all fit, so they look like [{unit}]"
+    return (
+        f"allowed: {lower[joint]:.5g} to {upper[joint]:.5g} {robot.joint_units[joint]}, so sign, "
+        "zero, unit or order of the joints are others than the model's"
+    )
+
+
+def _check_velocities(record: Record, robot: MeasuredRobot) -> None:
+    stride = max(1, round(_STRETCH / record.sampling_time))
+    if record.t.size <= stride:
+        return
+    rates = [
+        ("q changes by", (record.q[stride:] - record.q[:-stride]) / (stride * record.sampling_time))
+    ]
+    if record.v is not None:
+        rates.append(("v is", record.v))
+    for what, values in rates:
+        fastest = np.abs(values).max(axis=0)
+        j = int(np.argmax(fastest / robot.velocity_limit))
+        ratio = float(fastest[j] / robot.velocity_limit[j])
+        if ratio <= 1.0 + 5.0 * _BEYOND:
+            continue
+        hint = "unit of q or t?" if ratio > _OTHER_UNIT else "is the limit the robot's?"
+        raise InputError(
+            f"{record.source}: {what} {fastest[j]:.4g} {robot.joint_units[j]}/s in "
+            f"{record.joint_names[j]}, {ratio:.3g} times its limit of "
+            f"{robot.velocity_limit[j]:.4g}; must stay within ({hint})"
+        )
+
+
+def _check_torques(record: Record, robot: MeasuredRobot) -> None:
+    for j, name in enumerate(record.joint_names):
+        tau, limit = record.tau[:, j], float(robot.effort_limit[j])
+        unit = "Nm" if robot.joint_units[j] == "rad" else "N"
+        if not np.ptp(tau) > 0.0:
+            raise InputError(
+                f"{record.source}: tau of {name} is {tau[0] + 0.0:g} {unit} throughout; a torque "
+                "that was measured is required"
+            )
+        largest = float(np.abs(tau).max())
+        if largest > _OTHER_UNIT * limit:
+            raise InputError(
+                f"{record.source}: tau of {name} reaches {largest:.4g} {unit}, "
+                f"{largest / limit:.3g} times its limit; must stay within {limit:.4g} {unit} "
+                "(another unit?)"
+            )
+        at_limit = np.abs(tau) >= (1.0 - _REACHES) * limit
+        if at_limit.sum() >= _PLATEAU:
+            raise InputError(
+                f"{record.source}: tau of {name} is at the drive's limit of {limit:.4g} {unit} in "
+                f"{at_limit.sum()} samples, first at t = {record.t[np.argmax(at_limit)]:.6g} s; "
+                "must stay below (move more slowly)"
+            )
+        for extreme in (tau.max(), tau.min()):
+            begin, length = _plateau(tau, extreme)
+            if length:
+                raise InputError(
+                    f"{record.source}: tau of {name} is clipped at {extreme:.5g} {unit}: constant "
+                    f"for {length} samples from t = {record.t[begin]:.6g} s; must be the torque "
+                    "that acts (move more slowly, or raise the limit of what records it)"
+                )
+            begin, count = _pile(tau, extreme)
+            if count:
+                raise InputError(
+                    f"{record.source}: tau of {name} is clipped at {extreme:.5g} {unit}: there in "
+                    f"{count} samples, first at t = {record.t[begin]:.6g} s, and hardly ever just "
+                    "below; must be the torque that acts (move more slowly, or raise the limit of "
+                    "what records it)"
+                )
+
+
+def _plateau(values: np.ndarray, extreme: float) -> tuple[int, int]:
+    """Return where a signal stays at an extreme value for long, and for how many samples, or 0."""
+    begins, lengths = _runs(values)
+    at = np.flatnonzero(np.abs(values[begins] - extreme) <= 1e-9 * np.ptp(values))
+    longest = at[np.argmax(lengths[at])]
+    beside = lengths[max(longest - 1, 0) : longest + 2].tolist()
+    beside.remove(lengths[longest])
+    flat = lengths[longest] > _FLAT * max(beside, default=1)
+    if lengths[longest] < _PLATEAU or not flat:
+        return 0, 0
+    return int(begins[longest]), int(lengths[longest])
+
+
+def _pile(values: np.ndarray, extreme: float) -> tuple[int, int]:
+    """Return where a noisy signal first is at an extreme value that it often has, and how often.
+
+    Clipping after the noise leaves no plateaus, but many samples at the limit. Both are 0 where
+    the values next to it are as frequent, as in signals that are rounded.
+    """
+    digit = 1e-9 * np.ptp(values)
+    levels, counts = np.unique(np.round(np.abs(values - extreme) / digit), return_counts=True)
+    often = counts[0] >= 2 * _PLATEAU and counts[0] > _FLAT * counts[1 : 1 + _PLATEAU].max()
+    if levels[0] != 0.0 or not often:
+        return 0, 0
+    return int(np.argmax(np.abs(values - extreme) <= digit)), int(counts[0])
+
+
+def _runs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where runs of equal values begin and how long they are."""
+    begins = np.flatnonzero(np.append(True, np.diff(values) != 0.0))
+    return begins, np.diff(np.append(begins, values.size))

@@ -156,19 +156,6 @@ def add_curves(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.nda
     return builder.AddNamedSystem(name, TrajectorySource(curves)).get_output_port()
 
 
-def add_lines(builder: DiagramBuilder, name: str, t: np.ndarray, values: np.ndarray) -> OutputPort:
-    """Return values that change evenly between their instants.
-
-    Args:
-        builder: Builder of the diagram.
-        name: Name of the source.
-        t: Instants [s], shape (K,).
-        values: Shape (K, n).
-    """
-    lines = PiecewisePolynomial.FirstOrderHold(t, values.T)
-    return builder.AddNamedSystem(name, TrajectorySource(lines)).get_output_port()
-
-
 def add_signs(
     builder: DiagramBuilder, name: str, t: np.ndarray, v: np.ndarray, size: np.ndarray
 ) -> OutputPort:

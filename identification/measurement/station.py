@@ -25,12 +25,12 @@ from identification.measurement.servo import (
 )
 from identification.model.subject import Subject
 from pfsc_drake.physics.friction import bristles_for_step
-from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.physics.joint_sensors import EncoderOptions, JointEncoders
 from pfsc_drake.robot.serial.chain_from_plant import PlantCoordinates
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.joint_friction import JointFriction
+from pfsc_drake.systems.plants.coupled_plants import RigidPlant
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
-from pfsc_drake.systems.plants.rigid_plant import RigidPlant
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class Lag:
         return abs(self.time) > tolerance + _SURE * self.standard_deviation
 
 
-def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = LONGEST_LAG) -> Lag:
+def torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
     """Return how late the torques are, as the lag with which a model explains them best.
 
     For each lag the parameters of the model are estimated anew, so that none have to be known:
@@ -50,7 +50,6 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = L
         motion: One period.
         regressor: ``Y(q, v, a)`` along the motion, of full or base parameters, with friction,
             shape (K, N, n).
-        longest: Lag up to which is looked [s].
 
     Raises:
         InputError: If the regressor is not of this motion.
@@ -71,7 +70,7 @@ def torque_lag(motion: AveragedMotion, regressor: np.ndarray, longest: float = L
         energy += np.fft.fft(motion.tau[:, j] ** 2) * np.fft.fft(weight[:, j] ** 2).conj()
     left = np.fft.ifft(energy).real - np.sum(np.fft.ifft(cross, axis=1).real ** 2, axis=0)
     step = motion.period / count
-    reach = min(max(2, round(longest / step)), count // 2 - 1)
+    reach = min(max(2, round(LONGEST_LAG / step)), count // 2 - 1)
     lags = np.arange(-reach, reach + 1)
     best = int(lags[np.argmin(left[lags])])
     near = np.arange(best - _NEAR, best + _NEAR + 1)
@@ -93,24 +92,21 @@ def _weight(motion: AveragedMotion) -> np.ndarray:
     return np.asarray(np.clip(share / _SLOW - 1.0, 0.0, 1.0) / deviation)
 
 
-def check_torque_lag(
-    motion: AveragedMotion, regressor: np.ndarray, tolerance: float | None = None
-) -> Lag:
+def check_torque_lag(motion: AveragedMotion, regressor: np.ndarray) -> Lag:
     """Refuse torques that lag the motion, or lead it.
 
     Args:
         motion: One period.
         regressor: ``Y(q, v, a)`` along the motion, with friction, as :func:`torque_lag` takes it.
-        tolerance: What is allowed [s]; by default two sampling times.
 
     Returns:
         The lag that was found and is tolerated.
 
     Raises:
-        InputError: If they are off by more, with certainty.
+        InputError: If they are off by more than two sampling times, with certainty.
     """
     lag = torque_lag(motion, regressor)
-    allowed = TOLERATED * motion.period / len(motion.t) if tolerance is None else tolerance
+    allowed = TOLERATED * motion.period / len(motion.t)
     if lag.is_beyond(allowed):
         raise InputError(
             f"tau {_late(lag.time)} the motion by {abs(lag.time) * 1e3:.3g} ms (standard "
@@ -120,19 +116,18 @@ def check_torque_lag(
     return lag
 
 
-def check_velocities(record: Record, tolerance: float | None = None) -> None:
+def check_velocities(record: Record) -> None:
     """Refuse measured velocities that are not those of the positions: late, scaled or turned.
 
     Args:
         record: With velocities, or nothing is checked.
-        tolerance: Lag that is allowed [s]; by default two sampling times.
 
     Raises:
-        InputError: With joint and lag, or factor.
+        InputError: With joint and lag, above two sampling times, or factor.
     """
     if record.v is None:
         return
-    allowed = TOLERATED * record.sampling_time if tolerance is None else tolerance
+    allowed = TOLERATED * record.sampling_time
     rates = np.gradient(record.q, record.sampling_time, axis=0)
     for j, name in enumerate(record.joint_names):
         if not (rates[:, j].any() and record.v[:, j].any()):

@@ -50,7 +50,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 def analytic_base(subject: Subject, friction: bool = True, coupling: bool = True) -> BaseParameters:
-    """Return the base parameters of (B.4), (B.5), in the order of Tab. B.2.
+    """Return the base parameters of (B.4), (B.5), in the order of Tab. B.2, errata corrected.
 
     Those of a DELTA robot are its parameters themselves (Sec. 2.4.6).
 
@@ -284,24 +284,3 @@ def load_printed_identification(
         InputError: If the file cannot be read, or a key is unknown, missing or out of range.
     """
     return load_file(PrintedIdentification, shipped_or_own(robot, FILE_NAME))
-
-
-def printed_base(subject: Subject) -> np.ndarray:
-    """Return the combinations of Tab. B.2, errata corrected, shape (52, n).
-
-    Times the parameters of :mod:`~identification.model.parameters` they give what Tab. C.3 lists.
-    Rows 1 and 2 hold the inertias of rotors 1 and 2, too, which add to moments of inertia of the
-    links and which the table leaves out.
-
-    Args:
-        subject: A Comau Racer 1.4, or a robot with axes like it.
-
-    Raises:
-        InputError: If the robot has another number of base parameters.
-    """
-    base = analytic_base(subject)
-    if base.rank != SIZE:
-        raise InputError(
-            f"{subject.name}: {base.rank} base parameters; must be {SIZE} for Tab. B.2"
-        )
-    return base.projection

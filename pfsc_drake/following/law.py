@@ -8,7 +8,7 @@ import numpy as np
 
 from pfsc_drake.checks import require_whole_ticks
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.estimation.state_predictor import MOST_TICKS
+from pfsc_drake.control.estimation.robot_state import MOST_TICKS
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.linearization import (

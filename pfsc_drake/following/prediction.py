@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
-from pfsc_drake.control.estimation.state_predictor import StatePredictor
+from pfsc_drake.control.estimation.robot_state import StatePredictor
 from pfsc_drake.errors import require
 from pfsc_drake.following.law import Believed, ticks_of
 from pfsc_drake.following.options.controller import ControllerParameters

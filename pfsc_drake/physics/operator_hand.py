@@ -1,14 +1,24 @@
-"""An operator whose hand guides the tool."""
+"""Hands that guide the tool: of a simulated operator, and of a person at a screen."""
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, where
-from pfsc_drake.errors import InputError
-from pfsc_drake.physics.hand_model import HandModel, HandParameters, observed_twist, orientation
+from pfsc_drake.errors import InputError, require
+from pfsc_drake.physics.hand_model import (
+    HandModel,
+    HandParameters,
+    limited,
+    observed_twist,
+    orientation,
+)
 from pfsc_drake.physics.hand_way import Place
+from pfsc_drake.robot.robot_model import RobotModel, tool_motion_function
 
 MAX_PERIODS = 10_000  # in a reaction delay; every wrench of it is moved at every tick
 
@@ -83,3 +93,128 @@ class OperatorHand(Block):
             twist: ``[y_t', w]``, shape (6,).
         """
         return self._hand.wanted(time, pose[:3], twist, orientation(pose))
+
+
+_LARGEST = 1e9  # of stiffness, damping and force; what it multiplies stays within a float
+_SLOWEST = 10.0  # s
+# below this share of its grip a hand is open
+_OPEN = 1e-3
+# parts of what is asked, and of the memory
+PUSH, HOLD, TARGET = slice(0, 3), 3, slice(4, 7)
+ASKED = 7
+
+
+@dataclass
+class LiveHandParameters:
+    """Properties of a hand whose owner decides, at every instant, what it does.
+
+    Attributes:
+        stiffness: K, from the tool to where a holding hand wants it [N/m].
+        damping: D of a holding hand [N s/m].
+        rotational_damping: D_r, by which a holding hand resists turning [Nm s/rad].
+        force_limit: Largest magnitude of the force [N].
+        torque_limit: Largest magnitude of the torque [Nm].
+        response_time: Time constant of each of two lags between what is asked and what the muscles
+            do [s].
+    """
+
+    stiffness: float = 400.0
+    damping: float = 30.0
+    rotational_damping: float = 0.3
+    force_limit: float = 45.0
+    torque_limit: float = 3.0
+    response_time: float = 0.05
+
+    def __post_init__(self) -> None:
+        for key in ("stiffness", "force_limit", "torque_limit"):
+            value = getattr(self, key)
+            require(0.0 < value <= _LARGEST, key, value, f"positive, at most {_LARGEST:g}")
+        for key in ("damping", "rotational_damping"):
+            value = getattr(self, key)
+            require(0.0 <= value <= _LARGEST, key, value, f"zero or positive, at most {_LARGEST:g}")
+        time = self.response_time
+        require(0.0 < time <= _SLOWEST, "response_time", time, f"positive, at most {_SLOWEST:g} s")
+
+
+class LiveHand(Block):
+    """A hand that is asked for a push, and to hold the tool at a place.
+
+    ``f = limit(f_2 + g_2 (K (p_2 - y_t) - D y_t'))``, ``tau = limit(-g_2 D_r w)``: what is asked -
+    push f, grip g (0 or 1) and target p - passes two lags of first order,
+    ``x_1' = (x - x_1) / T_r``, ``x_2' = (x_1 - x_2) / T_r``, so that the force is C^1 in time
+    whatever a slider does. The target of an open hand is taken at once: a hand closes where it is
+    asked to hold, not on the way there from where it held before.
+
+    It sees tool and person once per period, and holds its wrench until the next.
+
+    Ports:
+        asked (input): Push, world axes [N], 1 to hold and 0 not to, place to hold at, world axes
+            [m], shape (7,).
+        tool_pose (input): ``[y_t, R_e]``, shape (12,); see :class:`ToolKinematics`.
+        wrench (output): ``[force, torque]`` on the robot at the tool point, world axes,
+            shape (6,) [N, Nm]; zero before the first tick, and while the tool pose is not finite.
+
+    State:
+        wrench; last_pose, and whether the tool was ``seen`` then; lags ``first`` and ``second`` of
+        what is asked.
+
+    Args:
+        parameters: Properties of the hand.
+        period: Sampling time [s].
+    """
+
+    def __init__(self, parameters: LiveHandParameters, period: float) -> None:
+        self._hand, self._period = parameters, period
+        self.inputs = {"asked": Port(ASKED, "N, 1, m"), "tool_pose": Port(12, "m, 1")}
+        self.outputs = {"wrench": Port(6, "N, Nm")}
+        sizes = {"wrench": 6, "last_pose": 12, "seen": 1}
+        self.states = sizes | {"first": ASKED, "second": ASKED}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        return {"wrench": x.wrench}
+
+    def update(self, x: Values, u: Values, y: Values, t: Any) -> dict[str, Any]:
+        """Return what is remembered at the next tick; what is left out stays."""
+        hand, asked, pose = self._hand, u.asked, u.tool_pose
+        sees = all_finite(pose)
+        share = -math.expm1(-self._period / hand.response_time)
+        is_taken = ca.DM(np.arange(ASKED) >= TARGET.start) * (x.first[HOLD] < _OPEN)
+        first, second = where(is_taken, asked, x.first), where(is_taken, asked, x.second)
+        second += share * (first - second)
+        first += share * (asked - first)
+        grip = second[HOLD]
+        twist = where(x.seen, observed_twist(x.last_pose, pose, self._period), 0.0)
+        held = hand.stiffness * (second[TARGET] - pose[:3]) - hand.damping * twist[:3]
+        force = limited(second[PUSH] + grip * held, hand.force_limit)
+        torque = limited(-grip * hand.rotational_damping * twist[3:], hand.torque_limit)
+        return {
+            "wrench": where(sees, ca.vertcat(force, torque), 0.0),
+            "last_pose": pose,
+            "seen": sees,
+            "first": where(sees, first, x.first),
+            "second": where(sees, second, x.second),
+        }
+
+
+class ToolMotion(Block):
+    """Direct kinematics (2.5) of a robot's links, and their rates (2.11).
+
+    Ports:
+        joint_state (input): ``[q_J, v_J, q_M, v_M]``, shape (4N,) [rad, rad/s or m, m/s].
+        tool_motion (output): ``[y_t, R_e by rows, v, w]``: tool point [m], orientation, velocity
+            of the tool point [m/s] and angular velocity [rad/s], world axes, shape (18,).
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._size, self._motion = robot.dimension, tool_motion_function(robot)
+        self.inputs = {"joint_state": Port(4 * robot.dimension, "rad, rad/s or m, m/s")}
+        self.outputs, self.states = {"tool_motion": Port(18, "m, 1, m/s, rad/s")}, {}
+
+    def output(self, x: Values, u: Values, t: Any) -> dict[str, Any]:
+        """Return all outputs, and the inner values."""
+        n = self._size
+        return {"tool_motion": self._motion(u.joint_state[:n], u.joint_state[n : 2 * n])}

@@ -12,8 +12,8 @@ from pfsc_drake.control.law.following_law import FollowingLaw
 from pfsc_drake.control.law.safe_stop import SafeStop
 from pfsc_drake.control.law.sampled_law import LawReport, SampledLaw
 from pfsc_drake.control.law.supervision import DriveWatch, Supervision, SupervisionParameters
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem, is_tick
+from pfsc_drake.systems.fuse import BlockAccess
 
 
 class FaultAccess:

@@ -20,7 +20,7 @@ from diagrams.scenario import (
 from diagrams.scenario.workpiece import BallParameters, NotchParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant

@@ -10,7 +10,7 @@ from diagrams.scenario import BrakeParameters, ForcePulse, GainParameters, LawGa
 from experiments.scenario_file import find_scenario
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.robot.robot_model import pose_function
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant

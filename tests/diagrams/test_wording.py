@@ -3,7 +3,7 @@
 import numpy as np
 
 from diagrams.builder import build_station
-from diagrams.scenario.wording import coordinate_text, listed, posture_text
+from diagrams.scenario.checks import coordinate_text, listed, posture_text
 from experiments.scenario_file import find_scenario
 
 

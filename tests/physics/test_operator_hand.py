@@ -1,4 +1,4 @@
-"""The hand in a diagram, on prescribed motions, on a free mass and on the robot."""
+"""Hands that guide the tool: of a simulated operator, and of a person at a screen."""
 
 import numpy as np
 import pytest
@@ -8,10 +8,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput, MatrixGain
 
+from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.manifolds.manifold import ToolKinematics
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.hand_model import HandParameters, HandWaypoint
-from pfsc_drake.physics.operator_hand import OperatorHand
+from pfsc_drake.physics.operator_hand import LiveHand, LiveHandParameters, OperatorHand, ToolMotion
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.systems.block_system import BlockSystem
@@ -223,3 +224,108 @@ def test_it_turns_the_tool_as_it_sees_it():
     way = [HandWaypoint(0.0, np.zeros(3), [15.0, 0.0, 0.0])]
     wrench = watch(lambda t: np.zeros(3), hand(**changes | {"waypoints": way}), 0.01)
     assert wrench[-1] == pytest.approx([0, 0, 0, 0, 0, 4.0 * np.deg2rad(15.0)])
+
+
+HAND = LiveHandParameters(stiffness=400.0, damping=30.0, rotational_damping=0.3)
+AT_HOME = np.concatenate([[0.8, 0.1, 0.9], np.eye(3).ravel()])
+
+
+def ask(push=(0.0, 0.0, 0.0), hold=0.0, target=(0.0, 0.0, 0.0)):
+    return np.concatenate([push, [hold], target])
+
+
+def person():
+    return Stepper(LiveHand(HAND, PERIOD))
+
+
+def follow(stepper, asked, poses):
+    """Return the wrenches that answer poses."""
+    wrenches = []
+    for pose in poses:
+        stepper.step(asked=asked, tool_pose=pose)
+        wrenches.append(stepper.states["wrench"])
+    return np.array(wrenches)
+
+
+def test_a_push_comes_as_two_lags_let_it():
+    wrenches = follow(person(), ask(push=(0.0, 20.0, 0.0)), [AT_HOME] * 400)
+    t = PERIOD * np.arange(1, 401) / HAND.response_time
+    expected = 20.0 * (1.0 - (1.0 + t) * np.exp(-t))
+    assert np.abs(wrenches[:, 1] - expected).max() < 0.02 * 20.0
+    assert np.abs(np.diff(wrenches[:, 1])).max() < 20.0 / np.e * PERIOD / HAND.response_time * 1.05
+    assert not wrenches[:, [0, 2, 3, 4, 5]].any()
+
+
+def test_a_holding_hand_is_a_spring_and_a_damper():
+    stepper, target = person(), AT_HOME[:3] + np.array([0.03, 0.0, -0.02])
+    asked = ask(hold=1.0, target=target)
+    wrenches = follow(stepper, asked, [AT_HOME] * 1500)
+    assert wrenches[-1][:3] == pytest.approx(400.0 * np.array([0.03, 0.0, -0.02]), abs=1e-6)
+    velocity, spin = np.array([0.1, -0.2, 0.05]), 0.4
+    c, s = np.cos(spin * PERIOD), np.sin(spin * PERIOD)
+    before = AT_HOME.copy()
+    before[:3] -= PERIOD * velocity
+    before[3:] = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).ravel()
+    moving = follow(stepper, asked, [before, AT_HOME])
+    assert moving[1][:3] - wrenches[-1][:3] == pytest.approx(-30.0 * velocity, abs=1e-6)
+    assert moving[1][3:] == pytest.approx([0.0, 0.0, -0.3 * spin], abs=1e-6)
+
+
+def test_it_is_no_stronger_than_its_limit():
+    far = AT_HOME[:3] + np.array([3.0, 4.0, 0.0])
+    wrenches = follow(person(), ask(push=(0.0, 0.0, 40.0), hold=1.0, target=far), [AT_HOME] * 1000)
+    sizes = np.linalg.norm(wrenches[:, :3], axis=1)
+    assert sizes.max() == pytest.approx(45.0, rel=1e-9)
+    assert wrenches[-1][:3] == pytest.approx(45.0 * np.array([1200, 1600, 40]) / 2000.4, rel=1e-3)
+
+
+def test_an_open_hand_closes_where_it_is_asked_to_hold():
+    """Not on the way from where it held before; and nothing pulls while it closes."""
+    stepper = person()
+    follow(stepper, ask(hold=1.0, target=(5.0, 5.0, 5.0)), [AT_HOME] * 500)
+    follow(stepper, ask(), [AT_HOME] * 1000)
+    wrenches = follow(stepper, ask(hold=1.0, target=AT_HOME[:3]), [AT_HOME] * 500)
+    assert np.abs(wrenches).max() < 1e-3
+
+
+def test_it_holds_its_wrench_until_the_next_look():
+    stepper = person()
+    before = [np.zeros(6), *follow(stepper, ask(push=(5.0, 0.0, 0.0)), [AT_HOME] * 20)]
+    shown = stepper.step(asked=ask(), tool_pose=AT_HOME)["wrench"]
+    assert np.array_equal(shown, before[-1])
+
+
+def test_it_does_nothing_to_a_tool_that_is_nowhere_and_goes_on_after():
+    poses = [AT_HOME] * 50 + [AT_HOME * np.nan] + [AT_HOME] * 2
+    asked = ask(push=(5.0, 0.0, 0.0), hold=1.0, target=(0.9, 0.1, 0.8))
+    forces = np.linalg.norm(follow(person(), asked, poses), axis=1)
+    assert forces[49] > 1.0
+    assert forces[50] == 0.0
+    assert forces[52] > forces[49]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("force_limit", 0.0), ("damping", -1.0), ("response_time", np.nan)]
+)
+def test_what_no_hand_has_is_refused(key, value):
+    with pytest.raises(InputError, match=f"{key} = {value}"):
+        LiveHandParameters(**{key: value})
+
+
+def test_motion_is_drakes():
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(resolve_model("comau_racer_1_4_3r")))
+    plant.Finalize()
+    tool, context = plant.GetFrameByName("tool_point"), plant.CreateDefaultContext()
+    chain, _ = chain_from_plant(plant, tool)
+    stepper, random = Stepper(ToolMotion(chain)), np.random.default_rng(1)
+    for _ in range(10):
+        state = random.uniform(-1.5, 1.5, 12)
+        plant.SetPositions(context, state[:3])
+        plant.SetVelocities(context, state[3:6])
+        X_WT, V_WT = tool.CalcPoseInWorld(context), tool.CalcSpatialVelocityInWorld(context)
+        pose = np.concatenate([X_WT.translation(), X_WT.rotation().matrix().ravel()])
+        motion = stepper.step(joint_state=state)["tool_motion"]
+        np.testing.assert_allclose(motion[:12], pose, atol=1e-12)
+        expected = [*V_WT.translational(), *V_WT.rotational()]
+        np.testing.assert_allclose(motion[12:], expected, atol=1e-12)

@@ -94,7 +94,3 @@ def test_set_target():
 )
 def test_format_quantity(value, unit, text):
     assert format_quantity(value, unit).replace(NARROW_SPACE, " ") == text
-
-
-def test_format_quantity_shares_a_prefix():
-    assert format_quantity(2e-6, "m", scale_by=5e-3).replace(NARROW_SPACE, " ") == "0.002 mm"

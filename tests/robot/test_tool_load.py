@@ -15,7 +15,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
 from pfsc_drake.robot.tool_load import dead_band, joint_torque_function
-from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
+from pfsc_drake.systems.plants.reactions import tool_load_from_plant
 
 PERIOD = 1e-3
 

@@ -10,7 +10,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Gain, MatrixGain
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.control.compliance.impedance import ImpedanceStatus
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.control.law.decoupling import DecouplingInverse
 from pfsc_drake.control.law.fault import Fault
 from pfsc_drake.control.law.following_law import FollowingLaw
@@ -22,10 +22,9 @@ from pfsc_drake.control.manifolds.manifold import Projector, ToolKinematics
 from pfsc_drake.control.manifolds.path import PathManifold
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.following_controller import ControllerAccess, FollowingController
-from pfsc_drake.systems.fuse import fuse, fuse_blocks
+from pfsc_drake.systems.fuse import BlockAccess, fuse, fuse_blocks
 
 PERIOD = 1e-3
 THETA = 0.6

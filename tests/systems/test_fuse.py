@@ -1,4 +1,4 @@
-"""Blocks of a diagram as one system: the same ports, the same log to the last bit."""
+"""The blocks of a diagram as one system, and by name whether they are one system or many."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,8 @@ from pydrake.systems.primitives import Integrator, LogVectorOutput, MatrixGain
 from pfsc_drake.blocks.block import Block, Port
 from pfsc_drake.blocks.wiring_blocks import Collect, Constant, Hold, Rows, Sum
 from pfsc_drake.errors import InputError
-from pfsc_drake.systems.block_access import BlockAccess
 from pfsc_drake.systems.block_system import BlockSystem
-from pfsc_drake.systems.fuse import fuse, fuse_blocks
+from pfsc_drake.systems.fuse import BlockAccess, fuse, fuse_blocks
 
 PERIOD = 0.01
 

@@ -1,9 +1,13 @@
-"""From a scenario to its margins in a table and on one page."""
+"""From a scenario to its margins in a table, in pictures and on one page."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
 from rich.markup import escape
 from rich.table import Table
 
@@ -12,14 +16,166 @@ from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile
 from experiments.studies.margins.analysis import analyse
 from experiments.studies.margins.box import ErrorBox
-from experiments.studies.margins.picture import draw_margins
-from experiments.studies.margins.result import MarginAnalysis
-from experiments.studies.margins.words import margins_json, metrics_of, sentences
+from experiments.studies.margins.result import Case, MarginAnalysis
+from experiments.studies.margins.words import (
+    GOOD_DAMPING,
+    GOOD_DISC,
+    margins_json,
+    metrics_of,
+    sentences,
+)
 from pfsc_drake.yaml.typed import dump_typed, load_typed
 from reporting.folder import check_folder, open_results
 from reporting.page import Report, report_page, write_report
 from reporting.progress import ProgressListener
 from reporting.provenance import standard_attributes
+from reporting.style import (
+    ALERT,
+    COLOURS,
+    REFERENCE,
+    STYLE,
+    WIDTH,
+    Drawing,
+    Figure,
+    place_legend,
+    render,
+)
+
+# 1/s; faster modes are of no interest, and would press the others together
+_FASTEST = 400.0
+_DAMPING_LINES = (0.1, 0.3, 0.7)
+
+
+def draw_margins(analysis: MarginAnalysis) -> list[Figure]:
+    """Return the pictures of an analysis: modes, rates along the way, margins of the drives.
+
+    Args:
+        analysis: The analysis.
+    """
+    with plt.rc_context(STYLE):
+        drawings = [_modes(analysis), _along(analysis)]
+        if analysis.margins:
+            drawings.append(_drives(analysis))
+        return [render(drawing) for drawing in drawings]
+
+
+def _modes(analysis: MarginAnalysis) -> Drawing:
+    """Eigenvalues in the plane that a control engineer knows."""
+    canvas = Canvas(figsize=(WIDTH, 4.8))
+    panel = canvas.subplots()
+    _scatter(panel, analysis.singles + analysis.corners, COLOURS[4], "with model errors", 10.0)
+    moving = [place for place in analysis.nominal.places if place.instant.speed]
+    resting = [place for place in analysis.nominal.places if not place.instant.speed]
+    nominal, error = analysis.nominal, analysis.nominal.error
+    _scatter(panel, [Case(error, "", moving)], COLOURS[0], "as the scenario says, moving", 16.0)
+    _scatter(panel, [Case(error, "", resting)], COLOURS[2], "at rest", 16.0)
+    shown = [place.modes for case in analysis.cases for place in case.places if place.modes]
+    rates = np.concatenate([m.rate for m in shown]) if shown else np.zeros(1)
+    frequencies = np.concatenate([m.frequency for m in shown]) if shown else np.zeros(1)
+    near = rates > -_FASTEST
+    right = max(float(np.max(rates, initial=0.0)) * 1.15, 0.06 * _FASTEST)
+    left = -1.05 * min(_FASTEST, max(float(np.max(-rates[near], initial=50.0)), 50.0))
+    top = max(float(np.max(frequencies[near], initial=0.0)) / (2.0 * np.pi) * 1.1, 5.0)
+    panel.set(xlim=(left, right), ylim=(-0.02 * top, top))
+    panel.axvspan(0.0, right, color=ALERT, alpha=0.08, linewidth=0.0)
+    panel.axvline(0.0, color=ALERT, linewidth=1.2)
+    for damping in _DAMPING_LINES:
+        slope = np.sqrt(1.0 - damping**2) / damping / (2.0 * np.pi)
+        end = min(-left, top / slope)
+        panel.plot([0.0, -end], [0.0, end * slope], ":", color=REFERENCE, linewidth=1.0, zorder=0)
+        panel.annotate(f"{damping:g}", (-0.97 * end, 0.97 * end * slope), color=REFERENCE, size=9)
+    panel.set_xlabel("rate in 1/s: decays to the left, grows to the right")
+    panel.set_ylabel("frequency in Hz")
+    panel.set_title("Modes of the sampled loop")
+    place_legend(panel)
+    unstable = sum(not case.is_stable for case in analysis.cases)
+    verdict = "All of them decay" if not unstable else f"{unstable} of the loops grow"
+    caption = (
+        f"Eigenvalues of the loop as it is sampled, log(lambda) / T_s, of {len(analysis.cases)} "
+        f"loops at {len(nominal.places)} places along the path. {verdict}. Dotted: damping ratios; "
+        f"a fair loop stays below the line {GOOD_DAMPING:g}. Faster modes are left out."
+    )
+    return Drawing("modes", "Modes", caption, canvas)
+
+
+def _scatter(panel: Axes, cases: list[Case], colour: str, label: str, size: float) -> None:
+    modes = [place.modes for case in cases for place in case.places if place.modes is not None]
+    if not modes:
+        return
+    rate = np.concatenate([m.rate for m in modes])
+    frequency = np.concatenate([m.frequency for m in modes]) / (2.0 * np.pi)
+    panel.scatter(rate, frequency, s=size, color=colour, label=label, alpha=0.7, linewidths=0.0)
+
+
+def _along(analysis: MarginAnalysis) -> Drawing:
+    """Slowest rate along the way, nominal and with one parameter wrong at a time."""
+    canvas = Canvas(figsize=(WIDTH, 3.6))
+    panel = canvas.subplots()
+    corners = analysis.corners
+    for number, case in enumerate(corners):
+        times, rates = _rates(case)
+        label = "all wrong" if number == 0 else None
+        panel.plot(times, rates, "x", color=REFERENCE, markersize=5, label=label)
+    for colour, (_, case) in zip(COLOURS[1:], analysis.worst_by_key.items(), strict=False):
+        times, rates = _rates(case)
+        panel.plot(times, rates, "o-", color=colour, markersize=4, label=str(case.error))
+    times, rates = _rates(analysis.nominal)
+    panel.plot(times, rates, "o-", color=COLOURS[0], markersize=5, label="as the scenario says")
+    panel.axhline(0.0, color=ALERT, linewidth=1.2)
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, max(high, 0.08 * abs(low)))
+    panel.axhspan(0.0, panel.get_ylim()[1], color=ALERT, alpha=0.08, linewidth=0.0)
+    top = panel.get_ylim()[1]
+    for place in analysis.nominal.places:
+        words = "rest" if not place.instant.speed else f"{abs(place.instant.speed):.2g}"
+        panel.annotate(words, (place.instant.time, top), ha="center", va="bottom", size=8)
+    panel.set_xlabel("time in s; above the picture the speed in m/s")
+    panel.set_ylabel("slowest rate in 1/s")
+    panel.legend(loc="best", fontsize=9)
+    caption = (
+        "Where on the way the loop is slowest, or grows: above zero it is unstable. Of each "
+        "parameter the worse sign is shown; crosses: all parameters wrong at once."
+    )
+    return Drawing("along_the_path", "Along the path", caption, canvas)
+
+
+def _rates(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    times = np.array([place.instant.time for place in case.places])
+    rates = np.array([place.rate for place in case.places])
+    return times, np.where(np.isfinite(rates), rates, np.nan)
+
+
+def _drives(analysis: MarginAnalysis) -> Drawing:
+    """Disc margin of every drive, as bars from the best to the worst place."""
+    canvas = Canvas(figsize=(WIDTH, 3.6))
+    panel = canvas.subplots()
+    alpha = np.array([[m.alpha for m in margins.drives] for margins in analysis.margins])
+    worst = np.argmin(alpha, axis=0)
+    names = [*analysis.joints, "all at once"]
+    common = np.array([margins.common.alpha for margins in analysis.margins])
+    smallest = np.append(alpha.min(axis=0), common.min())
+    largest = np.append(alpha.max(axis=0), common.max())
+    where = [analysis.margins[i].instant for i in [*worst.tolist(), int(np.argmin(common))]]
+    places = np.arange(len(names))
+    colours = [COLOURS[0]] * len(analysis.joints) + [COLOURS[2]]
+    panel.bar(places, smallest, width=0.6, color=colours)
+    panel.vlines(places, smallest, largest, color=REFERENCE, linewidth=2.0)
+    panel.axhline(GOOD_DISC, color=REFERENCE, linestyle=":", linewidth=1.0)
+    for x, height, instant in zip(places, largest, where, strict=True):
+        percent = 100.0 * 2.0 * smallest[x] / max(2.0 - smallest[x], 1e-9)
+        text = f"+{percent:.3g} %\n{instant.time:.2f} s" if smallest[x] < 2.0 else "any"
+        panel.annotate(text, (x, height), ha="center", va="bottom", size=9)
+    panel.set_xticks(places, names, rotation=20, ha="right")
+    panel.set_ylim(0.0, 1.3 * max(float(np.max(largest)), 0.1))
+    panel.set_ylabel("disc margin")
+    panel.margins(x=0.03)
+    caption = (
+        "Disc margin of each drive at its weakest place, with the gain error that it bears there "
+        "and when that is; the grey line reaches to the strongest place. "
+        f"{GOOD_DISC:g} (dotted) bears a factor of 2.2 or 41 degrees. An exact law for elastic "
+        "joints has little to spare: it relies on drives that give the torque they are told."
+    )
+    return Drawing("drives", "Margins of the drives", caption, canvas)
 
 
 def place_table(analysis: MarginAnalysis) -> Table:

@@ -1,7 +1,6 @@
 """A tool's weight and inertia taken off a force/torque measurement; what a sensor stops for."""
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import casadi as ca
@@ -10,9 +9,10 @@ import numpy as np
 from pfsc_drake.blocks.block import Block, Port, Values
 from pfsc_drake.blocks.cases import all_finite, all_of, any_of, first_of, where
 from pfsc_drake.compiled.content import once_per_content
-from pfsc_drake.control.compliance.taring import (
+from pfsc_drake.control.compliance.measured_wrench import (
     STILL_TIME,
     TARING_BLOCK,
+    SensorFault,
     Taring,
     memory_size,
     stands_still,
@@ -25,14 +25,6 @@ from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.robot.tool_load import ToolLoad, dead_band, predicted_load
 
 _INERTIA = ("none", "differentiated", "given")
-
-
-class SensorFault(IntEnum):
-    """Why a compensated wrench is not to be trusted."""
-
-    NONE = 0
-    LOST = 1  # no finite number, or a component that stands still
-    SATURATED = 2
 
 
 @dataclass

@@ -11,8 +11,8 @@ from pfsc_drake.blocks.program import Program
 from pfsc_drake.blocks.wiring_blocks import Sum
 from pfsc_drake.compiled.content import once_per_content
 from pfsc_drake.control.estimation.link_deviation import LinkErrors, StateUncertainty
-from pfsc_drake.control.estimation.link_state import LinkState
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
+from pfsc_drake.control.estimation.robot_state import LinkState
 from pfsc_drake.robot.robot_model import RobotModel, gravity_function, largest_speeds
 
 # ticks after which an observer at rest knows what acted before

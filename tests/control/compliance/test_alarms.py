@@ -3,7 +3,8 @@
 import pytest
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.tool_compensation import Alarms, SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
+from pfsc_drake.control.compliance.tool_compensation import Alarms
 from pfsc_drake.control.law.fault import Fault
 
 

@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import PayloadCompensation, SensorFault
 
 MASS, CENTER, GRAVITY = 0.8, np.array([0.01, -0.02, 0.03]), np.array([0, 0, -9.81])
 R = Rotation.from_euler("ZYX", [20.0, 15.0, 170.0], degrees=True)

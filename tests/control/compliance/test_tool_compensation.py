@@ -6,7 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from pfsc_drake.blocks.stepper import Stepper
-from pfsc_drake.control.compliance.taring import Taring
+from pfsc_drake.control.compliance.measured_wrench import Taring
 from pfsc_drake.control.compliance.tool_compensation import (
     SensorFault,
     ToolCompensation,
@@ -17,7 +17,7 @@ from pfsc_drake.control.estimation.filters import LowPass
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
+from pfsc_drake.systems.plants.reactions import tool_load_from_plant
 
 PERIOD = 1e-3
 STILL = 50  # samples

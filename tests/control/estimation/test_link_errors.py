@@ -11,8 +11,8 @@ from pfsc_drake.control.estimation.link_errors import (
     errors_of_observed_torques,
     observing_network,
 )
-from pfsc_drake.control.estimation.link_state import LinkState
 from pfsc_drake.control.estimation.momentum import MomentumObserver, motor_momentum
+from pfsc_drake.control.estimation.robot_state import LinkState
 from pfsc_drake.robot.robot_model import gravity_function
 
 PERIOD, BANDWIDTH, COUNT, SETTLED = 1e-3, 800.0, 6000, 100

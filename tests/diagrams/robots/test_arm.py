@@ -13,7 +13,7 @@ from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.scripted_force import ForcePulse
-from pfsc_drake.systems.plants.full_elastic_plant import FullElasticPlant
+from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
 
 COMAU = "comau_racer_1_4"
 

@@ -5,7 +5,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from diagrams.builder import build_station
-from diagrams.robots.sensors import taring_warnings
+from diagrams.robots.force_sensor import taring_warnings
 from experiments.scenario_file import find_scenario
 
 

@@ -1,4 +1,4 @@
-"""What a scenario file may say."""
+"""The schema of a scenario file, and what is left of one where the robot stands elsewhere."""
 
 import math
 

@@ -9,7 +9,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from diagrams.builder import build_station
 from diagrams.scenario import GainParameters, LawGains, Scenario
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
-from pfsc_drake.control.compliance.tool_compensation import SensorFault
+from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.scripted_force import ForcePulse
 from pfsc_drake.yaml.typed import load_typed

@@ -6,7 +6,7 @@ from pydrake.lcm import DrakeLcm
 
 from diagrams.builder import build_station
 from diagrams.robot_station import build_robot_station
-from diagrams.scenario.driven import driven
+from diagrams.scenario.schema import driven
 from experiments.hardware.drive import Drive, DriveOptions
 from experiments.hardware.robot import SimulatedRobot, Transport
 from experiments.results.run_signals import collect_log

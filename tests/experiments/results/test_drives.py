@@ -1,4 +1,4 @@
-"""Limits of the joints: metrics and sentences, on made-up logs and on the robots' own limits."""
+"""Drives and joints of a run: how near to limits, what a reference asks; what their link did."""
 
 import math
 

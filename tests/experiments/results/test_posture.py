@@ -1,12 +1,11 @@
-"""Metrics of posture and pushes, and the lap before, from made-up logs."""
+"""What happens to an arm beside its tool: pushes on its links, its elbow, its posture."""
 
 import math
 
 import numpy as np
 import pytest
 
-from experiments.results.posture import posture_metrics
-from experiments.results.pushes import elbow_shift, elbow_travel, lap_before
+from experiments.results.posture import elbow_shift, elbow_travel, lap_before, posture_metrics
 from experiments.results.run_log import RunLog
 from tests.experiments.results.registry_names import names_about
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.results.pushes import SETTLING, press_metrics
+from experiments.results.path import SETTLING, press_metrics
 from experiments.results.run_log import RunLog
 from tests.experiments.results.registry_names import names_about
 

@@ -92,14 +92,11 @@ def test_noise_of_the_positions_does_not_soften_the_joint():
     assert attenuation * STIFFNESS > 4.0 * spread / np.sqrt(20)
 
 
-def test_viscous_friction_of_a_locked_joint_counts_with_its_deviation():
+def test_viscous_friction_of_a_locked_joint_is_no_damping():
     signals = noisy(steady_motion(True), 0)
     sure = estimate_joint(signals, locked=True, viscous=VISCOUS)
-    vague = estimate_joint(signals, locked=True, viscous=VISCOUS, viscous_deviation=3.0)
     both = estimate_joint(signals, locked=True, viscous=0.0)
     assert both.damping == pytest.approx(sure.damping + VISCOUS)
-    expected = np.hypot(sure.deviation("damping"), 3.0)
-    assert vague.deviation("damping") == pytest.approx(expected)
 
 
 def refused(message, signals, **given):

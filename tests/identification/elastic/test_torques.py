@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.elastic.experiment import random_steps, zippered_multisine
+from identification.elastic.experiment import zippered_multisine
 from pfsc_drake.errors import InputError
 
 
@@ -24,14 +24,6 @@ def test_joints_share_no_frequency_and_have_the_stated_size():
     np.testing.assert_allclose(products, np.diag(rms**2), atol=1e-9 * rms.max() ** 2)
 
 
-def test_steps_hold():
-    t = np.arange(1000) * 1e-3
-    steps = random_steps(np.array([5.0, 2.0]), 0.1, t, np.random.default_rng(1))
-    changes = np.flatnonzero(np.any(np.diff(steps, axis=0) != 0.0, axis=1))
-    np.testing.assert_array_equal(changes, np.arange(99, 999, 100))
-    assert np.all(np.abs(steps) <= [5.0, 2.0])
-
-
 def test_bad_values():
     random = np.random.default_rng(0)
     for rms, period, lowest, message in (
@@ -41,5 +33,3 @@ def test_bad_values():
     ):
         with pytest.raises(InputError, match=message):
             zippered_multisine(np.array(rms), period, random, lowest)
-    with pytest.raises(InputError, match="hold = 0"):
-        random_steps(np.ones(2), 0.0, np.arange(3.0), random)

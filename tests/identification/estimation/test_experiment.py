@@ -7,7 +7,7 @@ from identification.estimation.least_squares import estimate
 from identification.estimation.residuals import excess
 from identification.estimation.validation import compare_with_truth, predict
 from identification.excitation.fourier import FourierTrajectory
-from identification.measurement.experiment import simulate_experiment
+from identification.measurement.experiment import run_experiment
 from identification.measurement.periods import average
 from identification.model.base import base_parameters
 from identification.model.parameters import true_parameters
@@ -31,7 +31,7 @@ def measured(delta):
     excitation = FourierTrajectory(np.full(3, 0.2), _A, _B, 2.0, (1, 2, 3))
     other = FourierTrajectory(np.full(3, 0.2), 0.8 * _B[::-1], -0.8 * _A, 2.0, (1, 2, 3))
     return [
-        average(simulate_experiment(delta[0], trajectory, periods=4, seed=seed))
+        average(run_experiment(delta[0], trajectory, periods=4, seed=seed).record)
         for seed, trajectory in enumerate([excitation, other])
     ]
 
@@ -44,7 +44,7 @@ def test_estimate_of_simulated_experiment(delta, measured):
     assert test.p_value > 0.01
     assert np.all(result.relative_standard_deviation < 0.05)
     system = result.system
-    assert excess(result.residuals, system.used, measured[0], parameters=10).noise_only(1e-3).all()
+    assert (excess(result.residuals, system.used, measured[0], parameters=10).p_value > 1e-3).all()
 
 
 def test_prediction_of_another_experiment(delta, measured):
@@ -53,4 +53,4 @@ def test_prediction_of_another_experiment(delta, measured):
     np.testing.assert_allclose(prediction.error_rms, prediction.noise_level, rtol=0.15)
     assert np.all(prediction.explained > 0.9)
     found = excess(prediction.residuals, prediction.used, measured[1])
-    assert found.noise_only(1e-4).all()
+    assert (found.p_value > 1e-4).all()

@@ -149,7 +149,7 @@ def test_what_is_badly_identifiable(comau, measure):
         (r for r in result.relative_standard_deviation if r > 0.15), reverse=True
     )
     worst = {w.name: w for w in weak}["link_6.Ixz"]
-    column = result.regressor_matrix[:, :, result.short_names.index("link_6.Ixz")]
+    column = result.system.matrix[:, :, result.short_names.index("link_6.Ixz")]
     # as if it were known with all others
     alone = 1.0 / np.sqrt(np.sum(column**2 / result.system.variance * result.system.used))
     size = abs(result.base_parameters[result.short_names.index("link_6.Ixz")])

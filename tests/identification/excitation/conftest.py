@@ -5,8 +5,9 @@ import pytest
 
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
 from identification.excitation.limits import chosen_limits
-from identification.excitation.problem import excitation_problem
-from identification.excitation.scene import RobotScene, load_cell
+from identification.excitation.program import believed_parameters, excitation_problem
+from identification.excitation.scene import RobotScene, cell_of, load_cell
+from identification.excitation.verification import verify
 from identification.model.base import base_parameters
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
@@ -60,6 +61,19 @@ def delta():
 @pytest.fixture(scope="session")
 def arm_problem(arm):
     return excitation_problem(arm, chosen_limits(arm), period=5.0, harmonics=(1, 2))
+
+
+@pytest.fixture(scope="session")
+def verified():
+    """Tells how much of its limits a robot's motion takes."""
+
+    def tell(subject, motion, limits=None, cell=None):
+        around, joints = cell_of(subject, cell), chosen_limits(subject, limits)
+        scene = None if subject.block is None else RobotScene(subject, around)
+        believed = believed_parameters(subject)
+        return verify(Regressor(subject), believed, joints, motion, around, scene)
+
+    return tell
 
 
 @pytest.fixture

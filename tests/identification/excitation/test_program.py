@@ -1,4 +1,4 @@
-"""The problem for Drake's solvers."""
+"""The optimization problem (2.79) of a robot, for other processes and for Drake's solvers."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 from identification.excitation.fourier import fourier_basis
 from identification.excitation.limits import chosen_limits
 from identification.excitation.local_search import LocalSearch
-from identification.excitation.problem import excitation_problem, tightened
-from identification.excitation.program import ExcitationProgram
+from identification.excitation.program import ExcitationProgram, excitation_problem, tightened
 from identification.excitation.scene import Cell, Obstacle
 
 TIMES = np.linspace(0.1, 4.6, 7)

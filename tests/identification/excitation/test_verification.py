@@ -5,9 +5,7 @@ import pytest
 
 from identification.excitation.criterion import information
 from identification.excitation.fourier import FourierTrajectory, shipped_excitation
-from identification.excitation.verification import verify_excitation
 from identification.model.subject import load_subject
-from pfsc_drake.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -15,10 +13,12 @@ def best():
     return FourierTrajectory.load(shipped_excitation(name="excitation_optimal"))
 
 
-def test_shipped_excitation_keeps_all_and_beats_the_printed_one(comau, regressor, base, best):
+def test_shipped_excitation_keeps_all_and_beats_the_printed_one(
+    comau, regressor, base, best, verified
+):
     # that of Tab. C.2 is 599.3
     assert information(regressor, base, best).log_determinant >= 680.0
-    verification = verify_excitation(comau, best)
+    verification = verified(comau, best)
     assert verification.keeps_all
     assert verification.clearance.guaranteed > 0.0
     assert verification.margins["height of the flange"] >= 0.0
@@ -27,10 +27,10 @@ def test_shipped_excitation_keeps_all_and_beats_the_printed_one(comau, regressor
 @pytest.mark.parametrize(
     ("name", "limits"), [("festo_expt_45", {"acceleration": 30.0}), ("franka_emika_panda", None)]
 )
-def test_other_shipped_excitations(name, limits):
+def test_other_shipped_excitations(name, limits, verified):
     subject = load_subject(name)
     motion = FourierTrajectory.load(shipped_excitation(name, "excitation_optimal"))
-    assert verify_excitation(subject, motion, limits).problems == []
+    assert verified(subject, motion, limits).problems == []
 
 
 def test_shipped_excitation_between_samples(comau, comau_scene, comau_cell, best):
@@ -42,8 +42,8 @@ def test_shipped_excitation_between_samples(comau, comau_scene, comau_cell, best
     assert comau_scene.clearance(q).least >= comau_cell.clearance
 
 
-def test_printed_excitation_dips_too_low(comau, printed):
-    verification = verify_excitation(comau, printed)
+def test_printed_excitation_dips_too_low(comau, printed, verified):
+    verification = verified(comau, printed)
     assert not verification.keeps_all
     assert 0.2 + verification.margins["height of the flange"] == pytest.approx(-0.18, abs=0.01)
     assert any("floor" in problem for problem in verification.problems)
@@ -51,16 +51,11 @@ def test_printed_excitation_dips_too_low(comau, printed):
         assert np.all(verification.shares[key] < 1.0)
 
 
-def test_too_fast(comau, best):
+def test_too_fast(comau, best, verified):
     # the same way in less time
     faster = FourierTrajectory(
         best.q_0, best.a * 1.2, best.b * 1.2, best.period / 1.2, best.harmonics
     )
-    problems = verify_excitation(comau, faster).problems
+    problems = verified(comau, faster).problems
     assert any(problem.startswith("acceleration of joint_1") for problem in problems)
     assert not any("position" in problem or "distance" in problem for problem in problems)
-
-
-def test_refuses(arm, best):
-    with pytest.raises(InputError, match="of 6 joints; comau_racer_1_4_3r has 3"):
-        verify_excitation(arm, best)

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from identification.excitation.fourier import FourierTrajectory
-from identification.measurement.experiment import run_experiment, simulate_experiment
+from identification.measurement.experiment import run_experiment
 from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import Imperfections, shipped_imperfections
 from identification.measurement.periods import average, friction_trend
@@ -77,7 +77,7 @@ def test_torques_of_drakes_inverse_dynamics(robot):
     subject = load_subject(robot, tool=True)
     subject = replace(subject, mounts=None, coulomb=np.zeros(subject.dimension))
     motion = average(
-        simulate_experiment(subject, excitation(subject), perfect(subject), periods=PERIODS)
+        run_experiment(subject, excitation(subject), perfect(subject), periods=PERIODS).record
     )
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(resolve_model(robot)))
@@ -100,7 +100,9 @@ def delta():
 
 def test_dry_friction(delta):
     """At reversals alone, within some samples, the torque is anywhere between both signs."""
-    motion = average(simulate_experiment(delta, excitation(delta), perfect(delta), periods=PERIODS))
+    motion = average(
+        run_experiment(delta, excitation(delta), perfect(delta), periods=PERIODS).record
+    )
     expected = Regressor(delta).matrix(motion.q, motion.v, motion.a) @ true_parameters(delta)
     moving = np.abs(motion.v) > 0.05 * np.abs(motion.v).max()
     error = np.abs(motion.tau - expected)[moving]
@@ -113,7 +115,7 @@ def test_dry_friction(delta):
 def test_a_servo_that_knows_nothing(delta):
     """Its joints stick before they reverse: torques are late there, the record is not."""
     plain = Servo(feedforward=0.0, friction=0.0)
-    record = simulate_experiment(delta, excitation(delta), periods=PERIODS, servo=plain)
+    record = run_experiment(delta, excitation(delta), periods=PERIODS, servo=plain).record
     regressor = Regressor(delta)
     found = []
     for shift in (0, 6):
@@ -147,7 +149,7 @@ def test_five_percent_of_drift_are_seen(delta):
     warm = replace(faults, drift=FrictionDrift(factor=1.05, begin=0.0, end=5 * PERIOD))
     seen = []
     for imperfections in (faults, warm):
-        record = simulate_experiment(delta, excitation(delta), imperfections, periods=5)
+        record = run_experiment(delta, excitation(delta), imperfections, periods=5).record
         seen.append(friction_trend(average(record)))
     assert not seen[0].changes.any()
     # of the drives together; from the first to the last of four periods
@@ -169,12 +171,12 @@ def test_runs_differ_by_their_seed_alone(delta):
 
 def test_a_record_through_a_file(delta, tmp_path):
     told = []
-    record = simulate_experiment(
+    record = run_experiment(
         delta,
         excitation(delta),
         periods=2,
         progress=lambda fraction, what: told.append((fraction, what)),
-    )
+    ).record
     assert told[-1] == (1.0, "simulating the experiment")
     assert np.all(np.diff([fraction for fraction, _ in told]) > 0.0)
     write_record(tmp_path / "run.csv", record, delta)
@@ -184,7 +186,7 @@ def test_a_record_through_a_file(delta, tmp_path):
 
 def refused(message, subject, trajectory, imperfections=None, **options):
     with pytest.raises(InputError, match=message):
-        simulate_experiment(subject, trajectory, imperfections, **options)
+        run_experiment(subject, trajectory, imperfections, **options)
 
 
 def test_bad_input(delta):

@@ -8,8 +8,8 @@ import pytest
 
 from identification.excitation.fourier import FourierTrajectory
 from identification.measurement.columns import Reading
-from identification.measurement.experiment import read_motion, simulate_experiment
-from identification.measurement.files import write_record
+from identification.measurement.experiment import prepare_motion, run_experiment
+from identification.measurement.files import read_record, write_record
 from identification.measurement.imperfections import shipped_imperfections
 from identification.model.regressor import Regressor
 from identification.model.subject import load_subject
@@ -35,7 +35,7 @@ def lines(comau, tmp_path_factory):
     a, b = rng.uniform(0.2, 0.5, (2, 6, 2))
     trajectory = FourierTrajectory([0.0, 1.0, 0.1, 0.0, 0.0, 0.0], a, b, PERIOD, (1, 3))
     noise = shipped_imperfections("comau_racer_1_4")
-    record = simulate_experiment(comau, trajectory, noise, periods=3)
+    record = run_experiment(comau, trajectory, noise, periods=3).record
     record = replace(record, v=np.gradient(record.q, 1e-3, axis=0))
     path = tmp_path_factory.mktemp("records") / "run.csv"
     write_record(path, record, comau)
@@ -134,10 +134,14 @@ FAULTS = {
 }
 
 
+def motion_of(file, regressor, reading=None):
+    return prepare_motion(read_record(file, regressor.subject, None, reading), regressor)
+
+
 def test_the_file_without_fault(lines, regressor, tmp_path):
     table = Table(lines)
     table.write(tmp_path / "run.csv")
-    motion = read_motion(tmp_path / "run.csv", regressor)
+    motion = motion_of(tmp_path / "run.csv", regressor)
     assert motion.periods == 2 and motion.period == PERIOD
     # what the file states otherwise, it may
     table.scale("q_", 180.0 / np.pi)
@@ -149,7 +153,7 @@ def test_the_file_without_fault(lines, regressor, tmp_path):
     names = {f"angle_{j}": f"q_{j}" for j in range(1, 7)}
     names |= {f"{s}_{j}": f"{s}_{j}" for s in ("tau", "v") for j in range(1, 7)} | {"t": "t"}
     reading = Reading(names=names, scale={"tau_3": 0.5})
-    again = read_motion(tmp_path / "other.csv", regressor, reading=reading)
+    again = motion_of(tmp_path / "other.csv", regressor, reading)
     np.testing.assert_allclose(again.q, motion.q, atol=1e-7)
     np.testing.assert_allclose(again.tau, motion.tau, rtol=1e-6, atol=1e-6)
 
@@ -161,7 +165,7 @@ def test_faults_are_named(lines, regressor, tmp_path, fault):
     spoil(table)
     table.write(tmp_path / "run.csv")
     with pytest.raises(InputError, match=message) as caught:
-        read_motion(tmp_path / "run.csv", regressor)
+        motion_of(tmp_path / "run.csv", regressor)
     text = str(caught.value)
     assert "\n" not in text
     assert re.search(r"run\.csv|tau l", text)

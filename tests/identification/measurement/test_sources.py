@@ -5,7 +5,6 @@ from pydrake.systems.framework import DiagramBuilder
 
 from identification.measurement.servo import (
     add_curves,
-    add_lines,
     add_samples,
     add_signs,
     add_sines,
@@ -29,13 +28,12 @@ def signal(add, *arguments):
     return at
 
 
-def test_held_interpolated_and_smooth_samples():
+def test_held_and_smooth_samples():
     values = np.column_stack([T**2, 1.0 - T])
-    held, lines, curves = (signal(f, T, values) for f in (add_samples, add_lines, add_curves))
+    held, curves = (signal(f, T, values) for f in (add_samples, add_curves))
     np.testing.assert_allclose(held(0.47), [0.16, 0.6])
     np.testing.assert_allclose(held(0.4), [0.16, 0.6])
     np.testing.assert_allclose(held(1.0), [1.0, 0.0])
-    np.testing.assert_allclose(lines(0.45), [0.205, 0.55])
     np.testing.assert_allclose(curves(0.45), [0.2025, 0.55])
 
 
@@ -58,7 +56,7 @@ def test_sums_of_sines():
 
 def test_sum():
     def twice(builder, name):
-        first = add_lines(builder, "first", T, np.column_stack([T, T**2]))
+        first = add_samples(builder, "first", T, np.column_stack([T, T**2]))
         return add_sum(builder, name, first, first)
 
     np.testing.assert_allclose(signal(twice)(0.5), [1.0, 0.5])

@@ -6,7 +6,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from pfsc_drake.systems.drawing.surface_visualizer import RegionVisualizer
+from pfsc_drake.systems.drawing.manifold_visualizer import RegionVisualizer
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What reaches Meshcat of what a tool carries, and where."""
+"""A tool, its frame, its trail and the forces on it in Meshcat."""
 
 import numpy as np
 from pydrake.geometry import Rgba, Sphere

@@ -14,8 +14,7 @@ from pfsc_drake.control.law.supervision import SupervisionParameters
 from pfsc_drake.physics.velocity_servo import VelocityServoLaw, joint_inertia, servo_gains
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.block_access import BlockAccess
-from pfsc_drake.systems.fuse import fuse
+from pfsc_drake.systems.fuse import BlockAccess, fuse
 from pfsc_drake.systems.physics.velocity_servo import ServoAccess, VelocityServo
 
 POSTURE = np.deg2rad([0.0, 96.0, -32.3, 0.0, 71.4, -5.7])

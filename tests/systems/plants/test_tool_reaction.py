@@ -9,8 +9,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 
 from pfsc_drake.robot.models.files import resolve_model
 from pfsc_drake.robot.serial.chain_from_plant import chain_from_plant
-from pfsc_drake.systems.plants.reactions import ToolReaction, reaction_index
-from pfsc_drake.systems.plants.tool_load_from_plant import tool_load_from_plant
+from pfsc_drake.systems.plants.reactions import ToolReaction, reaction_index, tool_load_from_plant
 
 
 @pytest.fixture(name="plant", scope="module")

@@ -1,4 +1,4 @@
-"""Surfaces and regions in Meshcat, coloured by what is felt on them."""
+"""Paths, surfaces and regions in Meshcat; surfaces coloured by what is felt on them."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -7,10 +7,57 @@ from pydrake.geometry import Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from pfsc_drake.geometry import Path, PathPointLayout
 from pfsc_drake.systems.drawing.tool_visualizer import draw_frame
 
-_ROOT = "surface_following"
-_LINE, _SKIN = Rgba(0.15, 0.4, 0.85, 1.0), Rgba(0.45, 0.65, 0.95, 0.35)
+_PATH_ROOT, _SURFACE_ROOT, _REGION_ROOT = "path_following", "surface_following", "fixtures"
+_LINE = Rgba(0.15, 0.4, 0.85, 1.0)
+
+
+class PathVisualizer(LeafSystem):
+    """Draws the path, and the parallel transport frame at the projected point.
+
+    The frame's axes are red ``e_par``, green ``e_perp``, blue ``e_cross``.
+
+    Ports:
+        path_point (input): From :class:`Projector`.
+
+    Args:
+        path: The path.
+        layout: Layout of the path point.
+        meshcat: Where to draw.
+        period: Time between frames [s].
+    """
+
+    def __init__(
+        self, path: Path, layout: PathPointLayout, meshcat: Meshcat, period: float
+    ) -> None:
+        super().__init__()
+        self._path, self._layout, self._meshcat = path, layout, meshcat
+        self._path_point = self.DeclareVectorInputPort("path_point", layout.size)
+        self.DeclareInitializationPublishEvent(self._draw_path)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
+
+    def _draw_path(self, context: Context) -> EventStatus:
+        theta = np.linspace(*self._path.position.domain, 800)
+        points = self._path.position.derivatives(theta, 0)[:, 0, :]
+        self._meshcat.SetLine(f"{_PATH_ROOT}/path", points.T, 3.0, _LINE)
+        draw_frame(self._meshcat, f"{_PATH_ROOT}/frame")
+        return EventStatus.Succeeded()
+
+    def _draw(self, context: Context) -> None:
+        point = self._path_point.Eval(context)
+        if not np.isfinite(point).all():
+            return
+        time = context.get_time()
+        position = point[self._layout.position]
+        e_par = position[3:6] / np.linalg.norm(position[3:6])
+        e_perp = point[self._layout.normal]
+        R_WF = RotationMatrix(np.column_stack([e_par, e_perp, np.cross(e_par, e_perp)]))
+        self._meshcat.SetTransform(f"{_PATH_ROOT}/frame", RigidTransform(R_WF, position[:3]), time)
+
+
+_SKIN = Rgba(0.45, 0.65, 0.95, 0.35)
 
 
 class SurfaceVisualizer(LeafSystem):
@@ -46,8 +93,8 @@ class SurfaceVisualizer(LeafSystem):
         self.DeclarePeriodicPublishEvent(period, 0.0, self._draw)
 
     def _draw_surface(self, context: Context) -> EventStatus:
-        draw_surface(self._meshcat, _ROOT, self._skin, self._lines)
-        draw_frame(self._meshcat, f"{_ROOT}/frame")
+        draw_surface(self._meshcat, _SURFACE_ROOT, self._skin, self._lines)
+        draw_frame(self._meshcat, f"{_SURFACE_ROOT}/frame")
         return EventStatus.Succeeded()
 
     def _draw(self, context: Context) -> None:
@@ -56,7 +103,7 @@ class SurfaceVisualizer(LeafSystem):
             return
         position, axes = self._place(point)
         X_WF = RigidTransform(RotationMatrix.ProjectToRotationMatrix(axes), position)
-        self._meshcat.SetTransform(f"{_ROOT}/frame", X_WF, context.get_time())
+        self._meshcat.SetTransform(f"{_SURFACE_ROOT}/frame", X_WF, context.get_time())
 
 
 def draw_surface(
@@ -84,9 +131,6 @@ def _triangles(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
     return grid.reshape(-1, 3), faces.reshape(-1, 3)
-
-
-_REGION_ROOT = "fixtures"
 
 
 class RegionVisualizer(LeafSystem):

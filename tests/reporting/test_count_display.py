@@ -5,13 +5,13 @@ import io
 import pytest
 from rich.console import Console
 
-from experiments.sweep.progress import SweepProgress, spoken_time
+from reporting.progress import CountDisplay, spoken_time
 
 
 def lines_of(total, done, statuses, terminal=False):
     text = io.StringIO()
     console = Console(file=text, force_terminal=terminal, width=100)
-    with SweepProgress(console, "arm", total, done) as progress:
+    with CountDisplay(console, "arm", total, done, "completed") as progress:
         progress.processes(2)
         for status in statuses:
             progress.advance(status)
@@ -45,9 +45,9 @@ def test_times(seconds, spoken):
 
 def test_the_time_left_counts_runs_since_processes_started(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr("experiments.sweep.progress.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("reporting.progress.time.monotonic", lambda: clock[0])
     text = io.StringIO()
-    with SweepProgress(Console(file=text, width=100), "arm", 20, 0) as progress:
+    with CountDisplay(Console(file=text, width=100), "arm", 20, 0, "completed") as progress:
         progress.processes(1)
         for _ in range(10):
             clock[0] += 10.0

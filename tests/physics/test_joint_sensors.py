@@ -1,4 +1,4 @@
-"""Encoders against what they are to do, step by step."""
+"""Sensors of joints: position encoders, and torque sensors of elastic joints."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from pfsc_drake.blocks.stepper import Stepper
 from pfsc_drake.errors import InputError
-from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
+from pfsc_drake.physics.joint_sensors import EncoderOptions, JointEncoders
 from pfsc_drake.robot.serial.chain import SerialChain
 from pfsc_drake.robot.serial.links import ChainLink
 from pfsc_drake.systems.block_system import BlockSystem

@@ -1,4 +1,4 @@
-"""What reaches Meshcat of a surface and its moving frame."""
+"""Paths, surfaces and regions in Meshcat; surfaces coloured by what is felt on them."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,5 @@
-"""What a controller measures: joints by encoders, forces at the flange."""
+"""What a controller measures of forces at the flange."""
 
-import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from diagrams.robots.part import RobotPart, SensorMount
@@ -14,104 +13,9 @@ from pfsc_drake.physics.force_torque_sensor import (
     ForceTorqueSensor,
     SensorFailure,
 )
-from pfsc_drake.physics.joint_encoders import EncoderOptions, JointEncoders
-from pfsc_drake.physics.joint_torque_sensor import JointTorqueSensor
-from pfsc_drake.robot.robot_model import RobotModel
 from pfsc_drake.systems.block_system import BlockSystem
 from pfsc_drake.systems.physics.sensor_noise import SensorNoise
 from pfsc_drake.systems.plants.reactions import JointReaction
-
-
-def add_joint_state(
-    builder: DiagramBuilder,
-    joint_state: OutputPort,
-    robot: RobotModel,
-    encoders: EncoderOptions,
-    failure: SensorFailureParameters,
-    period: float,
-    encoder_period: float,
-) -> OutputPort:
-    """Add what encoders make of the joint state, and return ``[q_J, v_J, q_M, v_M]`` as measured.
-
-    Args:
-        builder: Builder of the diagram.
-        joint_state: The true one.
-        robot: The robot.
-        encoders: The encoders.
-        failure: How one of them fails, if any does.
-        period: Sampling time of the controller [s].
-        encoder_period: That of the encoders, which servos may read more often [s].
-
-    Raises:
-        InputError: If the encoders do not suit the robot, or a sensor is to fail that does
-            not exist.
-    """
-    measured = joint_state
-    if encoders != EncoderOptions():
-        block = JointEncoders(robot, encoders, encoder_period)
-        real = builder.AddNamedSystem("encoder_increments", BlockSystem(block, encoder_period))
-        builder.Connect(joint_state, real.GetInputPort("joint_state"))
-        measured = real.GetOutputPort("joint_state")
-    if failure.time < 0.0:
-        return measured
-    size = 4 * robot.dimension
-    if not 0 <= failure.component < size:
-        raise InputError(
-            f"simulation.sensor_failure.component: {failure.component}; allowed: 0 to {size - 1}"
-        )
-    indices = [failure.component]
-    if failure.whole_joint:
-        indices = list(range(failure.component % robot.dimension, size, robot.dimension))
-    failing = SensorFailure(size, indices, failure.time, period, failure.kind, failure.size)
-    broken = builder.AddNamedSystem(
-        "sensor_failure",
-        BlockSystem(failing, period),
-    )
-    builder.Connect(measured, broken.GetInputPort("measured"))
-    return broken.GetOutputPort("delivered")
-
-
-def states_to_log(joint_state: OutputPort, measured: OutputPort) -> dict[str, OutputPort]:
-    """Return ``joint_state`` for the log, and ``joint_state_measured`` where it is not the truth.
-
-    That is with imperfect encoders, and where a sensor is to fail.
-
-    Args:
-        joint_state: The true one.
-        measured: What the law gets, see :func:`add_joint_state`.
-    """
-    if measured is joint_state:
-        return {"joint_state": measured}
-    return {"joint_state": joint_state, "joint_state_measured": measured}
-
-
-def add_torque_sensor(
-    builder: DiagramBuilder,
-    robot: RobotModel,
-    encoders: EncoderOptions,
-    period: float,
-    true_state: OutputPort,
-) -> OutputPort:
-    """Add torque sensors in elastic joints, and return what they measure, shape (N,) [Nm or N].
-
-    Args:
-        builder: Builder of the diagram.
-        robot: The robot as it is.
-        encoders: What the sensors do.
-        period: Sampling time [s].
-        true_state: The true ``[q_J, v_J, q_M, v_M]``.
-    """
-    block = JointTorqueSensor(robot, encoders.torque)
-    sensor = builder.AddNamedSystem("joint_torque_sensor", BlockSystem(block, period))
-    builder.Connect(true_state, sensor.GetInputPort("joint_state"))
-    if encoders.torque.noise > 0.0:
-        effort = robot.gather("effort_limit")
-        deviation = encoders.torque.noise * np.where(robot.elastic_joints, effort, 0.0)
-        noise = SensorNoise(deviation, encoders.torque.seed, period)
-        builder.AddNamedSystem("joint_torque_noise", noise)
-        builder.Connect(noise.get_output_port(), sensor.GetInputPort("noise"))
-    return sensor.GetOutputPort("joint_torque")
-
 
 _MOST_TICKS = 10_000  # by which a force is late
 

@@ -1,4 +1,4 @@
-"""Forces on links of a station's robot: what they do, who knows of them, what is refused."""
+"""Everything that acts on the robot, at its tool and on its links."""
 
 from pathlib import Path
 

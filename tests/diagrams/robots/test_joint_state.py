@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.builder import build_station
-from diagrams.robots import link_state
+from diagrams.robots import joint_state
 from diagrams.scenario import ControllerParameters
 from experiments.results.found_links import found_links_metrics
 from experiments.results.run_signals import collect_log
@@ -78,11 +78,11 @@ def test_friction_that_is_believed_is_no_torque_of_a_spring(load_arm, monkeypatc
         told.append(friction)
         raise InputError("enough")
 
-    monkeypatch.setattr(link_state, "motor_momentum", note)
+    monkeypatch.setattr(joint_state, "motor_momentum", note)
     robot, f_c, f_v = load_arm("comau_racer_1_4_elastic_3r").chain, np.ones(3), 2.0 * np.ones(3)
     for friction in ((f_c, f_v), None):
         with pytest.raises(InputError, match="enough"):
-            link_state._add_torque_observer(
+            joint_state._add_torque_observer(
                 None, robot, ControllerParameters(), None, np.zeros(3), friction
             )
     np.testing.assert_array_equal(told, [[f_c, f_v], np.zeros((2, 3))])
