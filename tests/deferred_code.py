@@ -16,9 +16,11 @@ from pfsc_drake.compiled.native_code import native_code
 # after so many evaluations it is looked at what they take
 BATCH = 100
 # of the interpreter, over all tests of a process [s]: to make machine code takes about as long
-ENOUGH = 1.0
+ENOUGH = 2.0
 
-_spent: Counter[bytes] = Counter()
+_batches: Counter[bytes] = Counter()
+# of one evaluation [s]: the least that was seen, as a busy machine makes some of them longer
+_least: dict[bytes, float] = {}
 
 
 class DeferredCode:
@@ -52,9 +54,11 @@ class DeferredCode:
                 return
             begin = time.thread_time()
             evaluate()
-            key = function_digest(self._function)
-            _spent[key] += BATCH * (time.thread_time() - begin)
-            code = native_code(self._function) if _spent[key] > ENOUGH else None
+            elapsed, key = time.thread_time() - begin, function_digest(self._function)
+            _batches[key] += 1
+            _least[key] = min(elapsed, _least.get(key, elapsed))
+            spent = BATCH * _batches[key] * _least[key]
+            code = native_code(self._function) if spent > ENOUGH else None
             if code is None:
                 left = BATCH
             else:
