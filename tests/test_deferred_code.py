@@ -1,8 +1,6 @@
 """Code that is made late against the interpreter's and machine code."""
 
 from collections import Counter
-from itertools import count
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -18,12 +16,11 @@ FUNCTION = ca.Function("f", [A, X], [A @ X, ca.sin(X)], ["A", "x"], ["y", "s"])
 
 
 @pytest.fixture
-def slow_clock(monkeypatch):
-    """Let an evaluation take 1 s; two batches are enough."""
-    monkeypatch.setattr(deferred_code, "_batches", Counter())
-    monkeypatch.setattr(deferred_code, "_least", {})
-    monkeypatch.setattr(deferred_code, "time", SimpleNamespace(thread_time=count().__next__))
-    monkeypatch.setattr(deferred_code, "ENOUGH", 1.5 * BATCH)
+def evaluations(monkeypatch):
+    """Return how often all functions have been evaluated; two batches are enough."""
+    monkeypatch.setattr(deferred_code, "_evaluations", evaluations := Counter())
+    monkeypatch.setattr(deferred_code, "ENOUGH", 2 * BATCH)
+    return evaluations
 
 
 def evaluate(bound, k):
@@ -34,8 +31,7 @@ def evaluate(bound, k):
     np.testing.assert_allclose(bound.results["s"], np.sin(x), rtol=1e-15)
 
 
-@pytest.mark.usefixtures("slow_clock")
-def test_results_before_and_after_it_is_made(monkeypatch):
+def test_results_before_and_after_it_is_made(monkeypatch, evaluations):
     made = []
     original = deferred_code.native_code
     monkeypatch.setattr(deferred_code, "native_code", lambda f: made.append(f) or original(f))
@@ -45,8 +41,7 @@ def test_results_before_and_after_it_is_made(monkeypatch):
         assert len(made) == (k >= 2 * BATCH - 1)
 
 
-@pytest.mark.usefixtures("slow_clock")
-def test_evaluations_of_the_same_content_count_together(monkeypatch):
+def test_evaluations_of_the_same_content_count_together(monkeypatch, evaluations):
     made = []
     monkeypatch.setattr(deferred_code, "native_code", made.append)
     for again in (False, True):
@@ -54,10 +49,10 @@ def test_evaluations_of_the_same_content_count_together(monkeypatch):
         for k in range(BATCH):
             evaluate(bound, k)
         assert bool(made) == again
+    assert evaluations.total() == 2 * BATCH
 
 
-@pytest.mark.usefixtures("slow_clock")
-def test_what_cannot_be_compiled_stays_interpreted(monkeypatch):
+def test_what_cannot_be_compiled_stays_interpreted(monkeypatch, evaluations):
     monkeypatch.setattr(deferred_code, "native_code", lambda f: None)
     bound = BoundFunction(FUNCTION)
     for k in range(3 * BATCH):
@@ -71,15 +66,3 @@ def test_only_within_a_context_it_is_made_at_once_or_never():
     with interpreted():
         assert bound_function.native_code(FUNCTION) is None
     assert bound_function.native_code is DeferredCode
-
-
-@pytest.mark.usefixtures("slow_clock")
-def test_an_evaluation_that_was_disturbed_does_not_count_for_others(monkeypatch):
-    """The third one that is looked at takes a thousand times as long as others."""
-    made, times = [], iter([0.0, 0.1, 1.0, 1.1, 2.0, 102.0, 103.0, 103.1])
-    monkeypatch.setattr(deferred_code.time, "thread_time", times.__next__)
-    monkeypatch.setattr(deferred_code, "native_code", made.append)
-    bound = BoundFunction(FUNCTION)
-    for k in range(4 * BATCH):
-        evaluate(bound, k)
-    assert not made
