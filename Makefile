@@ -3,8 +3,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 FUZZ_SECONDS ?= 600
 DEMO_OUT := out/demo
-# a file's tests share what they build; in the order of tests/conftest.py
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+# a file's tests share what they build; in the order of tests/conftest.py. As many processes as
+# cores: threads for matrices would wait for each other, and modules are compiled for all processes
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 # the slowest tests only where they are asked for, as test-all and continuous integration do
 PFSC_TESTS ?= quick
 SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
@@ -35,7 +37,12 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 demo: setup
 	$(BIN)/python -m experiments run pfc_elastic_6r --out $(DEMO_OUT)
 
-test: lint types unit
+# types are checked beside the tests, which all cores but one would wait for, and told at the end
+test: lint
+	@told=$$(mktemp); $(BIN)/mypy >$$told 2>&1 & types=$$!; \
+	$(PYTEST) $(SELECTED); tests=$$?; \
+	wait $$types; typed=$$?; cat $$told; rm -f $$told; \
+	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
 
 lint: setup
 	$(BIN)/ruff check .

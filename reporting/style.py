@@ -1,6 +1,7 @@
 """How the project's figures look: colours, sizes, grid, panels, and the picture of each."""
 
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 from typing import Any
 
@@ -254,6 +255,7 @@ def place_legend(panel: Axes, columns: int | None = None) -> None:
     )
 
 
+@cache
 def _text_width(text: str, size: float, weight: str = "normal") -> float:
     """Width of a line of text [points]."""
     if not text:

@@ -1,6 +1,5 @@
 """Machine code that is made when it pays: most functions of a test are evaluated a few times."""
 
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -13,18 +12,19 @@ from pfsc_drake.compiled import bound_function
 from pfsc_drake.compiled.content import function_digest
 from pfsc_drake.compiled.native_code import native_code
 
-# after so many evaluations it is looked at what they take
+# evaluations are counted by so many
 BATCH = 100
-# of the interpreter, over all tests of a process [s]: to make machine code takes about as long
-ENOUGH = 1.0
+# over all tests of a process: to make machine code takes the interpreter's time for as many
+ENOUGH = 3000
 
-_spent: Counter[bytes] = Counter()
+_evaluations: Counter[bytes] = Counter()
 
 
 class DeferredCode:
-    """Evaluates a function by CasADi's interpreter until that has taken long, then as machine code.
+    """Evaluates a function by CasADi's interpreter, and as machine code when that has paid.
 
-    The results are the same to the last bit, which ``tests/compiled`` checks.
+    Evaluations are counted, not timed: a process that others disturb would make code too early. The
+    results are the same to the last bit, which ``tests/compiled`` checks.
 
     Args:
         function: The function.
@@ -50,11 +50,10 @@ class DeferredCode:
             if left:
                 evaluate()
                 return
-            begin = time.thread_time()
             evaluate()
             key = function_digest(self._function)
-            _spent[key] += BATCH * (time.thread_time() - begin)
-            code = native_code(self._function) if _spent[key] > ENOUGH else None
+            _evaluations[key] += BATCH
+            code = native_code(self._function) if _evaluations[key] >= ENOUGH else None
             if code is None:
                 left = BATCH
             else:

@@ -7,6 +7,9 @@ from diagrams.scenario import Scenario
 from experiments.scenario_file import find_scenario
 from pfsc_drake.yaml.typed import load_file
 
+# s; to fuse a station pays where it is simulated for longer
+LONG = 0.5
+
 
 def shipped_scenario(name: str) -> Scenario:
     """Return a fresh copy of a shipped scenario; its file is read once per process.

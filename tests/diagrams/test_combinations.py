@@ -24,6 +24,7 @@ from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.inverse_kinematics import ToolTarget, solve_pose
 from pfsc_drake.systems.plants.delta_plant import DeltaPlant
+from tests.scenarios import LONG
 
 STIFFNESS = 500.0
 
@@ -36,6 +37,7 @@ def soft():
 
 def run(settings: Scenario, duration: float, folder=SCENARIO_DIRECTORY):
     """Return the station and its log."""
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, folder)
     simulator = Simulator(station.diagram)
     station.set_start(simulator.get_mutable_context())

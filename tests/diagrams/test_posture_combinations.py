@@ -26,10 +26,24 @@ LAWS = {
     "visco_elastic": (ELASTIC, 2e-4, [-30.0] * 3),
     "elastic": (ELASTIC, 2e-4, [-40.0, -40.0, -220.0, -300.0]),
 }
+# each task and each law once; all of them take long
+QUICK = {
+    ("reference", "rigid"),
+    ("limits", "velocity_servo"),
+    ("limits", "visco_elastic"),
+    ("conditioning", "singular_perturbation"),
+    ("elbow", "elastic"),
+}
+COMBINATIONS = [
+    pytest.param(
+        task, law, marks=() if (task, law) in QUICK else pytest.mark.slow, id=f"{task}-{law}"
+    )
+    for task in TASKS
+    for law in LAWS
+]
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize(("task", "law"), COMBINATIONS)
 def test_a_posture_moves_and_the_tool_does_not_notice(load_exact_scenario, law, task):
     settings = load_exact_scenario("pfc_elbow_7r")
     model, bound, poles = LAWS[law]

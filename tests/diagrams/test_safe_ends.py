@@ -51,6 +51,7 @@ def go_on(settings, duration, after=AFTER):
     """Simulate into a fault and on; return station, result, times, and what was logged."""
     if settings.simulation.integrator == "auto":
         settings.simulation.integrator = "runge_kutta3"
+    settings.simulation.fused = True
     station = build_station(settings, SCENARIOS)
     progress = [lambda *_: None]
     result = simulate(station, settings.simulation, duration, *progress, after_fault=after)

@@ -15,10 +15,11 @@ import h5py
 import numpy as np
 import pytest
 
-from experiments import simulation
+from experiments import integration, simulation
 from experiments.cli import main
 from experiments.results.run_log import RunLog
 from experiments.scenario_file import find_scenario
+from reporting import style as figure_style
 
 BARE = ("--no-figures", "--no-recording")
 FIRST_MOVE = "1.7"  # s, of pfc_elastic_3r
@@ -53,9 +54,25 @@ class Run:
         return self.t >= t
 
 
+@contextlib.contextmanager
+def few_pixels():
+    """Draw figures where it only matters that something is drawn."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figure_style, "DPI", 30)
+        patch.setitem(figure_style.STYLE, "figure.constrained_layout.use", False)
+        yield
+
+
+@pytest.fixture
+def coarse():
+    """Draw all figures of a test with few pixels."""
+    with few_pixels():
+        yield
+
+
 def run(out, scenario, *arguments, complete=False):
     stdout = io.StringIO()
-    with contextlib.redirect_stdout(stdout):
+    with contextlib.redirect_stdout(stdout), few_pixels():
         arguments = [*arguments, *(() if complete else BARE)]
         status = main(["run", str(scenario), "--out", str(out), *arguments])
     return Run(status, out, stdout.getvalue())
@@ -66,6 +83,15 @@ def few_ticks_measured():
     """Measure the tick a few times: that would take as long as to simulate, and no test looks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation, "_SAMPLES", 10)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_trials():
+    """Try integrations for as long as it takes to tell them apart, roughly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(integration, "_STEPS", 20)
+        patch.setattr(integration, "_TICKS", 4)
         yield
 
 

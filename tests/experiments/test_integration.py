@@ -18,6 +18,7 @@ from pfsc_drake.robot.models.writer import write_sdf
 from pfsc_drake.robot.robot_model import joint_resonances
 from pfsc_drake.yaml.typed import load_typed
 
+STEPS, TICKS = integration._STEPS, integration._TICKS
 RIGID = (
     "robot.model=comau_racer_1_4",
     "controller.law=rigid",
@@ -49,6 +50,13 @@ def motion(station, settings, parameters):
     result = simulate(station, parameters, 0.2, Quiet())
     log = collect_log(station, result.root)
     return np.hstack([log["q_J"].values, log["y_t"].values])
+
+
+@pytest.fixture(autouse=True)
+def whole_trials(monkeypatch):
+    """Try integrations as long as a run does."""
+    monkeypatch.setattr(integration, "_STEPS", STEPS)
+    monkeypatch.setattr(integration, "_TICKS", TICKS)
 
 
 @pytest.mark.parametrize(

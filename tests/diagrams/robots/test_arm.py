@@ -14,6 +14,7 @@ from experiments.simulation import simulate
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.scripted_force import ForcePulse
 from pfsc_drake.systems.plants.coupled_plants import FullElasticPlant
+from tests.scenarios import LONG
 
 COMAU = "comau_racer_1_4"
 
@@ -33,6 +34,7 @@ def coupled(settings):
 
 
 def run(settings, duration):
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, Path())
     result = simulate(station, settings.simulation, duration, lambda *_: None)
     assert result.fault is None

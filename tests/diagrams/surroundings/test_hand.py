@@ -74,6 +74,7 @@ def test_springs_of_hand_and_tool_share_the_way(settings):
     """At rest k xi = K (xi_d - xi); along the path the tool arrives, for nothing holds it."""
     k, K = 1500.0, 500.0
     soft = CoordinateImpedance(Profile(2.0), Profile(60.0), Profile(0.0))
+    settings.simulation.fused = True
     settings.compliance.tangential = soft
     settings.compliance.transversal = CoordinateImpedance(Profile(2.0), Profile(120.0), Profile(k))
     settings.hand = HandParameters(
@@ -191,6 +192,7 @@ def test_values_out_of_range(data, part):
 def test_the_shipped_operator(load_scenario):
     """The first two seconds: led along the path, gently."""
     settings = load_scenario("operator_hand_6r")
+    settings.simulation.fused = True
     _, log = run(settings, 2.0)
     assert log["eta"].values[-1, 0] > 0.16
     assert np.linalg.norm(log["wrench_ext"].values[:, :3], axis=1).max() < 15.0

@@ -47,6 +47,7 @@ def test_a_push_leads_the_tool_and_stiffness_decides_how_far(tmp_path, settings)
         (400, {"push_z": -20.0}),
         (1200, {"transversal_stiffness": 2000.0}),
     )
+    settings.simulation.fused = True
     station = build_station(settings, SCENARIOS)
     result = simulate(station, settings.simulation, 2.4, lambda *_: None)
     assert result.fault is None

@@ -13,6 +13,7 @@ from pfsc_drake.control.compliance.measured_wrench import SensorFault
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.scripted_force import ForcePulse
 from pfsc_drake.yaml.typed import load_typed
+from tests.scenarios import LONG
 
 TICK = 1e-3
 STIFFNESS = 2000.0
@@ -38,6 +39,7 @@ def settings(load_scenario) -> Scenario:
 
 
 def run(settings, duration):
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, Path())
     simulator = Simulator(station.diagram)
     configuration = SimulatorConfig(

@@ -12,6 +12,7 @@ from experiments.results.run_signals import collect_log
 from experiments.simulation import simulate
 from pfsc_drake.control.compliance.impedance_parameters import CoordinateImpedance, Profile
 from pfsc_drake.geometry import quaternion_to_matrix
+from tests.scenarios import LONG
 
 SCENARIOS = Path(__file__).parents[3] / "experiments" / "scenarios"
 TICK = 1e-3
@@ -47,6 +48,7 @@ def arm(settings):
 
 
 def run(settings, duration):
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, SCENARIOS)
     result = simulate(station, settings.simulation, duration, lambda *_: None)
     assert result.fault is None

@@ -12,12 +12,14 @@ from diagrams.scenario import JointFrictionParameters
 from experiments.scenario_file import SCENARIO_DIRECTORY
 from pfsc_drake.errors import InputError
 from pfsc_drake.physics.friction import FrictionDrift
+from tests.scenarios import LONG
 
 F_C, F_V = [40.0, 90.0, 20.0], [14.0, 97.0, 39.0]
 
 
 def run(settings, duration=1.0):
     """Return the station, times and log."""
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, SCENARIO_DIRECTORY)
     simulator = Simulator(station.diagram)
     station.set_start(simulator.get_mutable_context())

@@ -15,6 +15,7 @@ from pfsc_drake.errors import InputError
 from pfsc_drake.following.law import make_law
 from pfsc_drake.jets import Jet
 from tests.control.conftest import BENT_7
+from tests.scenarios import LONG
 
 XI = [-4.0, -6.0]
 
@@ -120,6 +121,7 @@ def test_a_reference_out_of_reach_is_refused(reference, message, load_scenario):
 
 def run(settings, duration):
     """Return a station and its logged signals after a run."""
+    settings.simulation.fused = duration >= LONG
     station = build_station(settings, Path())
     simulator = Simulator(station.diagram)
     root = simulator.get_mutable_context()

@@ -25,6 +25,7 @@ def fixture_run(load_exact_scenario):
         settings.reference.dwell, settings.reference.velocity = dwell, 0.6
         settings.reference.acceleration = 3.0
         settings.controller.posture = PostureParameters(**posture)
+        settings.simulation.fused = True
         station = build_station(settings, Path())
         simulator = Simulator(station.diagram)
         root = simulator.get_mutable_context()

@@ -8,7 +8,6 @@ from PIL import Image
 
 from experiments.figures.all import draw_figures, render_figures
 from experiments.results.run_log import RunLog
-from reporting import style as figure_style
 
 PATH = np.stack([np.linspace(0.0, 0.3, 50), np.zeros(50), np.full(50, 0.5)], axis=1)
 NAMES = [
@@ -29,13 +28,6 @@ NAMES = [
 
 def names(log):
     return [drawing.name for drawing in draw_figures(log, [PATH])]
-
-
-@pytest.fixture
-def coarse(monkeypatch):
-    """Few pixels, where it only matters that something is drawn."""
-    monkeypatch.setattr(figure_style, "DPI", 30)
-    monkeypatch.setitem(figure_style.STYLE, "figure.constrained_layout.use", False)
 
 
 def test_all_figures_are_drawn(drawn_log):

@@ -82,6 +82,7 @@ def test_interrupted_before_the_simulation_nothing_is_left(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_folder_removed_during_the_run_loses_nothing(tmp_path, monkeypatch):
     out, temporary = tmp_path / "out", tmp_path / "temporary"
     temporary.mkdir()
