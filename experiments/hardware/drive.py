@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
 from experiments.hardware.check import AT_REST, check_first
-from experiments.results.run_log import RunLog
+from experiments.hardware.drive_record import DrivenTick, DriveRecord
 from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_positive
 from pfsc_drake.drivers.driver_rules import torque_rates
@@ -21,10 +21,12 @@ from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
 # after which a robot that is to stop is left alone, and how long it rests before [s]
-_LONGEST_STOP, _RESTED = 2.0, 0.2
+LONGEST_STOP, RESTED = 2.0, 0.2
 _FAULT = "a fault"
 # beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
-_TWICE, _FASTEST, _LEAST_JUMP = 2.0, 10.0, 2e-3
+_TWICE, _FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
+# ticks that are missing for longer are none of a robot's: its clock was set [s]
+LARGEST_GAP = 1.0
 
 
 @dataclass(frozen=True)
@@ -49,44 +51,6 @@ class DriveOptions:
         require_positive("effort_share", self.effort_share)
 
 
-@dataclass
-class _Tick:
-    """What is noted of one tick beside the station's own log."""
-
-    age: float
-    missed: int
-    clipped: int
-    robot_mode: int
-    sent: np.ndarray
-
-
-@dataclass
-class DriveRecord:
-    """What happened on the link.
-
-    Attributes:
-        ticks: What is noted of each tick of the controller.
-    """
-
-    ticks: list[_Tick] = field(default_factory=list)
-
-    def add_to(self, log: RunLog) -> None:
-        """Add what was noted to the log of a run.
-
-        Args:
-            log: The log.
-        """
-        noted = self.ticks[: len(log.time)]
-        if len(noted) < len(log.time):
-            noted = noted + [noted[-1]] * (len(log.time) - len(noted))
-        modes = [mode.name.lower() for mode in RobotMode]
-        log.add("status_age", [1e6 * tick.age for tick in noted])
-        log.add("missed", [tick.missed for tick in noted])
-        log.add("clipped", [tick.clipped for tick in noted])
-        log.add("sent", [tick.sent for tick in noted])
-        log.add("robot_mode", [tick.robot_mode for tick in noted], labels=modes)
-
-
 class Drive:
     """A station's controller, advanced by what a robot tells.
 
@@ -97,6 +61,10 @@ class Drive:
 
     Attributes:
         period: Sampling time [s].
+        mode: What the robot is commanded by.
+        limit: Largest torques that are sent [Nm or N], shape (N,).
+        rate: How fast they may change [Nm/s or N/s], shape (N,).
+        fastest: Speeds that no joint can have [rad/s or m/s], shape (N,).
         record: What happened.
         fault: Why it ended, or None.
     """
@@ -108,11 +76,11 @@ class Drive:
         self._n, self.period = robot.dimension, station.controller.period
         self._weight = gravity_function(robot)
         effort = robot.gather("effort_limit")
-        self._limit = options.effort_share * effort
+        self.limit = options.effort_share * effort
         speed = robot.gather("velocity_limit")
-        self._fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
+        self.fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
         self._lost = np.zeros(self._n, dtype=bool)
-        self._rate = torque_rates(options.torque_rate, effort)
+        self.rate = torque_rates(options.torque_rate, effort)
         self._q = station.start_posture
         torques = station.law.linearization.relative_degree > 1
         self.mode = ControlMode.TORQUE if torques else ControlMode.VELOCITY
@@ -166,6 +134,9 @@ class Drive:
         missed = number - self._tick
         if missed < 0:
             return  # an old one
+        if missed * self.period > LARGEST_GAP:
+            self.lose(f"the robot's clock jumped by {missed * self.period:.3g} s")
+            return
         state = self._believed(self._state(status), missed + 1)
         self._bridge(state, missed, status)
         if missed > self._options.bridged:
@@ -178,6 +149,10 @@ class Drive:
         self.root.SetTime(self.time)
         wanted = self._wanted()
         values, clipped = self._within_limits(wanted)
+        if not np.isfinite(values).all():
+            self.root.SetTime(before)
+            self.lose("the controller wants what is no finite number")
+            return
         faulty = self._station.controller.fault(self._station.blocks, self.root)
         if faulty and self._stopping is None:
             self._stopping, self._stop_time = _FAULT, self.time
@@ -185,7 +160,7 @@ class Drive:
         age = time.perf_counter() - received
         self._sent = values
         self.root.SetTime(before)
-        self._advance(_Tick(age, missed, clipped, int(status.robot_mode), values))
+        self._advance(DrivenTick(age, missed, clipped, int(status.robot_mode), values))
         self._last_state, self._last_torque = state, status.torque
         self._look(status, state)
 
@@ -207,8 +182,8 @@ class Drive:
             return True
         if self._stopping is None:
             return False
-        long = self.time - self._stop_time > _LONGEST_STOP
-        return long or self._resting * self.period > _RESTED
+        long = self.time - self._stop_time > LONGEST_STOP
+        return long or self._resting * self.period > RESTED
 
     def lose(self, why: str) -> None:
         """End at once: there is no robot that would hear.
@@ -247,7 +222,7 @@ class Drive:
         n = self._n
         with np.errstate(invalid="ignore"):
             step = np.abs(state[:n] - self._last_state[:n])
-            jumped = (step > self._fastest * self.period * ticks + _LEAST_JUMP) & ~self._lost
+            jumped = (step > self.fastest * self.period * ticks + LEAST_JUMP) & ~self._lost
         if self._tick > 0 and jumped.any():
             joint = int(np.flatnonzero(jumped)[0])
             self._lost |= jumped
@@ -274,9 +249,9 @@ class Drive:
         """Return what is sent, and in how many joints that is less."""
         if self.mode is ControlMode.VELOCITY:
             return wanted, 0
-        values = np.clip(wanted, -self._limit, self._limit)
+        values = np.clip(wanted, -self.limit, self.limit)
         if self._sent is not None:
-            most = self._rate * self.period
+            most = self.rate * self.period
             values = self._sent + np.clip(values - self._sent, -most, most)
         return values, int(np.count_nonzero(np.abs(values - wanted) > 1e-9))
 
@@ -289,9 +264,9 @@ class Drive:
                 (1.0 - share) * self._last_torque + share * status.torque,
             )
             held = np.zeros(self._n) if self._sent is None else self._sent
-            self._advance(_Tick(np.nan, 1, 0, int(status.robot_mode), held))
+            self._advance(DrivenTick(np.nan, 1, 0, int(status.robot_mode), held))
 
-    def _advance(self, tick: _Tick) -> None:
+    def _advance(self, tick: DrivenTick) -> None:
         self.record.ticks.append(tick)
         # beyond the tick, so that it is logged with what was measured at it
         self._simulator.AdvanceTo((self._tick + 0.5) * self.period)
