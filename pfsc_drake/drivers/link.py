@@ -28,6 +28,10 @@ class _End:
         self.lcm, self.dialect = lcm, dialect
         self._data: bytes | None = None
 
+    def leave(self) -> None:
+        """Leave the bus: what comes from now on is not heard, and costs no time."""
+        del self.lcm
+
     def _listen(self, channel: str) -> None:
         self.lcm.Subscribe(channel, self._keep)
 
