@@ -122,6 +122,10 @@ def drive_command(
         float,
         typer.Option(metavar="SHARE", help="Of the reference's speed, 0.01 to 1.5: slower first."),
     ] = 1.0,
+    native: Annotated[
+        bool,
+        typer.Option("--native", help="Let the controller drive in C, compiled with gcc first."),
+    ] = False,
     overrides: Overrides = None,
     duration: Duration = None,
     figures: Figures = True,
@@ -154,6 +158,7 @@ def drive_command(
                 recording=recording,
                 progress=progress,
                 override=override,
+                native=native,
                 dry_run=(lambda first: _print_first(console, first)) if dry_run else None,
             )
         if outcome is None:

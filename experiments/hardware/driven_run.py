@@ -16,6 +16,8 @@ from diagrams.scenario.driven import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import RestCheck, check_at_rest, listen
 from experiments.hardware.drive import Drive, DriveOptions, run_drive
+from experiments.hardware.native_project import PRIORITY, check_native, write_native
+from experiments.hardware.native_run import repeat_drive, run_native
 from experiments.preparation import PreparedRun, naming, settle
 from experiments.scenario_file import ScenarioFile
 from pfsc_drake.checks import require_between
@@ -30,7 +32,7 @@ from reporting.processes import noticed_interruption
 from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
-_PRIORITY = 50
+NATIVE = "native"  # folder of a controller in C, beside the results
 _LEAST_OVERRIDE, _LARGEST_OVERRIDE = 0.01, 1.5
 _MEASURED = "all signals, those of the tool and the path too, follow from what the robot measured"
 
@@ -125,6 +127,7 @@ def drive_scenario(
     progress: ProgressListener,
     dry_run: Callable[[FirstCommand], None] | None = None,
     override: float = 1.0,
+    native: bool = False,
 ) -> RunOutcome | None:
     """Drive a robot by a scenario, and write everything that a run leaves into a folder.
 
@@ -138,6 +141,7 @@ def drive_scenario(
         progress: Told how far it is.
         dry_run: Told the first command in place of the robot; nothing is sent or written then.
         override: Share of its speed that the reference has.
+        native: Whether the controller is to do it in C.
 
     Returns:
         What the run left; None of a dry run.
@@ -149,6 +153,7 @@ def drive_scenario(
     inputs = scenario.inputs()
     if dry_run is None:
         check_folder(out, "run", inputs)
+    address = check_native(end, out / NATIVE) if native else None
     prepared = prepare_driven(
         scenario, duration, recording=recording, progress=progress, override=override
     )
@@ -166,20 +171,33 @@ def drive_scenario(
     if dry_run is not None:
         dry_run(FirstCommand(drive.mode.name or "", first))
         return None
+    project = None
+    if address is not None:
+        project = write_native(scenario, prepared, drive, options, end.dialect, out / NATIVE)
+        project.compile(progress)
+        end.leave()
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         progress.expect(prepared.settings.duration)
-        with steady_clock(), real_time_priority():
-            result = run_drive(
-                drive, end, options, prepared.settings.duration, interrupted, progress
-            )
         attributes = {"driven": f"over LCM, {end.dialect.name}"}
+        duration, further = prepared.settings.duration, drive.record.add_to
+        if project is None or address is None:
+            with steady_clock(), real_time_priority():
+                result = run_drive(drive, end, options, duration, interrupted, progress)
+        else:
+            left = run_native(project, address, duration, interrupted, progress)
+            repeated = repeat_drive(
+                left, lambda gone: Drive(station, gone, options), end.dialect, options, progress
+            )
+            result, further = repeated.result, repeated.add_to
+            attributes["driven"] += ", by the controller in C"
+            prepared.warnings.extend([*left.said, *repeated.comparison.warnings])
         run = FinishedRun(
             prepared,
             scenario.name,
             result,
             attributes=attributes,
-            further=drive.record.add_to,
+            further=further,
             simulated=False,
         )
         return write_outcome(
@@ -192,7 +210,7 @@ def real_time_priority() -> Iterator[bool]:
     """Let this process go before others, where that is allowed; tell whether it is."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         allowed = True
     except OSError:
         allowed = False
