@@ -78,9 +78,11 @@ class _Search:
             (system, int(i)): source.get_output_port(o)
             for (system, i), (source, o) in station.diagram.connection_map().items()
         }
-        name, port = station.measured
-        measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
-        self._inputs: dict[str, OutputPort] = {"joint_state": measured}
+        self._inputs: dict[str, OutputPort] = dict(station.part.told)
+        if not self._inputs:
+            name, port = station.measured
+            measured = station.diagram.GetSubsystemByName(name).GetOutputPort(port)
+            self._inputs["joint_state"] = measured
         self._wiring = Wiring()
 
     def part(self) -> ControllerPart:

@@ -126,13 +126,17 @@ def drive_command(
         float,
         typer.Option(metavar="SHARE", help="Of the reference's speed at first, 0.01 to 1.5."),
     ] = 1.0,
+    native: Annotated[
+        bool,
+        typer.Option("--native", help="Let the controller drive in C, compiled with gcc first."),
+    ] = False,
     overrides: Overrides = None,
     duration: Duration = None,
     figures: Figures = True,
     recording: Recording = True,
 ) -> None:
     """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
-    from experiments.hardware.driven_run import check_scenario, drive_scenario
+    from experiments.hardware.driven_run import check_scenario, drive_scenario, real_time_priority
     from experiments.hardware.keys import KEYS, DriveKeys, pressed_keys
     from pfsc_drake.drivers.link import ControllerEnd
     from pfsc_drake.drivers.messages import dialect
@@ -142,7 +146,9 @@ def drive_command(
         loaded = read_scenario(scenario, overrides or [])
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_driven"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
-        end = ControllerEnd(open_bus(lcm), dialect(driver))
+        # the thread of LCM that hears goes first, too
+        with real_time_priority():
+            end = ControllerEnd(open_bus(lcm), dialect(driver))
         console = Console()
         if move and not check:
             raise InputError(f"--move {move:g}: without --check; allowed: together with it")
@@ -168,6 +174,7 @@ def drive_command(
                 progress=progress,
                 override=override,
                 asked=lambda share: keys.requests(pressed(), share),
+                native=native,
                 dry_run=(lambda first: _print_first(console, first)) if dry_run else None,
             )
         if outcome is None:

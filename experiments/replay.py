@@ -127,8 +127,8 @@ def compile_replay(folder: Path, progress: ProgressListener, optimization: str =
     for source in sources:
         size = source.stat().st_size / 1e6
         progress(0.0, f"compiling {source.name}, {size:.1f} MB")
-        _make(folder, source.with_suffix(".o").name, options)
-    _make(folder, "replay", options)
+        make(folder, source.with_suffix(".o").name, options)
+    make(folder, "replay", options)
 
 
 def replay_log(folder: Path, log: Path, progress: ProgressListener) -> Commands:
@@ -279,7 +279,17 @@ def _fed(folder: Path, inputs: np.ndarray, size: int) -> np.ndarray:
         return np.fromfile(made).reshape(len(inputs), size)
 
 
-def _make(folder: Path, target: str, options: list[str]) -> None:
+def make(folder: Path, target: str, options: Sequence[str] = ()) -> None:
+    """Let make build a target.
+
+    Args:
+        folder: With the Makefile.
+        target: What.
+        options: Variables of the Makefile, ``NAME=value``.
+
+    Raises:
+        InputError: If there is no make or compiler, or either says anything.
+    """
     lacking = missing_tool()
     if lacking is not None:
         raise InputError(f"{folder}: cannot be compiled: there is no {lacking} here")

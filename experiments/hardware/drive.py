@@ -22,13 +22,15 @@ from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
 # after which a robot that is to stop is left alone, and how long it rests before [s]
-_LONGEST_STOP, _RESTED = 2.0, 0.2
+LONGEST_STOP, RESTED = 2.0, 0.2
 _FAULT = "a fault"
 # a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
-_FASTER, _LEAST_SPEED = 1.5, 0.2
+FASTER, LEAST_SPEED = 1.5, 0.2
 # beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
-_TWICE, _FASTEST, _LEAST_JUMP = 2.0, 10.0, 2e-3
-_PACE, _SECOND = "reference_generator.pace", 1000
+_TWICE, _FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
+# ticks that are missing for longer are none of a robot's: its clock was set [s]
+LARGEST_GAP = 1.0
+PACE, _SECOND = "reference_generator.pace", 1000
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,16 @@ class Drive:
 
     Attributes:
         period: Sampling time [s].
+        mode: What the robot is commanded by.
+        limit: Largest torques that are sent [Nm or N], shape (N,).
+        rate: How fast they may change [Nm/s or N/s], shape (N,).
+        fastest: Speeds that no joint can have [rad/s or m/s], shape (N,).
         record: What happened.
         fault: Why it ended, or None.
         override: Share of its planned pace at which the reference is to move.
+        fastest_pace: Largest share of the planned pace.
         motion_time: How far it is in the time of the motion as planned [s].
+        has_motion: Whether the reference moves by itself, not because a hand leads the tool.
     """
 
     def __init__(
@@ -93,11 +101,11 @@ class Drive:
         self._n, self.period = robot.dimension, station.controller.period
         self._weight = gravity_function(robot)
         effort = robot.gather("effort_limit")
-        self._limit = options.effort_share * effort
+        self.limit = options.effort_share * effort
         speed = robot.gather("velocity_limit")
-        self._fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
+        self.fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
         self._lost = np.zeros(self._n, dtype=bool)
-        self._rate = torque_rates(options.torque_rate, effort)
+        self.rate = torque_rates(options.torque_rate, effort)
         self._q = station.start_posture
         self.mode = command_mode(station)
         self._simulator = Simulator(station.diagram)
@@ -110,13 +118,12 @@ class Drive:
         self._resting = 0
         self.record = DriveRecord()
         self.fault: str | None = None
-        self._fastest_pace, plan = LARGEST_OVERRIDE, station.task.drive_plan
+        self.fastest_pace, plan = LARGEST_OVERRIDE, station.task.drive_plan
         if plan is not None:
             r = station.law.linearization.relative_degree
-            self._fastest_pace = min(LARGEST_OVERRIDE, plan.fastest_pace(r))
-        self.override, self.motion_time = min(override, self._fastest_pace), 0.0
-        # a tool that is led by hand has no motion of its own
-        self._has_motion = not isinstance(station.task, SpaceTask)
+            self.fastest_pace = min(LARGEST_OVERRIDE, plan.fastest_pace(r))
+        self.override, self.motion_time = min(override, self.fastest_pace), 0.0
+        self.has_motion = not isinstance(station.task, SpaceTask)
 
     @property
     def root(self) -> Context:
@@ -158,6 +165,9 @@ class Drive:
         missed = number - self._tick
         if missed < 0:
             return  # an old one
+        if missed * self.period > LARGEST_GAP:
+            self.lose(f"the robot's clock jumped by {missed * self.period:.3g} s")
+            return
         state = self._believed(self._state(status), missed + 1)
         self._bridge(state, missed, status)
         if missed > self._options.bridged:
@@ -170,6 +180,10 @@ class Drive:
         self.root.SetTime(self.time)
         wanted = self._wanted()
         values, clipped = self._within_limits(wanted)
+        if not np.isfinite(values).all():
+            self.root.SetTime(before)
+            self.lose("the controller wants what is no finite number")
+            return
         faulty = self._station.controller.fault(self._station.blocks, self.root)
         if faulty and self._stopping is None:
             self._begin_stop(_FAULT)
@@ -190,7 +204,7 @@ class Drive:
             request: What.
         """
         if request.override is not None:
-            self.override = min(request.override, self._fastest_pace)
+            self.override = min(request.override, self.fastest_pace)
             self._part.set_override(self.root, self.override)
         if request.stop:
             self.stop("asked to stop")
@@ -227,7 +241,7 @@ class Drive:
     def _begin_stop(self, why: str) -> None:
         n = self._n
         self._stopping, self._stop_time = why, self.time
-        self._stop_speed = _FASTER * np.nanmax(np.abs(self._last_state[n : 2 * n])) + _LEAST_SPEED
+        self._stop_speed = FASTER * np.nanmax(np.abs(self._last_state[n : 2 * n])) + LEAST_SPEED
 
     @property
     def has_ended(self) -> bool:
@@ -236,8 +250,8 @@ class Drive:
             return True
         if self._stopping is None:
             return False
-        long = self.time - self._stop_time > _LONGEST_STOP
-        return long or self._resting * self.period > _RESTED
+        long = self.time - self._stop_time > LONGEST_STOP
+        return long or self._resting * self.period > RESTED
 
     def lose(self, why: str) -> None:
         """End at once: there is no robot that would hear.
@@ -276,7 +290,7 @@ class Drive:
         n = self._n
         with np.errstate(invalid="ignore"):
             step = np.abs(state[:n] - self._last_state[:n])
-            jumped = (step > self._fastest * self.period * ticks + _LEAST_JUMP) & ~self._lost
+            jumped = (step > self.fastest * self.period * ticks + LEAST_JUMP) & ~self._lost
         if self._tick > 0 and jumped.any():
             joint = int(np.flatnonzero(jumped)[0])
             self._lost |= jumped
@@ -303,9 +317,9 @@ class Drive:
         """Return what is sent, and in how many joints that is less."""
         if self.mode is ControlMode.VELOCITY:
             return wanted, 0
-        values = np.clip(wanted, -self._limit, self._limit)
+        values = np.clip(wanted, -self.limit, self.limit)
         if self._sent is not None:
-            most = self._rate * self.period
+            most = self.rate * self.period
             values = self._sent + np.clip(values - self._sent, -most, most)
         return values, int(np.count_nonzero(np.abs(values - wanted) > 1e-9))
 
@@ -329,7 +343,8 @@ class Drive:
         q_0, v_0 = np.split(self._last_state, 4)[:2]
         q_1, v_1 = np.split(state, 4)[:2]
         rest = 1.0 - share
-        ways = (share**2 * (3.0 - 2.0 * share), span * share * rest**2, span * share**2 * rest)
+        square = share * share
+        ways = (square * (3.0 - 2.0 * share), span * share * (rest * rest), span * square * rest)
         rates = (6.0 * share * rest / span, rest * (1.0 - 3.0 * share), share * (1.0 - 3.0 * rest))
         q = q_0 + ways[0] * (q_1 - q_0) + ways[1] * v_0 - ways[2] * v_1
         v = rates[0] * (q_1 - q_0) + rates[1] * v_0 + rates[2] * v_1
@@ -344,9 +359,9 @@ class Drive:
 
     def _pace(self) -> float:
         """Return the pace of the reference, as its filter has it."""
-        if not self._has_motion:
+        if not self.has_motion:
             return 1.0
-        return float(self._station.blocks.state(self.root, _PACE)[1])
+        return float(self._station.blocks.state(self.root, PACE)[1])
 
     def _look(self, status: RobotStatus, state: np.ndarray) -> None:
         """End where the robot does not do any more what it is told."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydrake.lcm import DrakeLcm
 
 from diagrams.builder import build_station, draw_station
 from diagrams.integration import Integration
@@ -17,6 +18,8 @@ from diagrams.scenario.schema import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import check_ready, listen
 from experiments.hardware.drive import Drive, DriveOptions, command_mode
+from experiments.hardware.native_project import PRIORITY, check_native, write_native
+from experiments.hardware.native_run import Operator, repeat_drive, run_native
 from experiments.hardware.slow_motion import move_slowly
 from experiments.hardware.statics import StaticCheck, check_statics
 from experiments.preparation import PreparedRun, naming, settle
@@ -24,7 +27,7 @@ from experiments.scenario_file import ScenarioFile
 from experiments.simulation import SimulationResult
 from pfsc_drake.checks import require_between
 from pfsc_drake.drivers.driver_rules import check_mode
-from pfsc_drake.drivers.link import ControllerEnd
+from pfsc_drake.drivers.link import ControllerEnd, RequestEnd
 from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.errors import InputError
 from pfsc_drake.robot.serial.chain import SerialChain
@@ -35,7 +38,7 @@ from reporting.processes import noticed_interruption
 from reporting.progress import ProgressListener
 
 _FIRST_STATUS = 5.0  # s
-_PRIORITY = 50
+NATIVE = "native"  # folder of a controller in C, beside the results
 _LEAST_OVERRIDE = 0.01
 # how often who watches is told [s]
 _TOLD = 0.05
@@ -137,6 +140,7 @@ def drive_scenario(
     dry_run: Callable[[FirstCommand], None] | None = None,
     override: float = 1.0,
     asked: Callable[[float], list[Request]] = lambda _: [],
+    native: bool = False,
 ) -> RunOutcome | None:
     """Drive a robot by a scenario, and write everything that a run leaves into a folder.
 
@@ -151,6 +155,7 @@ def drive_scenario(
         dry_run: Told the first command in place of the robot; nothing is sent or written then.
         override: Share of its planned pace at which the reference moves at first.
         asked: Returns what a person has asked for since the last time, given the override.
+        native: Whether the controller is to do it in C.
 
     Returns:
         What the run left; None of a dry run.
@@ -163,6 +168,7 @@ def drive_scenario(
     inputs = scenario.inputs()
     if dry_run is None:
         check_folder(out, "run", inputs)
+    address = check_native(end, out / NATIVE) if native else None
     prepared = prepare_driven(scenario, duration, recording=recording, progress=progress)
     station, options = prepared.station, DriveOptions()
     drive = Drive(station, end, options, override)
@@ -182,20 +188,41 @@ def drive_scenario(
     if dry_run is not None:
         dry_run(FirstCommand(drive.mode.name or "", first))
         return None
+    project, url = None, ""
+    if address is not None:
+        project = write_native(scenario, prepared, drive, options, end.dialect, out / NATIVE)
+        project.compile(progress)
+        url = end.lcm.get_lcm_url()
+        end.leave()
     with noticed_interruption() as interrupted, open_results(out, "run", inputs) as results:
         results.write("scenario.yaml", prepared.text)
         progress.expect(prepared.settings.duration)
-        with steady_clock(), real_time_priority():
-            result = run_drive(
-                drive, end, options, prepared.settings.duration, interrupted, progress, asked
-            )
         attributes = {"driven": f"over LCM, {end.dialect.name}"}
+        duration, further = prepared.settings.duration, drive.record.add_to
+        if project is None or address is None:
+            with steady_clock(), real_time_priority():
+                result = run_drive(drive, end, options, duration, interrupted, progress, asked)
+        else:
+            operator = Operator(
+                RequestEnd(DrakeLcm(url)), asked, drive.override, drive.fastest_pace
+            )
+            left = run_native(project, address, duration, interrupted, progress, operator)
+            repeated = repeat_drive(
+                left,
+                lambda gone: Drive(station, gone, options, override),
+                end.dialect,
+                options,
+                progress,
+            )
+            result, further = repeated.result, repeated.add_to
+            attributes["driven"] += ", by the controller in C"
+            prepared.warnings.extend([*left.said, *repeated.comparison.warnings])
         run = FinishedRun(
             prepared,
             scenario.name,
             result,
             attributes=attributes,
-            further=drive.record.add_to,
+            further=further,
             simulated=False,
         )
         return write_outcome(
@@ -251,7 +278,7 @@ def real_time_priority() -> Iterator[bool]:
     """Let this process go before others, where that is allowed; tell whether it is."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         allowed = True
     except OSError:
         allowed = False

@@ -327,4 +327,8 @@ def link_metrics(log: RunLog) -> Metrics:
     metrics.add("link_answer_us_p99", float(p99))
     metrics.add("missed_ticks", int(np.isnan(log["status_age"].values).sum()))
     metrics.add("clipped_ticks", int(np.count_nonzero(log["clipped"].values)))
+    if "sent_difference" in log:
+        difference = log["sent_difference"]
+        largest = float(difference.values.max(initial=0.0))
+        metrics.add("largest_sent_difference", largest, difference.unit)
     return metrics

@@ -108,7 +108,7 @@ def write_project(
         InputError: If something has no translation to C.
     """
     written = controller.write(folder)
-    for file in sorted(_HARNESS.iterdir()):
+    for file in sorted(file for file in _HARNESS.iterdir() if file.is_file()):
         written.append(Path(shutil.copyfile(file, folder / file.name)))
     if recorded is not None:
         written.append(folder / LOG)

@@ -38,6 +38,10 @@ class _End:
         self.lcm, self.dialect = lcm, dialect
         self._data: bytes | None = None
 
+    def leave(self) -> None:
+        """Leave the bus: what comes from now on is not heard, and costs no time."""
+        del self.lcm
+
     def _listen(self, channel: str) -> None:
         self.lcm.Subscribe(channel, self._keep)
 
@@ -50,8 +54,44 @@ class _End:
                 return
 
 
-class ControllerEnd(_End):
-    """The controller's end: it hears the robot's status and sends commands.
+class RequestEnd:
+    """The end of whom people and pages ask for something, and who tells them how far it is.
+
+    Args:
+        lcm: The bus.
+    """
+
+    def __init__(self, lcm: DrakeLcmInterface) -> None:
+        self.lcm = lcm
+        self._requests: list[Request] = []
+        lcm.Subscribe(REQUEST_CHANNEL, self._keep_request)
+
+    def listen(self) -> None:
+        """Hear what has come, without waiting."""
+        while self.lcm.HandleSubscriptions(0):
+            pass
+
+    def requests(self) -> list[Request]:
+        """Return what has been asked for since the last time, the oldest first."""
+        asked, self._requests = self._requests, []
+        return asked
+
+    def tell(self, utime: int, values: Mapping[str, float]) -> None:
+        """Tell whoever watches how far it is.
+
+        Args:
+            utime: The robot's clock [us].
+            values: Numbers by name.
+        """
+        self.lcm.Publish(PROGRESS_CHANNEL, encode_values(utime, values))
+
+    def _keep_request(self, data: bytes) -> None:
+        with suppress(*_UNREADABLE):
+            self._requests.append(Request.of(decode_values(data)))
+
+
+class ControllerEnd(_End, RequestEnd):
+    """The controller's end: it hears the robot's status and requests, and sends commands.
 
     Args:
         lcm: The bus.
@@ -62,12 +102,11 @@ class ControllerEnd(_End):
     """
 
     def __init__(self, lcm: DrakeLcmInterface, dialect: Dialect) -> None:
-        super().__init__(lcm, dialect)
+        _End.__init__(self, lcm, dialect)
+        RequestEnd.__init__(self, lcm)
         self.wrench: np.ndarray | None = None
-        self._requests: list[Request] = []
         self._listen(dialect.status_channel)
         lcm.Subscribe(FORCE_TORQUE_CHANNEL, self._keep_wrench)
-        lcm.Subscribe(REQUEST_CHANNEL, self._keep_request)
 
     def receive(self, timeout: float) -> RobotStatus | None:
         """Return the newest status that has not been returned, or None if none comes in time.
@@ -95,27 +134,9 @@ class ControllerEnd(_End):
         """
         self.lcm.Publish(self.dialect.command_channel, self.dialect.encode_command(command))
 
-    def requests(self) -> list[Request]:
-        """Return what has been asked for since the last time, the oldest first."""
-        asked, self._requests = self._requests, []
-        return asked
-
-    def tell(self, utime: int, values: Mapping[str, float]) -> None:
-        """Tell whoever watches how far it is.
-
-        Args:
-            utime: The robot's clock [us].
-            values: Numbers by name.
-        """
-        self.lcm.Publish(PROGRESS_CHANNEL, encode_values(utime, values))
-
     def _keep_wrench(self, data: bytes) -> None:
         with suppress(*_UNREADABLE):
             self.wrench = decode_wrench(data)
-
-    def _keep_request(self, data: bytes) -> None:
-        with suppress(*_UNREADABLE):
-            self._requests.append(Request.of(decode_values(data)))
 
 
 class WatchingEnd(_End):

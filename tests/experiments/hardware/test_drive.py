@@ -220,6 +220,27 @@ def test_what_is_measured_is_watched():
     assert np.rad2deg(np.abs(loop.robot.status().q - before)).max() < 5.0
 
 
+def test_a_clock_that_is_set_ends_it():
+    """A second is not made up for tick by tick."""
+    loop = Loop(panda()).begin().run(0.4)
+    shift = 1_001_000
+    loop.run(1.0, lambda status: changed(utime=status.utime + shift)(status))
+    assert loop.fault == "the robot's clock jumped by 1 s"
+    assert len(loop.log().time) == 400
+
+
+def test_what_is_no_number_is_not_sent(monkeypatch):
+    loop = Loop(panda()).begin().run(0.1)
+    loop.robot_end.hear()
+    monkeypatch.setattr(loop.drive, "_wanted", lambda: np.full(7, np.nan))
+    loop.robot.tell()
+    loop.drive.answer(loop.end.receive(0.0))
+    assert loop.robot_end.hear() is None
+    assert loop.drive.has_ended
+    assert loop.fault == "the controller wants what is no finite number"
+    assert len(loop.log().time) == 100
+
+
 def test_a_command_of_another_kind_ends_the_robots_driver():
     loop = Loop(panda()).begin().run(0.3)
     loop.end.send(RobotCommand(loop.robot.utime, ControlMode.VELOCITY, np.zeros(7)))

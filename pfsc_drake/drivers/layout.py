@@ -1,0 +1,113 @@
+"""Where a driver's messages have what a controller in C reads and writes."""
+
+import struct
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pfsc_drake.drivers.messages import (
+    ControlMode,
+    Dialect,
+    RobotCommand,
+    RobotMode,
+    RobotStatus,
+    encode_wrench,
+)
+
+# every message begins with eight bytes that tell its type; then comes the time
+_TYPE = slice(0, 8)
+_COUNT = 16  # where a status has the number of its joints
+
+
+@dataclass(frozen=True)
+class StatusLayout:
+    """A status of N joints as bytes.
+
+    Attributes:
+        size: How many.
+        fingerprint: The first eight, its type.
+        q: Where its positions begin, as big-endian doubles one after the other.
+        v: Its velocities.
+        torque: Its torques.
+        torque_sign: 1, or -1 where it tells them with the opposite sign.
+        robot_mode: Its robot mode, one byte; None if it tells none.
+        control_mode: What it is commanded by, one byte; None if it tells none.
+    """
+
+    size: int
+    fingerprint: bytes
+    q: int
+    v: int
+    torque: int
+    torque_sign: int
+    robot_mode: int | None
+    control_mode: int | None
+
+    @classmethod
+    def of(cls, dialect: Dialect, joints: int) -> "StatusLayout":
+        """Find where a dialect writes what.
+
+        Args:
+            dialect: The dialect.
+            joints: Number N of joints.
+        """
+        q, v, torque = np.split(1.0 + np.arange(3 * joints), 3)
+        status = RobotStatus(0, q, v, torque, RobotMode.OTHER, ControlMode.NONE)
+        data = dialect.encode_status(status)
+        assert struct.unpack_from(">i", data, _COUNT) == (joints,)
+        sign = 1 if _doubles(torque) in data else -1
+        return cls(
+            len(data),
+            data[_TYPE],
+            data.index(_doubles(q)),
+            data.index(_doubles(v)),
+            data.index(_doubles(sign * torque)),
+            sign,
+            _changed(dialect, status, replace(status, robot_mode=RobotMode.MOVE)),
+            _changed(dialect, status, replace(status, control_mode=ControlMode.TORQUE)),
+        )
+
+
+@dataclass(frozen=True)
+class CommandLayout:
+    """A command to N joints as bytes.
+
+    Attributes:
+        message: All of it, its time and what is commanded being zero.
+        values: Where that begins, as big-endian doubles one after the other.
+    """
+
+    message: bytes
+    values: int
+
+    @classmethod
+    def of(cls, dialect: Dialect, mode: ControlMode, joints: int) -> "CommandLayout":
+        """Find where a dialect writes what is commanded.
+
+        Args:
+            dialect: The dialect.
+            mode: What is commanded.
+            joints: Number N of joints.
+        """
+        values = 1.0 + np.arange(joints)
+        data = dialect.encode_command(RobotCommand(0, mode, values))
+        zero = dialect.encode_command(RobotCommand(0, mode, 0.0 * values))
+        return cls(zero, data.index(_doubles(values)))
+
+
+def wrench_layout() -> tuple[int, bytes]:
+    """Return the size of a force sensor's message, and the bytes that tell its type."""
+    data = encode_wrench(0, np.zeros(6))
+    return len(data), data[_TYPE]
+
+
+def _doubles(values: np.ndarray) -> bytes:
+    return struct.pack(f">{len(values)}d", *values)
+
+
+def _changed(dialect: Dialect, status: RobotStatus, other: RobotStatus) -> int | None:
+    """Return the one byte in which two statuses differ, None if they do not."""
+    one, two = (np.frombuffer(dialect.encode_status(s), np.uint8) for s in (status, other))
+    places = np.flatnonzero(one != two)
+    assert len(places) <= 1
+    return int(places[0]) if len(places) else None

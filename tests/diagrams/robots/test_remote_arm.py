@@ -1,0 +1,41 @@
+"""What a controller of a robot elsewhere is told, and that it is a network like any other."""
+
+import pytest
+from diagrams.scenario.driven import driven
+
+from diagrams.builder import build_station
+from diagrams.controller_part import controller_part
+from experiments.scenario_file import find_scenario
+from tests.scenarios import shipped_scenario
+
+
+def elastic(state, sides):
+    settings = shipped_scenario("pfc_elastic_6r")
+    settings.controller.state, settings.encoders.sides = state, sides
+    return settings
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (shipped_scenario("pfc_panda_7r"), {"joint_state": 28, "stop_request": 1}),
+        (
+            elastic("from_torque", "motor_and_torque"),
+            {"joint_state": 24, "stop_request": 1, "joint_torque": 6},
+        ),
+        # the observer of the springs is the controller's own
+        (elastic("observed", "motor"), {"joint_state": 24, "stop_request": 1}),
+        (
+            shipped_scenario("pfc_compliant_6r"),
+            {"joint_state": 24, "stop_request": 1, "measured_wrench": 6},
+        ),
+    ],
+    ids=["rigid", "torques", "motors", "forces"],
+)
+def test_what_a_controller_is_told(settings, told):
+    settings, folder = driven(settings)[0], find_scenario("pfc_panda_7r").parent
+    settings.simulation.fused = False
+    station = build_station(settings, folder, remote=True)
+    part = controller_part(station)
+    assert {name: port.size for name, port in part.network.inputs.items()} == told
+    assert part.inputs["joint_state"].get_system() is station.part.measured

@@ -1,0 +1,71 @@
+"""Where messages have what: other numbers put there are those that Drake's types read."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from pfsc_drake.drivers.layout import CommandLayout, StatusLayout, wrench_layout
+from pfsc_drake.drivers.messages import (
+    ControlMode,
+    RobotCommand,
+    RobotMode,
+    RobotStatus,
+    decode_wrench,
+    dialect,
+    encode_wrench,
+)
+
+RANDOM = np.random.default_rng(0)
+MODES = [
+    ("panda", ControlMode.TORQUE),
+    ("panda", ControlMode.VELOCITY),
+    ("iiwa", ControlMode.TORQUE),
+]
+
+
+def doubles(values):
+    return struct.pack(f">{len(values)}d", *values)
+
+
+@pytest.mark.parametrize("kind", ["panda", "iiwa"])
+@pytest.mark.parametrize("joints", [1, 6, 7])
+def test_a_status(kind, joints):
+    spoken = dialect(kind)
+    layout = StatusLayout.of(spoken, joints)
+    zeros = np.zeros(joints)
+    data = bytearray(spoken.encode_status(RobotStatus(0, zeros, zeros, zeros)))
+    assert len(data) == layout.size
+    assert data[:8] == layout.fingerprint
+    q, v, torque = RANDOM.normal(size=(3, joints))
+    data[8:16] = struct.pack(">q", 77)
+    for place, values in ((layout.q, q), (layout.v, v), (layout.torque, torque)):
+        data[place : place + 8 * joints] = doubles(values)
+    found = spoken.decode_status(bytes(data))
+    assert found.utime == 77
+    np.testing.assert_array_equal([found.q, found.v], [q, v])
+    np.testing.assert_array_equal(found.torque, layout.torque_sign * torque)
+    if kind == "panda":
+        data[layout.robot_mode], data[layout.control_mode] = 3, 1
+        found = spoken.decode_status(bytes(data))
+        assert (found.robot_mode, found.control_mode) == (RobotMode.GUIDING, ControlMode.POSITION)
+    else:
+        assert (layout.robot_mode, layout.control_mode) == (None, None)
+
+
+@pytest.mark.parametrize(("kind", "mode"), MODES)
+@pytest.mark.parametrize("joints", [1, 6, 7])
+def test_a_command(kind, mode, joints):
+    spoken, values = dialect(kind), RANDOM.normal(size=joints)
+    layout = CommandLayout.of(spoken, mode, joints)
+    data = bytearray(layout.message)
+    data[8:16] = struct.pack(">q", 78)
+    data[layout.values : layout.values + 8 * joints] = doubles(values)
+    assert bytes(data) == spoken.encode_command(RobotCommand(78, mode, values))
+
+
+def test_a_force_sensors_reading():
+    wrench, (size, fingerprint) = RANDOM.normal(size=6), wrench_layout()
+    data = encode_wrench(5, wrench)
+    assert (len(data), data[:8]) == (size, fingerprint)
+    np.testing.assert_array_equal(decode_wrench(fingerprint + data[8:16] + doubles(wrench)), wrench)
