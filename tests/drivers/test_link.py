@@ -5,8 +5,17 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from pfsc_drake.drivers.link import ControllerEnd, RobotEnd
-from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotStatus, dialect
+from pfsc_drake.drivers.messages import (
+    FORCE_TORQUE_CHANNEL,
+    ControlMode,
+    RobotCommand,
+    RobotStatus,
+    dialect,
+    encode_wrench,
+)
 
+STATUS = RobotStatus(7, *np.arange(21.0).reshape(3, 7))
+COMMAND = RobotCommand(7, ControlMode.TORQUE, np.arange(7.0))
 WRENCH = np.array([1.0, -2.0, 3.0, 0.1, -0.2, 0.3])
 
 
@@ -68,3 +77,28 @@ def test_what_cannot_be_read_is_as_good_as_lost(ends):
     robot.tell(status(1000))
     controller.send(command(1000))
     assert controller.receive(0.0).utime == robot.hear().utime == 1000
+
+
+@pytest.mark.parametrize("kind", ["panda", "iiwa"])
+@pytest.mark.parametrize("left", [0, 7, 15, 50, -1])
+def test_what_is_cut_off_is_as_good_as_lost(kind, left):
+    lcm, spoken = DrakeLcm("memq://"), dialect(kind)
+    controller, robot = ControllerEnd(lcm, spoken), RobotEnd(lcm, spoken)
+    lcm.Publish(spoken.status_channel, spoken.encode_status(STATUS)[:left])
+    lcm.Publish(spoken.command_channel, spoken.encode_command(COMMAND)[:left])
+    lcm.Publish(FORCE_TORQUE_CHANNEL, encode_wrench(7, np.arange(6.0))[:left])
+    assert robot.hear() is None
+    assert controller.receive(0.0) is None
+    assert controller.wrench is None
+    robot.tell(STATUS, np.arange(6.0))
+    controller.send(COMMAND)
+    assert controller.receive(0.0).utime == robot.hear().utime == 7
+    np.testing.assert_array_equal(controller.wrench, np.arange(6.0))
+
+
+def test_who_has_left_a_bus_hears_nothing_more():
+    lcm, spoken = DrakeLcm("memq://"), dialect("panda")
+    controller = ControllerEnd(lcm, spoken)
+    controller.leave()
+    with pytest.raises(AttributeError, match="lcm"):
+        controller.receive(0.0)
