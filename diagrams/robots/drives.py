@@ -337,10 +337,9 @@ def _given_coefficients(
     if parameters.file:
         file = parameters.file
         known = load_parameters(folder / file if FilePath(file).suffix else file).friction
-        if known.coulomb.size < n:
-            raise InputError(
-                f"{block}.file: {file}: friction of {known.coulomb.size} joints; the robot has {n}"
-            )
+        count = known.coulomb.size
+        if count < n:
+            raise InputError(f"{block}.file: {file}: friction of {count} joints; the robot has {n}")
         return known.coulomb[:n], known.viscous[:n]
     values = []
     for key in ("f_c", "f_v"):

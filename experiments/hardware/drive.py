@@ -1,7 +1,6 @@
 """A controller that drives a robot by messages: one tick for each status that comes."""
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -11,9 +10,21 @@ from diagrams.robots.remote_arm import RemoteArm
 from diagrams.station import Station
 from diagrams.tasks.space_guidance import SpaceTask
 from experiments.hardware.check import AT_REST, check_first
+from experiments.hardware.drive_options import (
+    FASTER,
+    FASTEST,
+    LARGEST_GAP,
+    LEAST_JUMP,
+    LEAST_SPEED,
+    LONGEST_STOP,
+    PACE,
+    RESTED,
+    TWICE,
+    DriveOptions,
+    command_mode,
+)
 from experiments.hardware.drive_record import DrivenTick, DriveRecord
 from experiments.simulation import SimulationResult
-from pfsc_drake.checks import require_positive
 from pfsc_drake.drivers.driver_rules import torque_rates
 from pfsc_drake.drivers.link import ControllerEnd
 from pfsc_drake.drivers.messages import ControlMode, RobotCommand, RobotMode, RobotStatus
@@ -21,48 +32,8 @@ from pfsc_drake.drivers.remote_values import LARGEST_OVERRIDE, Request
 from pfsc_drake.robot.robot_model import gravity_function
 
 _US = 1e6
-# after which a robot that is to stop is left alone, and how long it rests before [s]
-LONGEST_STOP, RESTED = 2.0, 0.2
 _FAULT = "a fault"
-# a stop that makes the robot faster than this is none: a multiple of its speed, and more [rad/s]
-FASTER, LEAST_SPEED = 1.5, 0.2
-# beyond what a joint can move: a multiple of its speed, that of unknown ones, and noise
-_TWICE, _FASTEST, LEAST_JUMP = 2.0, 10.0, 2e-3
-# ticks that are missing for longer are none of a robot's: its clock was set [s]
-LARGEST_GAP = 1.0
-PACE, _SECOND = "reference_generator.pace", 1000
-
-
-@dataclass(frozen=True)
-class DriveOptions:
-    """What a controller allows itself on a robot.
-
-    Attributes:
-        silence: How long no status may come [s].
-        bridged: How many ticks may be missing in a row and are made up for.
-        torque_rate: Largest rate of commanded torques, as drivers have it [Nm/s].
-        effort_share: Largest share of a joint's effort limit.
-    """
-
-    silence: float = 0.1
-    bridged: int = 10
-    torque_rate: float = 1000.0
-    effort_share: float = 0.95
-
-    def __post_init__(self) -> None:
-        require_positive("silence", self.silence)
-        require_positive("torque_rate", self.torque_rate)
-        require_positive("effort_share", self.effort_share)
-
-
-def command_mode(station: Station) -> ControlMode:
-    """Return what a station's law commands a robot by.
-
-    Args:
-        station: The station.
-    """
-    torques = station.law.linearization.relative_degree > 1
-    return ControlMode.TORQUE if torques else ControlMode.VELOCITY
+_SECOND = 1000  # ticks
 
 
 class Drive:
@@ -103,7 +74,7 @@ class Drive:
         effort = robot.gather("effort_limit")
         self.limit = options.effort_share * effort
         speed = robot.gather("velocity_limit")
-        self.fastest = _TWICE * np.where(np.isfinite(speed), speed, _FASTEST)
+        self.fastest = TWICE * np.where(np.isfinite(speed), speed, FASTEST)
         self._lost = np.zeros(self._n, dtype=bool)
         self.rate = torque_rates(options.torque_rate, effort)
         self._q = station.start_posture

@@ -17,7 +17,8 @@ from diagrams.scenario import Scenario
 from diagrams.scenario.schema import driven
 from experiments.finished_run import FinishedRun, RunOutcome, steady_clock, write_outcome
 from experiments.hardware.check import check_ready, listen
-from experiments.hardware.drive import Drive, DriveOptions, command_mode
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import DriveOptions, command_mode
 from experiments.hardware.native_project import PRIORITY, check_native, write_native
 from experiments.hardware.native_run import Operator, repeat_drive, run_native
 from experiments.hardware.slow_motion import move_slowly

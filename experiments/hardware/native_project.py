@@ -13,7 +13,8 @@ from diagrams.builder import build_station
 from diagrams.controller_part import controller_part
 from diagrams.robots.remote_arm import RemoteArm
 from experiments.hardware.check import AT_REST, AT_START
-from experiments.hardware.drive import (
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import (
     FASTER,
     LARGEST_GAP,
     LEAST_JUMP,
@@ -21,7 +22,6 @@ from experiments.hardware.drive import (
     LONGEST_STOP,
     PACE,
     RESTED,
-    Drive,
     DriveOptions,
 )
 from experiments.hardware.native_record import RecordFormat

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.lcm import DrakeLcm
 
-from experiments.hardware.drive import Drive, DriveOptions
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.drive_record import DrivenTick
 from experiments.hardware.native_project import NativeProject
 from experiments.hardware.native_record import STOPS

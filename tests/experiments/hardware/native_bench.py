@@ -9,7 +9,8 @@ from pydrake.lcm import DrakeLcm
 
 from diagrams.robot_station import build_robot_station
 from diagrams.scenario import Scenario
-from experiments.hardware.drive import Drive, DriveOptions
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.driven_run import prepare_driven
 from experiments.hardware.native_project import write_native
 from experiments.hardware.native_run import NativeRun, repeat_drive

@@ -7,7 +7,8 @@ from pydrake.lcm import DrakeLcm
 from diagrams.builder import build_station
 from diagrams.robot_station import build_robot_station
 from diagrams.scenario.schema import driven
-from experiments.hardware.drive import Drive, DriveOptions
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.robot import SimulatedRobot, Transport
 from experiments.results.run_signals import collect_log
 from experiments.scenario_file import find_scenario

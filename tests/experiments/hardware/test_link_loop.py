@@ -8,7 +8,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from experiments.hardware import robot as robot_module
 from experiments.hardware.check import check_first
-from experiments.hardware.drive import DriveOptions
+from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.driven_run import run_drive
 from experiments.hardware.robot import run_robot
 from pfsc_drake.drivers.messages import ControlMode, RobotMode, RobotStatus

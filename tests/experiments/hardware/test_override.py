@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.hardware.drive import Drive, DriveOptions
+from experiments.hardware.drive import Drive
+from experiments.hardware.drive_options import DriveOptions
 from experiments.hardware.keys import DriveKeys, pressed_keys
 from pfsc_drake.drivers.driver_rules import DriverOptions
 from pfsc_drake.drivers.link import WatchingEnd
