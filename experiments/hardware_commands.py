@@ -71,6 +71,7 @@ def robot_command(
 ) -> None:
     """Be the robot of a scenario: plant, friction, sensors and a driver's rules, in real time."""
     from diagrams.scenario import Scenario
+    from experiments.hardware.driven_run import real_time_priority
     from experiments.hardware.robot import Transport
     from experiments.hardware.robot_run import run_robot_scenario
     from pfsc_drake.drivers.driver_rules import DriverOptions
@@ -88,7 +89,8 @@ def robot_command(
         expiry = messages.expiry if expire is None else expire
         options = DriverOptions(expiry, low_pass, damping=damping)
         transport = Transport(lose, delay)
-        end = RobotEnd(open_bus(lcm), messages)
+        with real_time_priority():
+            end = RobotEnd(open_bus(lcm), messages)
         console = Console()
         run_robot_scenario(
             loaded,

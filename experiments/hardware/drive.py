@@ -343,4 +343,5 @@ class Drive:
             why = self._stopping if self._stopping != _FAULT else self.result(1.0).fault
             self.lose(f"{why}; the stop made the robot faster, and was left to its driver")
             self._end.send(RobotCommand(status.utime, self.mode, np.zeros(self._n)))
-        self._resting = 0 if speed > AT_REST else self._resting + 1
+        # a joint whose speed is no number does not tell that it rests
+        self._resting = self._resting + 1 if speed <= AT_REST else 0

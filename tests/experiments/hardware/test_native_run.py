@@ -74,7 +74,7 @@ def test_lost_packets_and_what_comes_twice(panda, told):
         (lambda s: {"q": s.q + 0.05 * (np.arange(7) == 3)}, "joint 4 jumped by 2.8", "faster"),
         (lambda s: {"q": np.where(np.arange(7) == 2, np.nan, s.q)}, "not a finite numb", "faster"),
         (lambda s: {"v": np.where(np.arange(7) == 2, np.inf, s.v)}, "not a finite numb", "faster"),
-        (lambda s: {"v": np.where(np.arange(7) == 2, np.nan, s.v)}, "not a finite numb", "rested"),
+        (lambda s: {"v": np.where(np.arange(7) == 2, np.nan, s.v)}, "not a finite numb", "record"),
         (lambda s: {"robot_mode": RobotMode.REFLEX}, "the robot went into mode REFLEX", "mode"),
         (lambda s: {"utime": s.utime + 1_500_000}, "the robot's clock jumped by 1.5 s", "clock"),
         (lambda s: {"utime": s.utime + 30_000}, "no status of the robot for 30 ms", "faster"),

@@ -258,7 +258,7 @@ int drive_answer(
     if (speed > drive->stop_speed) {
         drive->end = DRIVE_FASTER;
     }
-    drive->resting = speed > DRIVE_AT_REST ? 0 : drive->resting + 1;
+    drive->resting = speed <= DRIVE_AT_REST ? drive->resting + 1 : 0;
     return 1;
 }
 
