@@ -20,8 +20,8 @@ help:
 	@echo "make test-all   the same with these; as continuous integration runs it"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
-	@echo "make signals    write docs/signals.md anew from reporting/registry.toml"
-	@echo "make architecture  draw docs/architecture.svg anew"
+	@echo "make signals    write docs/reference/signals.md anew from reporting/registry.toml"
+	@echo "make architecture  draw docs/images/architecture.svg anew"
 	@echo "make models     write the robot models anew from their parameters"
 
 setup: $(VENV)/.installed
@@ -75,7 +75,7 @@ benchmark: setup
 
 # the page of signals, metrics and figures
 signals: setup
-	$(BIN)/python -m reporting.registry > docs/signals.md
+	$(BIN)/python -m reporting.registry > docs/reference/signals.md
 
 # the picture of what imports what
 architecture: setup

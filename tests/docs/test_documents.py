@@ -99,8 +99,8 @@ def test_commands(command: Command, desk: Path) -> None:
 
 
 def _guidance_rows() -> Iterator[tuple[str, tuple[str, ...]]]:
-    """The rows of docs/fixtures.md: a scenario, and letters that stand for changes."""
-    text = (ROOT / "docs/fixtures.md").read_text(encoding="utf-8")
+    """The rows of docs/howto/fixtures.md: a scenario, and letters that stand for changes."""
+    text = (ROOT / "docs/howto/fixtures.md").read_text(encoding="utf-8")
     letters = dict(re.findall(r"^    ([A-Z])   (--set .*)$", text, re.MULTILINE))
     for name, said in re.findall(r"\| `(\w+)`((?: [A-Z])*) \|", text):
         changes = shlex.split(" ".join(letters[letter] for letter in said.split()))
