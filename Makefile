@@ -11,7 +11,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
 PFSC_TESTS ?= quick
 SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 
-.PHONY: help setup demo test test-all lint types unit fuzz benchmark models signals architecture clean
+.PHONY: help setup demo test test-all lint types unit fuzz benchmark models docs signals architecture clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
@@ -20,6 +20,7 @@ help:
 	@echo "make test-all   the same with these; as continuous integration runs it"
 	@echo "make fuzz       try wrong input for FUZZ_SECONDS=$(FUZZ_SECONDS) or until something is found"
 	@echo "make benchmark  measure the controller tick"
+	@echo "make docs       build the site in out/site, its notebooks executed"
 	@echo "make signals    write docs/reference/signals.md anew from reporting/registry.toml"
 	@echo "make architecture  draw docs/images/architecture.svg anew"
 	@echo "make models     write the robot models anew from their parameters"
@@ -31,7 +32,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 		{ echo "Python 3.11 or newer is needed; found $$($(PYTHON) --version). Try: make PYTHON=python3.11"; exit 1; }
 	@echo "Setting up $(VENV); downloads about 500 MB the first time ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[experiments,sweep,dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[experiments,sweep,docs,dev]'
 	@touch $@
 
 demo: setup
@@ -72,6 +73,12 @@ fuzz: setup
 benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
 	$(BIN)/python -m tests.benchmarks.paces
+
+# warnings are errors; executed notebooks are kept in out/notebooks
+docs: setup
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -d out/doctrees docs out/site
+	$(BIN)/python -m docs.making.links out/site
+	@echo "Open out/site/index.html"
 
 # the page of signals, metrics and figures
 signals: setup

@@ -31,6 +31,7 @@ MADE: dict[str, Callable[[], str]] = {
 
 project = "pfsc_drake"
 author = "the pfsc_drake authors"
+copyright = author
 release = version
 extensions = [
     "myst_nb",
@@ -42,7 +43,14 @@ extensions = [
 exclude_patterns = ["making", "**/.ipynb_checkpoints"]
 default_role = "code"
 
-myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = [
+    "amsmath",
+    "attrs_block",
+    "attrs_inline",
+    "colon_fence",
+    "deflist",
+    "dollarmath",
+]
 myst_heading_anchors = 4
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "out" / "notebooks")

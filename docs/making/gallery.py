@@ -8,7 +8,10 @@ import yaml
 from docs.making.text import as_markdown
 
 ROOT = Path(__file__).resolve().parents[2]
-_FOLDERS = {"scenarios": ROOT / "experiments" / "scenarios", "pictures": ROOT / "docs/images/gallery"}
+_FOLDERS = {
+    "scenarios": ROOT / "experiments" / "scenarios",
+    "pictures": ROOT / "docs/images/gallery",
+}
 _KINDS = {
     "pfc": "Paths",
     "sfc": "Surfaces",

@@ -1,6 +1,6 @@
 """Links of a built site: each leads to a page, a place on it, or a file that is there.
 
-    python -m docs.making.links out/site
+python -m docs.making.links out/site
 """
 
 import sys

@@ -25,7 +25,8 @@ _SEVERAL = {
 # in brackets stand units, and examples of lists
 _BRACKETS = re.compile(r" ?\[([^\[\]]*)\]")
 _WORD = re.compile(r"[A-Za-z%]+")
-_UNITS = set("m mm s ms kg N Nm J W V A rad deg Hz Pa K or and".split())
+_WORDS_OF_UNITS = "m mm s ms kg N Nm J W V A rad deg Hz Pa K or and"
+_UNITS = set(_WORDS_OF_UNITS.split())
 _HEAD = ["Key", "Type", "Unit", "Default", "Meaning"]
 
 
@@ -65,11 +66,12 @@ def unit_and_meaning(text: str, name: str) -> tuple[str, str]:
         text: What the docstring says of an attribute.
         name: Its name; ``_deg`` at the end is a unit, too.
     """
+    if text.startswith("["):  # the unit stands for all that is to be said
+        text = f"{name.replace('_', ' ').capitalize()} {text}"
     units = [unit for unit in _BRACKETS.findall(text) if set(_WORD.findall(unit)) <= _UNITS]
     units = [unit for unit in units if _WORD.search(unit)]
     if len(units) == 1:
-        rest = text.replace(f" [{units[0]}]", "").replace(f"[{units[0]}]", "")
-        return units[0], rest[:1].upper() + rest[1:] if rest else rest
+        return units[0], text.replace(f" [{units[0]}]", "")
     return (" or ".join(units) or ("deg" if name.endswith("_deg") else "")), text
 
 
