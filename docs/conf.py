@@ -55,6 +55,7 @@ myst_heading_anchors = 4
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "out" / "notebooks")
 nb_execution_timeout = 300
+nb_execution_in_temp = True  # what they write is no part of the sources
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
