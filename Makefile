@@ -11,7 +11,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
 PFSC_TESTS ?= quick
 SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 
-.PHONY: help setup demo test test-all lint types unit fuzz benchmark models docs signals architecture clean
+.PHONY: help setup demo test test-all lint types unit fuzz benchmark models docs signals architecture results gallery clean
 
 help:
 	@echo "make setup      create $(VENV) and install the project with its tools"
@@ -23,6 +23,8 @@ help:
 	@echo "make docs       build the site in out/site, its notebooks executed"
 	@echo "make signals    write docs/reference/signals.md anew from reporting/registry.toml"
 	@echo "make architecture  draw docs/images/architecture.svg anew"
+	@echo "make results    run all shipped scenarios and write the table of docs/results.md"
+	@echo "make gallery    draw docs/images/gallery/ and the README's picture anew; needs Chromium"
 	@echo "make models     write the robot models anew from their parameters"
 
 setup: $(VENV)/.installed
@@ -87,6 +89,15 @@ signals: setup
 # the picture of what imports what
 architecture: setup
 	$(BIN)/python -m docs.architecture
+
+# every shipped scenario under every law that it has targets for; what was run at this revision is kept
+results: setup
+	$(BIN)/python -m docs.results
+
+# pictures of recordings, drawn by a browser without a window
+gallery: setup
+	$(BIN)/python -m docs.pictures
+	$(BIN)/python -m docs.pictures --film
 
 models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer
