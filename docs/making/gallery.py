@@ -42,7 +42,7 @@ def first_sentence(text: str) -> str:
 
 
 def _card(file: Path) -> str:
-    data = yaml.safe_load(_untagged(file.read_text(encoding="utf-8")))
+    data = yaml.load(_untagged(file.read_text(encoding="utf-8")), Loader=yaml.CSafeLoader)
     section = f" ({data['section']})" if data.get("section") else ""
     lines = [f":::{{grid-item-card}} `{file.stem}`"]
     pictures = [_FOLDERS["pictures"] / f"{file.stem}{suffix}" for suffix in (".webp", ".png")]

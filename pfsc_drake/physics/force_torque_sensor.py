@@ -26,9 +26,9 @@ class ForceTorqueParameters:
     amplifier are assumed.
 
     Attributes:
-        measurement_range: Largest magnitude that is measured, shape (6,).
-        bias: Reading without load, shape (6,).
-        noise: Standard deviation of the white noise of one sample, shape (6,).
+        measurement_range: Largest magnitude that is measured, shape (6,) [N, Nm].
+        bias: Reading without load, shape (6,) [N, Nm].
+        noise: Standard deviation of the white noise of one sample, shape (6,) [N, Nm].
         bandwidth: Bandwidth of the amplifier's first-order filter [Hz].
         seed: Seed of the noise.
     """

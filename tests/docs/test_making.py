@@ -18,6 +18,8 @@ from docs.making.interface import interface
 from docs.making.scenario_keys import scenario_keys, unit_and_meaning
 from docs.making.text import as_markdown, attribute, cell
 from experiments.scenario_file import scenario_names
+from reporting.registry import SIGNALS
+from tests.docs.documents import ROOT
 
 
 def _classes(kind: object) -> set[type]:
@@ -121,3 +123,14 @@ def test_every_name_of_the_doors_is_told() -> None:
         for name in getattr(module, "__all__", []):
             if name[0] != "_":
                 assert f":: {module.__name__}.{name}" in page
+
+
+def test_symbols_of_the_glossary_are_signals() -> None:
+    page = (ROOT / "docs/reference/glossary.md").read_text(encoding="utf-8")
+    named = {
+        name
+        for row in page.split("## Symbols")[1].splitlines()
+        if len(row.split("|")) > 2
+        for name in re.findall(r"`(\w+)`", row.split("|")[2])
+    }
+    assert {"eta", "tau_J"} <= named <= set(SIGNALS)
