@@ -37,20 +37,22 @@ def shortened(text: str, length: int = 60) -> str:
     return f"{text[: length - 3 - tail]}...{text[len(text) - tail :]}"
 
 
-def did_you_mean(word: object, known: Iterable[str]) -> str:
+def did_you_mean(word: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return ``did you mean 'elastic'? ``, or nothing if no word is near.
 
     Args:
         word: What was written.
         known: Words that are known.
+        cutoff: How near a word must be, from 0 to 1.
     """
     text, words = str(word), list(known)
     if len(text) > max(map(len, words), default=0) + 20:  # near to none, and long to compare
         return ""
-    nearest = difflib.get_close_matches(text, words, n=1)
+    nearest = difflib.get_close_matches(text, words, n=1, cutoff=cutoff)
     if not nearest:  # capitals are no other word
         small = {name.lower(): name for name in words}
-        nearest = [small[name] for name in difflib.get_close_matches(text.lower(), small, n=1)]
+        found = difflib.get_close_matches(text.lower(), small, n=1, cutoff=cutoff)
+        nearest = [small[name] for name in found]
     return f"did you mean {nearest[0]!r}? " if nearest else ""
 
 
