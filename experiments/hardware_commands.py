@@ -17,6 +17,7 @@ from experiments.command_options import (
     Figures,
     Lcm,
     Overrides,
+    Quiet,
     Recording,
     ScenarioName,
     open_bus,
@@ -130,6 +131,7 @@ def drive_command(
     duration: Duration = None,
     figures: Figures = True,
     recording: Recording = True,
+    quiet: Quiet = False,
 ) -> None:
     """Drive a robot by a scenario: Ctrl-C brings it to rest. This is no safety function."""
     from experiments.hardware.driven_run import check_scenario, drive_scenario
@@ -143,7 +145,7 @@ def drive_command(
         folder = expand_home(out) if out is not None else Path("out") / f"{loaded.name}_driven"
         logging.getLogger("drake").setLevel(logging.CRITICAL)
         end = ControllerEnd(open_bus(lcm), dialect(driver))
-        console = Console()
+        console = Console(quiet=quiet)
         if move and not check:
             raise InputError(f"--move {move:g}: without --check; allowed: together with it")
         if check:

@@ -30,6 +30,13 @@ def standard_attributes(scenario_name: str) -> dict[str, str]:
     return {"scenario": scenario_name, "git_revision": git_revision(), **versions}
 
 
+def version_line() -> str:
+    """Return versions and revision in one line, as ``--version`` tells them."""
+    known = standard_attributes("")
+    libraries = f"Drake {known['drake_version']}, CasADi {known['casadi_version']}"
+    return f"{_PROGRAM} {known['pfsc_drake_version']}, {libraries}, git {known['git_revision']}"
+
+
 def git_revision(root: Path = PROJECT_ROOT) -> str:
     """Revision of the clone in ``root``.
 

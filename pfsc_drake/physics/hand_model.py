@@ -10,6 +10,7 @@ from pfsc_drake.blocks.cases import where
 from pfsc_drake.errors import InputError, require
 from pfsc_drake.physics.hand_way import HandWay, OrientationTarget, Place, rotation_vector
 from pfsc_drake.physics.scripted_force import FRAMES, smooth_step
+from pfsc_drake.yaml.typed import equal
 
 
 @dataclass
@@ -25,8 +26,8 @@ class Wander:
         longest: Longest time between them [s].
     """
 
-    low: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    high: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    low: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=equal(3))
+    high: np.ndarray = field(default_factory=lambda: np.zeros(3), metadata=equal(3))
     begin: float = 0.0
     end: float = 1.0
     shortest: float = 0.2
