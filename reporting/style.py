@@ -5,7 +5,6 @@ from functools import cache
 from io import BytesIO
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
@@ -15,8 +14,6 @@ from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
-
-matplotlib.use("Agg")
 
 # Okabe and Ito's palette: told apart with any colour vision, and in this order by lightness.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
@@ -80,6 +77,10 @@ class Figure:
     title: str
     caption: str
     png: bytes
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return the picture for a notebook, and how wide it is shown [pixels]."""
+        return self.png, {"width": round(WIDTH * DPI / 2)}
 
 
 @dataclass
