@@ -18,9 +18,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # what users import, and the modules that are loaded when they do
 _DOOR = {
+    "Margins": "experiments.studies.margins.told",
     "Run": "experiments.kept_run",
     "Scenario": "diagrams.scenario",
     "load": "experiments.kept_run",
+    "margins": "experiments.api",
     "run": "experiments.api",
 }
 

@@ -1,4 +1,4 @@
-"""Runs from scripts and notebooks, as the command line makes them."""
+"""Runs and margins from scripts and notebooks, as the command line makes them."""
 
 import logging
 import math
@@ -15,10 +15,14 @@ from rich.console import Console
 
 from diagrams.scenario import Scenario
 from experiments.kept_run import Run, load
+from experiments.preparation import naming
 from experiments.scenario_file import ScenarioFile, apply_change, expand_home, read_scenario
 from experiments.simulated_run import run_scenario
+from experiments.studies.margins.analysis import analyse
+from experiments.studies.margins.box import ErrorBox
+from experiments.studies.margins.told import Margins
 from pfsc_drake.errors import InputError, WriteError
-from pfsc_drake.yaml.typed import typed_data
+from pfsc_drake.yaml.typed import load_typed, typed_data
 from reporting.notebook import NotebookProgress, in_notebook
 from reporting.progress import ProgressDisplay
 
@@ -86,6 +90,37 @@ def run(
     return result
 
 
+def margins(
+    scenario: str | Path | Scenario,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    mass: float = 0.05,
+    stiffness: float = 0.05,
+    rotor: float = 0.0,
+    tool: float = 0.1,
+    quiet: bool = False,
+) -> Margins:
+    """Tell what the sampled loop of a scenario bears, before anything moves.
+
+    Args:
+        scenario: As of :func:`run`.
+        changes: As of :func:`run`.
+        mass: Relative error of masses and inertias to be borne.
+        stiffness: Relative error of joint stiffnesses to be borne.
+        rotor: Relative error of rotor inertias to be borne.
+        tool: Error of the tool's mass to be borne [kg].
+        quiet: Whether to show no progress.
+
+    Raises:
+        InputError: If the scenario or an argument is wrong; one line.
+    """
+    loaded, box = _read(scenario, changes or {}), ErrorBox(mass, stiffness, rotor, tool)
+    with _only_own_words(), _progress(loaded.name, None, quiet, paced=False) as progress:
+        settings = load_typed(Scenario, loaded.data, str(loaded.path))
+        with naming(loaded.path):
+            return Margins(loaded.name, analyse(settings, loaded.path.parent, box, progress))
+
+
 def _read(scenario: str | Path | Scenario, changes: Mapping[str, Any]) -> ScenarioFile:
     """Return a scenario with changes."""
     if isinstance(scenario, Scenario):
@@ -114,12 +149,14 @@ def _silence() -> Iterator[_Silence]:
 
 
 def _progress(
-    title: str, duration: float | None, quiet: bool
+    title: str, duration: float | None, quiet: bool, *, paced: bool = True
 ) -> AbstractContextManager[NotebookProgress | ProgressDisplay | _Silence]:
     """Return what shows progress here."""
     if quiet:
         return _silence()
-    return NotebookProgress(title) if in_notebook() else ProgressDisplay(Console(), title, duration)
+    if in_notebook():
+        return NotebookProgress(title)
+    return ProgressDisplay(Console(), title, duration, paced=paced)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """What a notebook shows of results: short tables, recordings in frames, how far a run is."""
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -28,9 +29,9 @@ def show_html(content: str) -> None:
     Args:
         content: The HTML.
     """
-    from IPython.display import HTML, display
+    from IPython.display import display
 
-    display(HTML(content))
+    display(_bundle(content), raw=True)
 
 
 def page_frame(page: Path, height: int, title: str) -> str:
@@ -71,19 +72,21 @@ def short_table(
     rest = [name for name in metrics if name not in chosen]
     lines = [f"<b>{escape(title)}</b>: {escape('; '.join(ends) or 'completed')}"]
     lines += [f"⚠ {escape(warning)}" for warning in warnings]
-    folded = (
-        f"<details><summary>{len(rest)} more metrics</summary>{_table(metrics, rest)}</details>"
-    )
-    return (
-        "".join(f"<div>{line}</div>" for line in lines)
-        + _table(metrics, chosen)
-        + (folded if rest else "")
-    )
+    summary = f"<summary>{len(rest)} more metrics</summary>"
+    folded = f"<details>{summary}{metrics_table(metrics, rest)}</details>" if rest else ""
+    told = "".join(f"<div>{line}</div>" for line in lines)
+    return told + metrics_table(metrics, chosen) + folded
 
 
-def _table(metrics: Mapping[str, Metric], names: Sequence[str]) -> str:
+def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = None) -> str:
+    """Return metrics with their targets, as HTML.
+
+    Args:
+        metrics: The metrics.
+        names: Names of those that are shown; by default all.
+    """
     head = "<tr><th>Metric</th><th>Value</th><th>Target</th></tr>"
-    rows = "".join(_row(name, metrics[name]) for name in names)
+    rows = "".join(_row(name, metrics[name]) for name in (metrics if names is None else names))
     return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
 
 
@@ -94,7 +97,8 @@ def _row(name: str, metric: Metric) -> str:
         comparison, number = metric.bound
         target = escape(f"{comparison} {format_quantity(number, metric.unit)}")
     value = escape(format_quantity(metric.value, metric.unit) or NOT_A_NUMBER)
-    target = f"{target} {_MARKS[metric.passed]}".strip()
+    mark = _MARKS[metric.passed] if math.isfinite(metric.value) else ""  # else there was nothing
+    target = f"{target} {mark}".strip()
     return (
         f"<tr{meaning}><td><code>{escape(name)}</code></td><td>{value}</td><td>{target}</td></tr>"
     )
@@ -115,9 +119,9 @@ class NotebookProgress:
         self._line: Any = None
 
     def __enter__(self) -> Self:
-        from IPython.display import HTML, display
+        from IPython.display import display
 
-        self._line = display(HTML(""), display_id=True)
+        self._line = display(_bundle(""), raw=True, display_id=True)
         return self
 
     def __exit__(
@@ -149,6 +153,9 @@ class NotebookProgress:
         self._show(f"{bar} {escape(self._title)}: {escape(phase)}{time}")
 
     def _show(self, content: str) -> None:
-        from IPython.display import HTML
+        self._line.update(_bundle(content), raw=True)
 
-        self._line.update(HTML(content))
+
+def _bundle(content: str) -> dict[str, str]:
+    """Return HTML as the kernel sends it; as text there is nothing to see."""
+    return {"text/html": content, "text/plain": ""}

@@ -1,6 +1,6 @@
 """How the project's figures look: colours, sizes, grid, panels, and the picture of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from io import BytesIO
 from typing import Any
@@ -76,7 +76,7 @@ class Figure:
     name: str
     title: str
     caption: str
-    png: bytes
+    png: bytes = field(repr=False)
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return the picture for a notebook, and how wide it is shown [pixels]."""

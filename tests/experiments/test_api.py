@@ -29,18 +29,20 @@ def notebook(monkeypatch):
     shown = []
 
     class Handle:
-        def update(self, content):
-            shown.append(content)
+        def update(self, content, raw):
+            assert raw
+            shown.append(content["text/html"])
 
-    def display(content, display_id=False):
-        shown.append(content)
+    def display(content, raw, display_id=False):
+        assert raw
+        shown.append(content["text/html"])
         return Handle() if display_id else None
 
     shell = type("ZMQInteractiveShell", (), {})()
     python = types.ModuleType("IPython")
     python.get_ipython, python.version_info = lambda: shell, (9, 0)
     python.display = types.ModuleType("IPython.display")
-    python.display.display, python.display.HTML = display, str
+    python.display.display = display
     monkeypatch.setitem(sys.modules, "IPython", python)
     monkeypatch.setitem(sys.modules, "IPython.display", python.display)
     return shown
