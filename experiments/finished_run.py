@@ -149,6 +149,14 @@ def write_outcome(
     drawn = figures and not interrupted()
     if drawn:
         progress(measured.end, "drawing")
+    results.tell(
+        {
+            "fault": measured.fault,
+            "missed": measured.broken,
+            "warnings": measured.warnings,
+            "interrupted": interrupted(),
+        }
+    )
     report = _report(run, measured, results, page, drawn, interrupted())
     progress(measured.end, "done")
     return RunOutcome(

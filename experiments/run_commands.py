@@ -93,8 +93,8 @@ def run_command(
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario and write log, metrics, figures, recording and report."""
-    from experiments.run import run_scenario
     from experiments.scenario_file import read_scenario
+    from experiments.simulated_run import run_scenario
 
     if scenario in (IDENTIFICATION, TEACH_IN):
         study_command(scenario, out or Path("out") / scenario, quiet)

@@ -195,12 +195,60 @@ def apply_override(data: dict[str, Any], override: str, option: str = "--set") -
     """
     source = f"{option} {shortened(override, 100)}"
     path, separator, text = override.partition("=")
+    keys = _keys(path if separator else "", source)
+    _set(data, keys, parse_yaml(text, source), source)
+
+
+def apply_change(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set one key in place to a value of Python.
+
+    Args:
+        data: Data of a scenario.
+        key: ``key.path``, as in an override.
+        value: Text, which is read as YAML as in an override, so that it may have a tag; or numbers,
+            truth values, None, and lists, arrays and mappings of these, taken as they are.
+
+    Raises:
+        InputError: If the key is malformed or goes through what is no mapping or list, or the value
+            is nothing that YAML could say.
+    """
+    source = f"change {shortened(f'{key} = {value!r}', 100)}"
+    keys = _keys(key, source)
+    _set(data, keys, _plain(value, source, len(keys)), source)
+
+
+def _plain(value: Any, source: str, depth: int) -> Any:
+    """A value of Python as YAML would give it."""
+    if isinstance(value, str):
+        return parse_yaml(value, source)
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # an array or a number of numpy
+        value = value.tolist()
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if depth < MAX_DEPTH and isinstance(value, (list, tuple)):
+        return [_plain(item, source, depth + 1) for item in value]
+    if depth < MAX_DEPTH and isinstance(value, dict):
+        return {str(key): _plain(item, source, depth + 1) for key, item in value.items()}
+    raise InputError(
+        f"{source}: of type {type(value).__name__}; allowed: text, numbers, true or false, None, "
+        f"and lists and mappings of these, up to {MAX_DEPTH} levels"
+    )
+
+
+def _keys(path: str, source: str) -> list[str]:
+    """The keys of an override, from the root on."""
     keys = path.strip().split(".")
-    if not separator or not all(keys):
+    if not all(keys):
         raise InputError(f"{source}: malformed; allowed: key.path=value")
     if len(keys) > MAX_DEPTH:
         raise InputError(f"{source}: {len(keys)} levels; allowed: up to {MAX_DEPTH}")
-    value = parse_yaml(text, source)
+    return keys
+
+
+def _set(data: dict[str, Any], keys: list[str], value: Any, source: str) -> None:
+    """Put a value at its place, making mappings that are missing on the way."""
     target: Any = data
     for depth, key in enumerate(keys):
         here = ".".join(keys[:depth]) or "the scenario"

@@ -31,7 +31,7 @@ class Outcome:
 
 
 class FakeRun:
-    """Stands in for ``experiments.run``: remembers the call, does what it is told."""
+    """Stands in for ``experiments.simulated_run``: remembers the call, does what it is told."""
 
     def __init__(self) -> None:
         self.outcome = Outcome()
@@ -52,9 +52,9 @@ class FakeRun:
 @pytest.fixture
 def fake_run(monkeypatch):
     fake = FakeRun()
-    module = types.ModuleType("experiments.run")
+    module = types.ModuleType("experiments.simulated_run")
     module.run_scenario = fake.run_scenario
-    monkeypatch.setitem(sys.modules, "experiments.run", module)
+    monkeypatch.setitem(sys.modules, "experiments.simulated_run", module)
     return fake
 
 
