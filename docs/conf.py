@@ -52,6 +52,8 @@ myst_enable_extensions = [
     "dollarmath",
 ]
 myst_heading_anchors = 4
+# cells that were not run do not say in which language they are
+suppress_warnings = ["myst-nb.lexer"]
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "out" / "notebooks")
 nb_execution_timeout = 300

@@ -11,7 +11,11 @@ import experiments.cli
 import identification.cli
 from docs.making.text import as_markdown, table
 
-_MODULES = {"experiments": experiments.cli, "identification": identification.cli}
+# what is asked for exit status, and the commands
+_PROGRAMS = {
+    "experiments": (experiments.cli, experiments.cli.make_app()),
+    "identification": (identification.cli, identification.cli.app),
+}
 _TYPES = {Path: "PATH", float: "NUMBER", int: "INTEGER"}
 _HEAD = ["Argument or option", "Default", "Meaning"]
 
@@ -19,10 +23,12 @@ _HEAD = ["Argument or option", "Default", "Meaning"]
 def command_line() -> str:
     """Return every command of both programs, with its arguments and options, as Markdown."""
     page = []
-    for program, module in _MODULES.items():
-        group: Any = typer.main.get_command(module.app)
+    for program, (module, app) in _PROGRAMS.items():
+        group: Any = typer.main.get_command(app)
         page += [f"## `python -m {program}`", _said(group.help)]
         page.append(as_markdown(_status(inspect.getdoc(module) or "")))
+        rows = [_row(parameter) for parameter in group.params if parameter.name == "version"]
+        page += [table(_HEAD, rows, "options")] if rows else []
         for name, command in group.commands.items():
             page += _section(program, name, command)
     return "\n\n".join(page)

@@ -166,8 +166,8 @@ def _words(hint: Any) -> str:
     if origin in (typing.Union, types.UnionType):
         members = [member for member in arguments if member is not type(None)]
         null = ["`null`"] if type(None) in arguments else []
-        if len(members) == 1:
-            return " or ".join([_words(members[0]), *null])
+        if not all(dc.is_dataclass(member) for member in members) or len(members) == 1:
+            return " or ".join([*map(_words, members), *null])
         return ", ".join([*(_tag(member) for member in members), *null])
     if origin is list:
         (item,) = arguments

@@ -96,11 +96,11 @@ def test_an_attribute_without_a_word_is_an_error() -> None:
 
 def test_every_command_and_option_is_told() -> None:
     page = command_line()
-    for program, module in (
-        ("experiments", experiments.cli),
-        ("identification", identification.cli),
+    for program, app in (
+        ("experiments", experiments.cli.make_app()),
+        ("identification", identification.cli.app),
     ):
-        group: typing.Any = typer.main.get_command(module.app)
+        group: typing.Any = typer.main.get_command(app)
         for name, command in group.commands.items():
             section = page.split(f"({program}-{name})=")[1].split("\n(")[0]
             for parameter in command.params:
