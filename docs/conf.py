@@ -40,7 +40,7 @@ extensions = [
     "sphinx_design",
     "sphinx-mathjax-offline",
 ]
-exclude_patterns = ["making", "**/.ipynb_checkpoints"]
+exclude_patterns = ["making", "**/out", "**/.ipynb_checkpoints"]
 default_role = "code"
 
 myst_enable_extensions = [
