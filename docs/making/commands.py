@@ -69,7 +69,7 @@ def _value(parameter: Any) -> str:
 
 def _default(parameter: Any) -> str:
     if parameter.required:
-        return "must be given"
+        return "*must be given*"
     value = parameter.default
     if value is None or value in ((), "", []) or callable(value):
         return ""

@@ -190,7 +190,7 @@ def _tag(owner: type) -> str:
 
 def _default(value: Any, hint: Any, field: dc.Field[Any]) -> str:
     if field.metadata == REQUIRED:
-        return "must be given"
+        return "*must be given*"
     if field.metadata == AUTO_OR_MANY and not value:
         return "`auto`"
     if dc.is_dataclass(value):

@@ -46,7 +46,7 @@ def test_every_key_of_a_scenario_is_told() -> None:
     [
         "| `velocity` | number | m/s | `0.1` | Largest velocity, 1e-6 to 1e3. |",
         "| `radius` | number | m | `0.15` | Radius, 1e-4 to 1e4. |",
-        "| `mass` | [block](#keys-profile) | kg or kg m^2 | must be given | `m`, positive. |",
+        "| `mass` | [block](#keys-profile) | kg or kg m^2 | *must be given* | `m`, positive. |",
         "| `stiffness` | number, or list of numbers |",
         "| `file` | file |  | empty |",
         "| `poles` | `auto`, or list of numbers |",
