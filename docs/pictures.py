@@ -60,9 +60,11 @@ MOMENTS = {
     "vf_wedge": 8.0,
 }
 _LARGEST = 60_000  # bytes of a picture
-_FINER = 2  # as many pixels are drawn in each direction as are kept
 _BACKGROUND, _SEEN = (0.86, 0.89, 0.93), 6  # colour, and how far others are from it, of 255
 _MARGIN = 0.05  # beside what is seen, as a share of it
+_SEE_THROUGH = """for (const one of Object.values(
+    viewer.scene_tree.find(["drake", "fixtures"]).children))
+  if (one.children.skin) one.children.skin.set_property("modulated_opacity", 0.4)"""
 _PATIENCE = 60.0  # s, for a recording to be loaded
 
 
@@ -74,16 +76,18 @@ class Scene:
         scenario: Its name.
         begin: Time of the run at which it begins [s].
         end: And ends [s].
+        to_tool: Whether the arm may leave the picture.
     """
 
     scenario: str
     begin: float
     end: float
+    to_tool: bool = False
 
 
 # side by side, each as fast as makes both last equally long
-SCENES = (Scene("pfc_elastic_6r", 0.0, 3.6), Scene("vf_forbidden_region", 1.0, 16.0))
-_FRAMES, _PACE, _SIDE = 90, 80, (400, 380)  # pictures, ms for each, pixels
+SCENES = (Scene("pfc_elastic_6r", 0.0, 3.6), Scene("vf_forbidden_region", 1.0, 16.0, True))
+_FRAMES, _PACE, _SIDE = 72, 100, (400, 380)  # pictures, ms for each, pixels
 
 
 class _Silent:
@@ -108,18 +112,19 @@ class View:
         self._browser = browser
         self._window = browser.open(recording.resolve().as_uri())
         self._until("window.viewer && viewer.animator.actions.length > 0")
-        browser.evaluate("viewer.animator.pause()")
+        self._evaluate("viewer.animator.pause()")
         for path in ("Axes", "Grid"):
-            browser.evaluate(f"viewer.set_property(['{path}'], 'visible', false)")
+            self._evaluate(f"viewer.set_property(['{path}'], 'visible', false)")
         for colour in ("top_color", "bottom_color"):
             what = f"['Background', '<object>'], '{colour}', {json.dumps(_BACKGROUND)}"
-            browser.evaluate(f"viewer.set_property({what})")
+            self._evaluate(f"viewer.set_property({what})")
+        self._evaluate(_SEE_THROUGH)
         self._settle()
 
     @property
     def duration(self) -> float:
         """How long the recording is [s]."""
-        return float(str(self._browser.evaluate("viewer.animator.duration")))
+        return float(str(self._evaluate("viewer.animator.duration")))
 
     def picture(self, moment: float, size: tuple[int, int]) -> Image.Image:
         """Return what is to be seen at a time.
@@ -128,21 +133,26 @@ class View:
             moment: Time of the run [s].
             size: Width and height in pixels.
         """
-        self._browser.speak_to(self._window)
-        self._browser.evaluate(f"viewer.animator.seek({moment:.4f})")
-        width, height = (_FINER * pixels for pixels in size)
-        drawn = str(self._browser.evaluate(f"viewer.capture_image({width}, {height})"))
-        image = Image.open(io.BytesIO(base64.b64decode(drawn.partition(",")[2])))
-        return image.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+        self._evaluate(f"viewer.animator.seek({moment:.4f})")
+        width, height = size
+        drawn = str(self._evaluate(f"viewer.capture_image({width}, {height})"))
+        return Image.open(io.BytesIO(base64.b64decode(drawn.partition(",")[2]))).convert("RGB")
 
-    def come_close(self, moments: Sequence[float], size: tuple[int, int]) -> None:
+    def come_close(
+        self, moments: Sequence[float], size: tuple[int, int], to_tool: bool = False
+    ) -> None:
         """Narrow the view to what is to be seen.
 
         Args:
             moments: Times at which it is [s].
             size: Width and height in pixels of the pictures that are to be taken.
+            to_tool: Whether the arm may leave the picture.
         """
+        shows = "viewer.set_property(['drake', 'visualizer'], 'visible', {})"
+        if to_tool:
+            self._evaluate(shows.format("false"))
         drawn = [np.asarray(self.picture(moment, size)).astype(int) for moment in moments]
+        self._evaluate(shows.format("true"))
         seen = np.any([abs(one - one[0, 0]).max(axis=2) > _SEEN for one in drawn], axis=0)
         rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
         if not rows.size:
@@ -152,11 +162,16 @@ class View:
         width, height = share * np.array(size)
         x, y = (low + high - (width, height)) / 2.0
         window = ", ".join(f"{value:.2f}" for value in (*size, x, y, width, height))
-        self._browser.evaluate(f"viewer.camera.setViewOffset({window})")
+        self._evaluate(f"viewer.camera.setViewOffset({window})")
+
+    def _evaluate(self, expression: str) -> object:
+        """Return what an expression of this page is; others may be open beside it."""
+        self._browser.speak_to(self._window)
+        return self._browser.evaluate(expression)
 
     def _until(self, condition: str) -> None:
         end = time.monotonic() + _PATIENCE
-        while not self._browser.evaluate(f"Boolean({condition})"):
+        while not self._evaluate(f"Boolean({condition})"):
             if time.monotonic() > end:
                 raise TimeoutError(f"the recording did not load: {self._browser.errors[:1]}")
             time.sleep(0.1)
@@ -235,7 +250,7 @@ def write_film(views: Sequence[View], file: Path) -> int:
     """
     width, height = _SIDE
     for scene, view in zip(SCENES, views, strict=True):
-        view.come_close(np.linspace(scene.begin, scene.end, 8), _SIDE)
+        view.come_close(np.linspace(scene.begin, scene.end, 8), _SIDE, scene.to_tool)
     frames = []
     for part in np.linspace(0.0, 1.0, _FRAMES):
         frame = Image.new("RGB", (width * len(views), height))
