@@ -1,7 +1,8 @@
-"""The one error raised for input that cannot be used, and how its line is worded."""
+"""The one error raised for input that cannot be used."""
 
 import difflib
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -9,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 MAX_MESSAGE = 1000  # characters
-_LONGEST_OF_SEVERAL = 240  # characters of one problem among others
+_SHORTEST_SHARE = 150  # characters of one problem among others
 _MOST_FILES = 10_000  # of a folder that is looked through for a name
 
 
@@ -84,12 +85,15 @@ def in_one_line(problems: Sequence[str]) -> str:
     if len(problems) == 1:
         return problems[0]
     told: list[str] = []
-    room = MAX_MESSAGE - 200  # for the file's name in front, and for what is left out
+    room = MAX_MESSAGE - 150  # for the file's name in front, and for what is left out
     for number, problem in enumerate(problems, start=1):
-        told.append(f"({number}) {shortened(problem, _LONGEST_OF_SEVERAL)}")
-        room -= len(told[-1]) + 2
-        if room < _LONGEST_OF_SEVERAL:
+        share = max(_SHORTEST_SHARE, room // (len(problems) - len(told)) - 7)
+        if room < share:
             break
+        if len(problem) > share:  # the nearest word tells more than all of them
+            problem = re.sub(r"(did you mean .*\?) allowed: .*", r"\1", problem)
+        told.append(f"({number}) {shortened(problem, share)}")
+        room -= len(told[-1]) + 2
     left = len(problems) - len(told)
     more = f"; and {left} more" if left else ""
     return f"{len(problems)} things are wrong: {'; '.join(told)}{more}"

@@ -128,6 +128,10 @@ class _Checker:
                 self._add(here, f"{what}: {hint}allowed: {allowed}")
             elif "words" in fields[name].metadata and isinstance(item, list):
                 self._check_words(fields[name].metadata["words"], item, here)
+            elif _takes_a_number(fields[name]) and not isinstance(item, list):
+                word = fields[name].metadata.get("empty_word")
+                single = f"a number, {word}" if word else "a number"
+                self._refuse(item, here, f"{single} or {_expected(hints[name])}")
             else:
                 self.check(hints[name], item, here)
         for name, field in fields.items():
@@ -268,6 +272,11 @@ def _is_required(field: "dataclasses.Field[Any]") -> bool:
     """Whether a key may not be left out."""
     no_default = field.default is field.default_factory is dataclasses.MISSING
     return no_default or bool(field.metadata.get("required"))
+
+
+def _takes_a_number(field: "dataclasses.Field[Any]") -> bool:
+    """Whether a number may stand for a list; see :mod:`pfsc_drake.yaml.broadcast`."""
+    return any(key in field.metadata for key in ("one_or_many", "one_for_all", "equal"))
 
 
 def _expected(schema: Any) -> str:

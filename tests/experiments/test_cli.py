@@ -1,6 +1,7 @@
 """Command line: exit status, streams and messages; the simulation itself is replaced."""
 
 import json
+import re
 import subprocess
 import sys
 import types
@@ -189,6 +190,10 @@ def test_other_exceptions_are_not_hidden(fake_run, scenario):
         (["run", "FILE", "--out", "~nobody_has_this_name/x"], "no home folder is known for ~nob"),
         (["run", "~nobody_has_this_name/x.yaml"], "no home folder is known for ~nobody"),
         (["run", "none.yaml"], "scenario file none.yaml: no such file"),
+        (["run", "identify_coma"], "did you mean 'identify_comau'?"),
+        (["study", "stifness"], "study stifness: allowed: stiffness, robustness"),
+        (["study", "stifness"], "did you mean 'stiffness'?"),
+        (["rnu", "FILE"], "Did you mean 'run'?"),
         (["run", "zzz"], "unknown scenario 'zzz'"),
     ],
 )
@@ -199,6 +204,51 @@ def test_wrong_input_is_one_line_and_status_2(fake_run, scenario, capsys, argume
     assert line.startswith("error: ")
     assert message in line
     assert fake_run.calls == []
+
+
+def test_a_file_with_nearly_that_name(scenario, capsys):
+    assert main(["run", str(scenario.with_name("my_rum.yaml"))]) == 2
+    assert error_line(capsys).endswith("my_rum.yaml: no such file; did you mean 'my_run.yaml'?\n")
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    line = capsys.readouterr().out
+    assert re.fullmatch(
+        r"pfsc_drake 0\.\S+, Drake \S+, CasADi \S+, git ([0-9a-f]{40}(\+dirty)?|unknown)\n", line
+    )
+
+
+def test_quietly_only_the_last_line(fake_run, scenario, capsys):
+    fake_run.outcome.metrics.add("max_path_deviation", 4.3e-5, "m", "< 0.05e-3")
+    fake_run.outcome.warnings = ["the joints resonate too fast"]
+    assert main(["run", str(scenario), "--quiet"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == "Open the report: somewhere/report.html\n"
+    assert captured.err == ""
+
+
+def test_quietly_errors_too(fake_run, scenario, capsys):
+    fake_run.outcome.fault = "singular"
+    assert main(["run", str(scenario), "--quiet"]) == 3
+    captured = capsys.readouterr()
+    assert captured.out == "Open the report: somewhere/report.html\n"
+    assert captured.err.startswith("fault: singular; stopped at t = ")
+    assert main(["run", "none.yaml", "--quiet"]) == 2
+    assert error_line(capsys).startswith("error: scenario file none.yaml: no such file")
+
+
+@pytest.mark.parametrize("command", ["run", "sweep", "study", "drive"])
+def test_commands_that_can_be_quiet(command, capsys):
+    assert main([command, "--help"]) == 0
+    assert "--quiet" in capsys.readouterr().out
+
+
+def test_only_a_program_of_one_word_is_completed(capsys):
+    assert main(["--help"], program="pfsc") == 0
+    assert "--install-completion" in capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert "--install-completion" not in capsys.readouterr().out
 
 
 def test_list(monkeypatch, scenario, capsys):
@@ -274,3 +324,7 @@ def test_the_identification_runs_by_its_name(monkeypatch, tmp_path, capsys):
     assert main(["run", "identify_comau", "--out", str(tmp_path / "found")]) == 0
     assert seen == [tmp_path / "found"]
     assert "one line" in capsys.readouterr().out
+    arguments = ["identify_comau", "--out", str(tmp_path / "found"), "--quiet"]
+    for command in ("run", "study"):
+        assert main([command, *arguments]) == 0
+        assert capsys.readouterr().out == f"Open the study: {tmp_path}/found/report.html\n"
