@@ -155,13 +155,15 @@ class SpaceDrawing:
         return drawing.GetInputPort("manifold_point")
 
 
-# right of who looks at the regions from their side, with the robot to the left
-_ACROSS = np.array([0.83, 0.56, 0.0])
-_NUMBER = 0.04  # height of a number against the size of all regions
+# to who looks at the regions from their side with the robot to the left, and that one's right
+_TO_VIEWER, _ACROSS = np.array([0.53, -0.79, 0.31]), np.array([0.83, 0.56, 0.0])
+_NUMBER, _OWN = 0.06, 0.4  # height of a number against the size of all regions, and of its own
 
 
 def region_numbers(skins: Sequence[np.ndarray], firsts: Sequence[int]) -> dict[int, SceneNumber]:
-    """Return the number of each region above it, by its first surface; none for a single region.
+    """Return the number of each region, by its first surface; none for a single region.
+
+    It stands where the region is next to who looks, before it.
 
     Args:
         skins: Points of all surfaces [m], each (rows, columns, 3).
@@ -174,12 +176,15 @@ def region_numbers(skins: Sequence[np.ndarray], firsts: Sequence[int]) -> dict[i
     size = float(np.linalg.norm(np.ptp(everything, axis=0)))
     middle = everything.mean(axis=0)
     azimuth = np.arctan2(middle[1], middle[0])
-    across = RotationMatrix.MakeZRotation(azimuth) @ (_ACROSS / np.linalg.norm(_ACROSS))
-    numbers, height = {}, _NUMBER * size
+    turn = RotationMatrix.MakeZRotation(azimuth).matrix()
+    view, across = (turn @ v / np.linalg.norm(v) for v in (_TO_VIEWER, _ACROSS))
+    numbers = {}
     for k, (first, end) in enumerate(pairwise([*firsts, len(clouds)])):
         points = np.concatenate(clouds[first:end])
-        top = points[points[:, 2] > points[:, 2].max() - 0.1 * height].mean(axis=0)
-        numbers[first] = SceneNumber(k + 1, top + height / 2.0 * np.eye(3)[2], across, height)
+        height = min(_NUMBER * size, _OWN * float(np.linalg.norm(np.ptp(points, axis=0))))
+        middle = points[np.argmax(points @ view)] + height / 2.0 * view
+        foot = middle - height / 2.0 * np.eye(3)[2]
+        numbers[first] = SceneNumber(k + 1, foot, across, height)
     return numbers
 
 

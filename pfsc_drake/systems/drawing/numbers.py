@@ -1,4 +1,4 @@
-"""Numbers in a scene, drawn as strokes since Meshcat knows no text."""
+"""Numbers in a scene, drawn as strokes: Meshcat knows no text, and no line but a thin one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 
-_WIDTH, _INK = 3.0, Rgba(0.1, 0.14, 0.2, 1.0)
+_INK = Rgba(0.85, 0.05, 0.3, 1.0)
+_BOLD = 0.07  # half the width of a stroke, in heights
 _PITCH = 0.85  # from one digit to the next, in heights
 # corners of a digit, across and up in heights: from the lower left one to the upper right one
 _CORNERS = np.array([[0.0, 0.0], [0.55, 0.0], [0.0, 0.5], [0.55, 0.5], [0.0, 1.0], [0.55, 1.0]])
@@ -57,6 +58,24 @@ def number_strokes(shown: SceneNumber) -> np.ndarray:
     return np.stack([points[0::2], points[1::2]])
 
 
+def number_mesh(strokes: np.ndarray, shown: SceneNumber) -> tuple[np.ndarray, np.ndarray]:
+    """Return flat bars for strokes, seen from both sides: vertices [m] (K, 3), triangles (M, 3).
+
+    Args:
+        strokes: From :func:`number_strokes`.
+        shown: The number.
+    """
+    starts, ends = strokes
+    bold = _BOLD * shown.height
+    along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
+    aside = bold * np.cross(np.cross(shown.across, [0.0, 0.0, 1.0]), along)
+    first, last = starts - bold * along, ends + bold * along
+    corners = np.stack([first - aside, last - aside, last + aside, first + aside], axis=1)
+    halves = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]])
+    triangles = 4 * np.arange(len(starts))[:, np.newaxis, np.newaxis] + halves
+    return corners.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
 def draw_number(meshcat: Meshcat, place: str, shown: SceneNumber) -> None:
     """Draw a number.
 
@@ -65,5 +84,5 @@ def draw_number(meshcat: Meshcat, place: str, shown: SceneNumber) -> None:
         place: Path of the number, which moves with what is above it.
         shown: The number.
     """
-    starts, ends = number_strokes(shown)
-    meshcat.SetLineSegments(place, starts.T, ends.T, _WIDTH, _INK)
+    vertices, triangles = number_mesh(number_strokes(shown), shown)
+    meshcat.SetTriangleMesh(place, vertices.T, triangles.T, _INK)

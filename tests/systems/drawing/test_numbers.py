@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from pfsc_drake.systems.drawing.numbers import SceneNumber, draw_number, number_strokes
+from pfsc_drake.systems.drawing.numbers import (
+    SceneNumber,
+    draw_number,
+    number_mesh,
+    number_strokes,
+)
 
 ACROSS = np.array([0.6, 0.8, 0.0])
 PLACE = np.array([1.0, -2.0, 0.5])
@@ -47,6 +52,19 @@ def test_digits_stand_side_by_side():
     four, one = strokes[:, :3], strokes[:, 3:]
     assert four[..., 0].max() < one[..., 0].min()
     assert strokes[..., 0].min() + strokes[..., 0].max() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_strokes_are_as_bold_from_either_side():
+    shown = SceneNumber(8, PLACE, ACROSS, 0.1)
+    strokes = number_strokes(shown)
+    vertices, triangles = number_mesh(strokes, shown)
+    np.testing.assert_allclose((vertices - PLACE) @ [0.8, -0.6, 0.0], 0.0, atol=1e-12)
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    np.testing.assert_allclose(normals.sum(axis=0), 0.0, atol=1e-12)
+    bold = 0.014
+    area = np.linalg.norm(normals, axis=1).sum() / 2.0
+    assert area == pytest.approx(2.0 * bold * (0.1 * length(flat(8)) + len(strokes[0]) * bold))
 
 
 def test_a_number_is_drawn_where_it_is_told():
