@@ -103,4 +103,4 @@ models: setup
 	$(BIN)/python -m pfsc_drake.robot.models.writer
 
 clean:
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) out docs/tutorials/out .pytest_cache .mypy_cache .ruff_cache

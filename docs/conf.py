@@ -19,6 +19,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPAT
 from docs.making.commands import command_line  # noqa: E402
 from docs.making.gallery import gallery  # noqa: E402
 from docs.making.interface import interface  # noqa: E402
+from docs.making.recordings import copy_recordings  # noqa: E402
 from docs.making.scenario_keys import scenario_keys  # noqa: E402
 from pfsc_drake import __version__ as version  # noqa: E402
 
@@ -57,7 +58,6 @@ suppress_warnings = ["myst-nb.lexer"]
 nb_execution_mode = "off" if os.environ.get("PFSC_NOTEBOOKS") == "off" else "cache"
 nb_execution_cache_path = str(ROOT / "out" / "notebooks")
 nb_execution_timeout = 300
-nb_execution_in_temp = True  # what they write is no part of the sources
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
@@ -104,3 +104,4 @@ def setup(app: Any) -> None:
     )
     app.connect("source-read", _fill)
     app.connect("env-get-outdated", _made_pages)
+    app.connect("build-finished", copy_recordings)

@@ -24,8 +24,8 @@ from PIL import Image
 from rich.console import Console
 
 from experiments.finished_run import RunOutcome
-from experiments.run import run_scenario
 from experiments.scenario_file import read_scenario, scenario_names
+from experiments.simulated_run import run_scenario
 from tests.experiments.live.browser import NAMES, Browser, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
