@@ -76,7 +76,7 @@ benchmark: setup
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,mean,max
 	$(BIN)/python -m tests.benchmarks.paces
 
-# warnings are errors; executed notebooks are kept in out/notebooks
+# warnings are errors; executed notebooks are kept beside what they wrote
 docs: setup
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d out/doctrees docs out/site
 	$(BIN)/python -m docs.making.links out/site
