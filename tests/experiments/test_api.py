@@ -1,6 +1,7 @@
 """Runs from scripts and notebooks: the same as of the command line, and what is said of them."""
 
 import gc
+import html
 import subprocess
 import sys
 import types
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import experiments
-from experiments import Scenario, load, run
+from experiments import Scenario, load, margins, run
 from pfsc_drake import InputError
 from reporting.provenance import PROJECT_ROOT
 
@@ -269,3 +270,21 @@ def test_a_table_of_pandas(short):
     np.testing.assert_array_equal(table["xi"].to_numpy(), short.log["xi"].values)
     assert set(table["fault", "fault"]) == {"none"}
     assert table.attrs["units"]["xi"] == "m"
+
+
+@pytest.mark.usefixtures("coarse")
+def test_margins():
+    told = margins(
+        "pfc_elastic_3r", {"reference.points": [0.96, 0.9]}, stiffness=0.0, tool=0.0, quiet=True
+    )
+    assert told.is_stable
+    assert told.is_robust
+    assert told.metrics["slowest_rate"].value == told.analysis.nominal.worst.rate < 0.0
+    assert {str(case.error) for case in told.analysis.singles} == {
+        "masses believed 5 % too low",
+        "masses believed 5 % too high",
+    }
+    assert told.figures["modes"].png.startswith(b"\x89PNG")
+    assert told.sentences[0] in html.unescape(told._repr_html_())
+    with pytest.raises(InputError, match=r"--mass 2: allowed: 0 or a fraction below 1"):
+        margins("pfc_elastic_3r", mass=2.0, quiet=True)
