@@ -9,7 +9,7 @@ def square(x, y, z, side=0.4):
     """Return an upright square, 2 by 2 points."""
     ends = np.array([-side / 2.0, side / 2.0])
     grid = np.stack(np.meshgrid(ends, [0.0], ends, indexing="ij"), axis=-1)[:, 0]
-    return grid + [x, y, z]
+    return grid + np.array([x, y, z])
 
 
 def test_a_single_region_needs_no_number():
