@@ -148,7 +148,7 @@ def run_all(
     left = [case for case in wanted if case not in outcomes]
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the processes that are started
     workers = max(1, min(count_cores(), len(left)))
-    with ProcessPoolExecutor(workers, get_context("spawn"), max_tasks_per_child=8) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         running = {pool.submit(run_case, case, duration): case for case in left}
         for ended in as_completed(running):
             case, outcome = running[ended], ended.result()
