@@ -44,7 +44,6 @@ _HEAD = (
     "deviation",
     "target",
     "further targets",
-    "times real time",
     "pace",
     "status",
 )
@@ -149,7 +148,7 @@ def run_all(
     left = [case for case in wanted if case not in outcomes]
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the processes that are started
     workers = max(1, min(count_cores(), len(left)))
-    with ProcessPoolExecutor(workers, get_context("spawn"), max_tasks_per_child=8) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         running = {pool.submit(run_case, case, duration): case for case in left}
         for ended in as_completed(running):
             case, outcome = running[ended], ended.result()
@@ -187,7 +186,7 @@ def table(wanted: Sequence[Case], outcomes: Mapping[Case, Outcome]) -> str:
     lines = [_line(_HEAD), _line(["---"] * len(_HEAD))]
     for case in wanted:
         outcome = outcomes.get(case)
-        cells = [""] * 5 + [NOT_RUN] if outcome is None else _cells(outcome)
+        cells = [""] * 4 + [NOT_RUN] if outcome is None else _cells(outcome)
         lines.append(_line([f"`{case.scenario}`", f"`{case.law}`", case.description, *cells]))
     return "\n".join(lines)
 
@@ -197,19 +196,16 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def _cells(outcome: Outcome) -> list[str]:
-    """Return what a run gave: deviation, its target, further ones, two paces, status."""
+    """Return what a run gave: deviation, its target, further ones, pace, status."""
     metrics = outcome.row.metrics
     name = next((name for name in DEVIATIONS if name in metrics), None)
     judged = {key: m for key, m in metrics.items() if m.passed is not None and key != name}
     others = [f"`{key}` {_value(m)} ({_bound(m)})" for key, m in judged.items()]
-    paces = ["", ""]
-    if "real_time_factor" in metrics:
-        factor = metrics["real_time_factor"].value
-        paces = [_rounded(factor, "1"), _rounded(outcome.pace, "s")]
+    pace = _rounded(outcome.pace, "s") if "real_time_factor" in metrics else ""
     deviation = (
         ["", ""] if name is None else [_deviation(name, metrics[name]), _bound(metrics[name])]
     )
-    return [*deviation, "; ".join(others), *paces, _status(outcome.row, metrics)]
+    return [*deviation, "; ".join(others), pace, _status(outcome.row, metrics)]
 
 
 def _deviation(name: str, metric: Metric) -> str:
