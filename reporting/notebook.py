@@ -14,6 +14,7 @@ from reporting.registry import known_metric
 
 _SHOWN = 8  # metrics of a short table
 _PARTS = 200  # of a whole, between two looks at its progress
+_CELL = 'style="text-align: left; padding: 0.1em 1.5em 0.1em 0"'
 _MARKS = {True: "✓ met", False: "✗ missed", None: ""}
 
 
@@ -85,7 +86,8 @@ def metrics_table(metrics: Mapping[str, Metric], names: Sequence[str] | None = N
         metrics: The metrics.
         names: Names of those that are shown; by default all.
     """
-    head = "<tr><th>Metric</th><th>Value</th><th>Target</th></tr>"
+    titles = ("Metric", "Value", "Target")
+    head = f"<tr>{''.join(f'<th {_CELL}>{title}</th>' for title in titles)}</tr>"
     rows = "".join(_row(name, metrics[name]) for name in (metrics if names is None else names))
     return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
 
@@ -98,10 +100,8 @@ def _row(name: str, metric: Metric) -> str:
         target = escape(f"{comparison} {format_quantity(number, metric.unit)}")
     value = escape(format_quantity(metric.value, metric.unit) or NOT_A_NUMBER)
     mark = _MARKS[metric.passed] if math.isfinite(metric.value) else ""  # else there was nothing
-    target = f"{target} {mark}".strip()
-    return (
-        f"<tr{meaning}><td><code>{escape(name)}</code></td><td>{value}</td><td>{target}</td></tr>"
-    )
+    cells = (f"<code>{escape(name)}</code>", value, f"{target} {mark}".strip())
+    return f"<tr{meaning}>{''.join(f'<td {_CELL}>{cell}</td>' for cell in cells)}</tr>"
 
 
 class NotebookProgress:
