@@ -14,7 +14,7 @@ SELECTED := $(if $(filter all,$(PFSC_TESTS)),,-m "not slow")
 .PHONY: help setup demo test test-all lint types unit fuzz benchmark models docs signals architecture results gallery clean
 
 help:
-	@echo "make setup      create $(VENV) and install the project with its tools"
+	@echo "make setup      create $(VENV) and install the project with its tools and $(BIN)/pfsc"
 	@echo "make demo       run the six-axis elastic path following demo into $(DEMO_OUT)"
 	@echo "make test       linters, types and the tests, but the dozen that take longest"
 	@echo "make test-all   the same with these; as continuous integration runs it"

@@ -89,6 +89,9 @@ def _root(
     """Take the options of the program itself."""
 
 
+app = make_app()
+
+
 def main(arguments: Sequence[str] | None = None, program: str = "python -m experiments") -> int:
     """Runs the command line.
 
@@ -99,4 +102,5 @@ def main(arguments: Sequence[str] | None = None, program: str = "python -m exper
     Returns:
         Exit status, see the module.
     """
-    return run_app(make_app(completion=" " not in program), program, arguments)
+    own = make_app(completion=True) if " " not in program else app
+    return run_app(own, program, arguments)

@@ -191,7 +191,7 @@ def _print_check(console: Console, found: "StaticCheck") -> None:
     for i, values in enumerate(np.column_stack(columns)):
         table.add_row(str(i + 1), f"{values[0]:.2f}", *(f"{value:.3f}" for value in values[1:]))
     console.print(table)
-    console.print(found.verdict, soft_wrap=True, highlight=False, markup=False)
+    Console().print(found.verdict, soft_wrap=True, highlight=False, markup=False)
 
 
 def _print_first(console: Console, first: "FirstCommand") -> None:

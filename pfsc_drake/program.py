@@ -23,7 +23,7 @@ def main(root: Path = _ROOT) -> int:
     Returns:
         Exit status, see ``experiments.cli``; 2 without a clone.
     """
-    if not (root / "experiments" / "cli.py").is_file():
+    if not (root / "experiments" / "program.py").is_file():
         return _fail(
             "the commands run from a clone of the project; here is the library alone, for which "
             "import pfsc_drake"

@@ -117,7 +117,7 @@ def _further_refusals(
     for misfit in misfits:
         rest = _without(rest, misfit.place)
     try:
-        result = _load(schema_class, rest, "")
+        result: Any = _load(schema_class, rest, "")
     except (InputError, TypeError):  # e.g. there is no default for a key that is missing
         return []
     return _refusals(result, (), [misfit.place[:-1] for misfit in misfits])

@@ -1,7 +1,6 @@
 """Command line: exit status, streams and messages; the simulation itself is replaced."""
 
 import json
-import re
 import subprocess
 import sys
 import types
@@ -211,14 +210,6 @@ def test_a_file_with_nearly_that_name(scenario, capsys):
     assert error_line(capsys).endswith("my_rum.yaml: no such file; did you mean 'my_run.yaml'?\n")
 
 
-def test_version(capsys):
-    assert main(["--version"]) == 0
-    line = capsys.readouterr().out
-    assert re.fullmatch(
-        r"pfsc_drake 0\.\S+, Drake \S+, CasADi \S+, git ([0-9a-f]{40}(\+dirty)?|unknown)\n", line
-    )
-
-
 def test_quietly_only_the_last_line(fake_run, scenario, capsys):
     fake_run.outcome.metrics.add("max_path_deviation", 4.3e-5, "m", "< 0.05e-3")
     fake_run.outcome.warnings = ["the joints resonate too fast"]
@@ -238,17 +229,37 @@ def test_quietly_errors_too(fake_run, scenario, capsys):
     assert error_line(capsys).startswith("error: scenario file none.yaml: no such file")
 
 
+def test_a_quiet_sweep(monkeypatch, capsys):
+    from experiments.sweep import sweep
+
+    def run_sweep(_, out, console, **__):
+        console.print("half of it")
+        return sweep.SweepOutcome(
+            out / "report.html",
+            {},
+            0,
+            {"strange": "run x"},
+            Metrics(),
+            [],
+            ["w"],
+            False,
+            None,
+            None,
+        )
+
+    made = types.SimpleNamespace(scenario=types.SimpleNamespace(name="many"))
+    monkeypatch.setattr(sweep, "define_sweep", lambda *_, **__: made)
+    monkeypatch.setattr(sweep, "run_sweep", run_sweep)
+    assert main(["sweep", "many", "--quiet"]) == 0
+    assert capsys.readouterr().out == "Open the report: out/many_sweep/report.html\n"
+    assert main(["sweep", "many"]) == 0
+    assert {"half of it", "warning: w"} < {*capsys.readouterr().out.splitlines()}
+
+
 @pytest.mark.parametrize("command", ["run", "sweep", "study", "drive"])
 def test_commands_that_can_be_quiet(command, capsys):
     assert main([command, "--help"]) == 0
     assert "--quiet" in capsys.readouterr().out
-
-
-def test_only_a_program_of_one_word_is_completed(capsys):
-    assert main(["--help"], program="pfsc") == 0
-    assert "--install-completion" in capsys.readouterr().out
-    assert main(["--help"]) == 0
-    assert "--install-completion" not in capsys.readouterr().out
 
 
 def test_list(monkeypatch, scenario, capsys):

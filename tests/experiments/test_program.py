@@ -1,6 +1,7 @@
 """The program ``pfsc``: the same commands from anywhere, and one line where there are none."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.cli import main
 from pfsc_drake import program
 from reporting.provenance import PROJECT_ROOT
 
@@ -85,3 +87,18 @@ def test_completion(tmp_path, line, offered):
     (tmp_path / "mystery").mkdir()
     (tmp_path / "mystery" / "other.yml").touch()
     assert completed(tmp_path, line) == offered
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    line = capsys.readouterr().out
+    assert re.fullmatch(
+        r"pfsc_drake 0\.\S+, Drake \S+, CasADi \S+, git ([0-9a-f]{40}(\+dirty)?|unknown)\n", line
+    )
+
+
+def test_only_a_program_of_one_word_is_completed(capsys):
+    assert main(["--help"], program="pfsc") == 0
+    assert "--install-completion" in capsys.readouterr().out
+    assert main(["--help"]) == 0
+    assert "--install-completion" not in capsys.readouterr().out
