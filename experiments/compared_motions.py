@@ -35,7 +35,8 @@ def motion_differences(scenarios: Mapping[str, str]) -> list[str]:
         for key, values in _unlike("", [{k: d.get(k) for k in _MOTION} for d in known.values()])
     ]
     if len(found) > _MOST:
-        found[_MOST:] = [f"{len(found) - _MOST} more keys"]
+        more = len(found) - _MOST
+        found[_MOST:] = [f"{more} more key{'s' * (more > 1)}"]
     return found
 
 
@@ -79,7 +80,9 @@ def _shown(value: Any) -> str:
     if value is None:
         return "not given"
     if isinstance(value, dict):
-        return str(value.get(TAG_KEY, "another one"))
+        return str(value.get(TAG_KEY) or Path(str(value.get(_FILE) or "another one")).name)
+    if isinstance(value, list) and any(isinstance(entry, dict | list) for entry in value):
+        return f"{len(value)} entr{'y' if len(value) == 1 else 'ies'}"
     if isinstance(value, str) and "/" in value:
         return Path(value).name
     return shortened(f"{value:g}" if isinstance(value, float) else str(value))

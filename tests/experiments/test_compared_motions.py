@@ -37,6 +37,12 @@ def test_what_is_compared_is_no_other_motion(old, new):
         ("!Circle {radius: 0.1}", "!Line {}", "path.shape is !Circle in a, !Line in b"),
         ("surface: null", "surface: {kind: x}", "surface is not given in a, another one in b"),
         ("duration: 5.0", "duration: 9.0", "duration is 5 in a, 9 in b"),
+        (
+            "!Circle {radius: 0.1}",
+            "{file: /somewhere/way.csv}",
+            "path.shape is !Circle in a, way.csv in b",
+        ),
+        ("[0.0, 0.5]", "[{at: 0.0}]", "reference.points is [0.0, 0.5] in a, 1 entry in b"),
     ],
 )
 def test_another_motion_is_told_with_its_key(old, new, told):
