@@ -13,7 +13,7 @@ from docs.making.text import as_markdown, table
 
 # what is asked for exit status, and the commands
 _PROGRAMS = {
-    "experiments": (experiments.cli, experiments.cli.make_app()),
+    "experiments": (experiments.cli, experiments.cli.app),
     "identification": (identification.cli, identification.cli.app),
 }
 _TYPES = {Path: "PATH", float: "NUMBER", int: "INTEGER"}

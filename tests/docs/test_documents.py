@@ -24,7 +24,7 @@ from pfsc_drake.yaml.reading import TAG_KEY, parse_yaml
 from pfsc_drake.yaml.typed import load_typed
 from tests.docs.documents import DOCUMENTS, ONE_OF, ROOT, Block, Command, blocks, commands
 
-APPS = {"experiments": experiments.cli.make_app(), "identification": identification.cli.app}
+APPS = {"experiments": experiments.cli.app, "identification": identification.cli.app}
 
 
 def _on_top(given: Any, part: Any) -> Any:

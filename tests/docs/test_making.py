@@ -97,7 +97,7 @@ def test_an_attribute_without_a_word_is_an_error() -> None:
 def test_every_command_and_option_is_told() -> None:
     page = command_line()
     for program, app in (
-        ("experiments", experiments.cli.make_app()),
+        ("experiments", experiments.cli.app),
         ("identification", identification.cli.app),
     ):
         group: typing.Any = typer.main.get_command(app)
