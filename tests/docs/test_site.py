@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from docs.making.links import broken_links
-from tests.docs.documents import ROOT
+from tests.docs.documents import PAGES, ROOT
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_document_is_a_page(site: Path) -> None:
-    for file in (ROOT / "docs").rglob("*.md"):
+    for file in PAGES:
         page = site / file.relative_to(ROOT / "docs").with_suffix(".html")
         assert page.is_file(), file
         assert "<!-- made:" not in page.read_text(encoding="utf-8"), file
