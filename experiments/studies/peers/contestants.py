@@ -70,9 +70,11 @@ class Servos:
 
     Attributes:
         slowed: Whether that takes the time of the reference instead.
+        integral: Pole of their integral part [1/s]; 0 for none.
     """
 
     slowed: bool
+    integral: float = 0.0
 
     def run(self, lap: Lap, disturbance: tuple[str, ...]) -> RobotMotion:
         """Make a lap."""
@@ -82,7 +84,8 @@ class Servos:
             if self.slowed:
                 plan = plan.lasting(lap.moving)
             samples = plan.sampled(lap.ticks, lap.period)
-            return JointServos(station.part.belief.robot, _BANDWIDTH, samples, _start(station))
+            robot, q_0 = station.part.belief.robot, _start(station)
+            return JointServos(robot, _BANDWIDTH, samples, q_0, lap.period, self.integral)
 
         return under_law(lap.settings(disturbance), FOLDER, lap.duration, make)
 
@@ -127,5 +130,6 @@ CONTESTANTS: Mapping[str, Contestant] = {
     "impedance, 600 N/m": Impedance(ImpedanceGains(600.0, 30.0, 1.0)),
     "impedance, 2000 N/m": Impedance(ImpedanceGains(2000.0, 100.0, 10.0, matched=True)),
     "joint servos, same time": Servos(slowed=True),
+    "joint servos, integral": Servos(slowed=True, integral=10.0),
     "joint servos, Toppra": Servos(slowed=False),
 }

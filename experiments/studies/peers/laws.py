@@ -138,24 +138,34 @@ class JointServos:
 
     ::
 
-        tau_i = D_i (w^2 (q_d,i - q_i) + 2 w (v_d,i - v_i)) + g_i(q)
+        tau_i = D_i (a_0 int e_i dt + a_1 e_i + a_2 e_i') + g_i(q),    e = q_d - q
 
-    with ``D_i`` the inertia that joint i has at the start, its rotor included, and ``g`` the weight
-    as it is believed.
+    with ``D_i`` the inertia that joint i has at the start, its rotor included, ``g`` the weight as
+    it is believed, and the coefficients of ``(s + w)^2 (s + p)``, of which p = 0 leaves a PD. The
+    integral is summed up tick by tick.
 
     Args:
         robot: The robot as it is believed, N joints.
-        bandwidth: w, both poles of every joint by itself [1/s].
+        bandwidth: w, two poles of every joint by itself [1/s].
         plan: Joint coordinates and rates at the ticks, shape (T, 2, N).
         q_0: Posture at the start, shape (N,).
+        period: Sampling time [s].
+        integral: p, the third pole [1/s]; 0 for none.
     """
 
     def __init__(
-        self, robot: RobotModel, bandwidth: float, plan: np.ndarray, q_0: np.ndarray
+        self,
+        robot: RobotModel,
+        bandwidth: float,
+        plan: np.ndarray,
+        q_0: np.ndarray,
+        period: float,
+        integral: float = 0.0,
     ) -> None:
-        self._plan, self._gravity = plan, gravity_function(robot)
-        inertia = np.diag(np.array(mass_function(robot)(q_0))) + robot.D_M
-        self._k_p, self._k_d = inertia * bandwidth**2, inertia * 2.0 * bandwidth
+        self._plan, self._gravity, self._period = plan, gravity_function(robot), period
+        self._D = np.diag(np.array(mass_function(robot)(q_0))) + robot.D_M
+        _, self._a_2, self._a_1, self._a_0 = np.poly([-bandwidth, -bandwidth, -integral])
+        self._sum = np.zeros(robot.dimension)
 
     def __call__(self, tick: int, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the torques of the drives [Nm], shape (N,).
@@ -166,8 +176,10 @@ class JointServos:
             v: Their rates [rad/s], shape (N,).
         """
         q_d, v_d = self._plan[tick]
+        self._sum += (q_d - q) * self._period
         weight: np.ndarray = self._gravity(q).full()[:, 0]
-        return self._k_p * (q_d - q) + self._k_d * (v_d - v) + weight
+        wanted = self._a_0 * self._sum + self._a_1 * (q_d - q) + self._a_2 * (v_d - v)
+        return self._D * wanted + weight
 
 
 def _clipped(error: np.ndarray, most: float) -> np.ndarray:

@@ -31,22 +31,22 @@ def draw(found: Mapping[tuple[str, str], Score]) -> Figure:
             lift = 0.25 - height * k
             wide.plot(values, places + lift, "o", color=COLOURS[k], ms=6, label=disturbance)
         wide.set(xscale="log", xlabel="largest distance from the path in mm")
+        wide.margins(x=0.03)
         wide.set_yticks(places, laws)
         wide.set_ylim(-0.6, len(laws) - 0.4)
         for line in places[:-1] - 0.5:
             wide.axhline(line, color="#D1D5DB", lw=0.6)
         _bars(narrow, places, [found[law, calm].time for law in laws], "{:.2f}")
-        narrow.set_xlabel("time of the lap in s")
+        narrow.set_xlabel("time in s")
         for disturbance in held[:1]:
             _bars(last, places, [found[law, disturbance].hand for law in laws], "{:.0f}")
-        last.set_xlabel("force of a hand for 20 mm in N")
-        wide.legend(
-            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, borderaxespad=0.3
-        )
+        last.set_xlabel("force of a hand in N")
+        handles, labels = wide.get_legend_handles_labels()
+        canvas.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
         caption = (
-            "The largest distance from the path under each disturbance, how long the lap takes "
-            "without any, and what a hand needs to move the resting tool by 20 mm. Less is better "
-            "left and in the middle; to the right less is softer."
+            "The largest distance from the path under each disturbance; how long the lap takes "
+            "without any; the force of a hand of 5 N/mm that goes 20 mm aside at rest. What yields "
+            "is meant to leave the path when it is pushed, and needs the least force."
         )
         return render(Drawing("peers", "What one would take instead", caption, canvas))
 

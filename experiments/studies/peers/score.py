@@ -59,9 +59,9 @@ class Score:
     def __str__(self) -> str:
         if self.fault:
             return self.fault
-        largest, rms, turned, time, effort, hand = self.cells
+        largest, _, turned, time, _, hand = self.cells
         held = "" if hand == NOT_A_NUMBER else f", {hand} N"
-        return f"{largest:>8s} mm, rms {rms:>7s} mm, {turned:>7s} mrad, {time} s, {effort} %{held}"
+        return f"{largest} mm, {turned} mrad, {time} s{held}"
 
 
 def score(lap: Lap, robot: RobotModel, motion: RobotMotion, held_from: float = np.inf) -> Score:

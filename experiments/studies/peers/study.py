@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from diagrams.robot_station import build_robot_station
-from experiments.studies.peers.contestants import CONTESTANTS, OwnLaw
+from experiments.studies.peers.contestants import CONTESTANTS
 from experiments.studies.peers.lap import COMMON, FOLDER, SCENARIO, Lap
 from experiments.studies.peers.picture import draw
 from experiments.studies.peers.score import Score, score
@@ -26,7 +26,7 @@ def _force(force: str, begin: float) -> str:
 
 
 _BACK, _ASIDE = "[-50, 0, 0]", "[0, 60, 0]"
-CALM, HAND = "undisturbed", "a hand moves the tool by 20 mm"
+CALM, HAND = "undisturbed", "a hand goes 20 mm aside"
 DISTURBANCES: Mapping[str, tuple[str, ...]] = {
     CALM: (),
     "masses 5 % too low, friction": _WRONG,
@@ -62,8 +62,8 @@ _DESCRIPTION = (
     "kinematics along Drake's Toppra with 70 % of the limits of velocity, acceleration and torque, "
     "and the same slowed down to the time of the others. Deviation is the distance from the path, "
     "wherever the tool is along it; time is that from the beginning of the motion until the tool "
-    "stays within 5 mm of the end; the hand moves the tool by 20 mm once it rests there. 50 N "
-    "along the path is what the wrist's drives bear."
+    "stays within 5 mm of the end; a hand of 5 N/mm takes hold of the tool once it rests there "
+    "and goes 20 mm aside. 50 N along the path is what the drives of the wrist bear."
 )
 
 
@@ -97,7 +97,7 @@ def write_peers(
             for name, contestant in CONTESTANTS.items():
                 came = score(lap, robot, contestant.run(lap, changes), held_from)
                 found[name, disturbance] = came
-                progress(f"{disturbance:30s} {name:30s} {came}")
+                progress(f"{disturbance}, {name}: {came}")
         metrics = Metrics()
         for (name, disturbance), came in found.items():
             for what, (value, unit) in came.numbers.items():
@@ -124,8 +124,4 @@ def write_peers(
 def _listing(disturbances: Mapping[str, tuple[str, ...]]) -> list[str]:
     lines = [" ".join(COMMON)]
     lines += [f"{name}: {' '.join(changes) or '-'}" for name, changes in disturbances.items()]
-    return lines + [
-        f"{name}: {' '.join(contestant.overrides)}"
-        for name, contestant in CONTESTANTS.items()
-        if isinstance(contestant, OwnLaw)
-    ]
+    return lines + [f"{name}: {contestant}" for name, contestant in CONTESTANTS.items()]

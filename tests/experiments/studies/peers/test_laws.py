@@ -104,9 +104,31 @@ def test_servos_pull_every_joint_back_with_their_poles(station, q_0, weight):
     context = model.CreateDefaultContext()
     model.SetPositions(context, q_0)
     inertia = np.diag(model.CalcMassMatrix(context))
-    law = JointServos(station.part.robot, bandwidth, np.stack([q_0, np.zeros(7)])[None], q_0)
+    plan = np.stack([q_0, np.zeros(7)])[None]
+    law = JointServos(station.part.robot, bandwidth, plan, q_0, 1e-3)
     off, v = np.linspace(-2e-3, 2e-3, 7), np.linspace(0.1, -0.1, 7)
     pulled = law(0, q_0 + off, v) - weight(q_0 + off)
     np.testing.assert_allclose(
         pulled, -inertia * (bandwidth**2 * off + 2.0 * bandwidth * v), rtol=1e-6, atol=1e-9
     )
+
+
+def test_an_integral_part_takes_a_load_away(station, q_0, weight):
+    """A double integrator per joint under a constant load, by its three poles."""
+    model, period, load = station.part.model, 1e-3, 3.0
+    context = model.CreateDefaultContext()
+    model.SetPositions(context, q_0)
+    inertia = np.diag(model.CalcMassMatrix(context))
+    plan = np.tile(np.stack([q_0, np.zeros(7)]), (1500, 1, 1))
+    law = JointServos(station.part.robot, 40.0, plan, q_0, period, integral=10.0)
+    e, v, far = np.zeros(7), np.zeros(7), 0.0
+    for tick in range(1500):
+        torque = law(tick, q_0 + e, v) - weight(q_0 + e)
+        v = v + period * (torque + load) / inertia
+        e = e + period * v
+        far = np.maximum(far, np.abs(e))
+    # of (s + 40)^2 (s + 10) under a step, found from its step response
+    t = np.linspace(0.0, 1.0, 100_001)
+    step = np.exp(-10.0 * t) / 900.0 - np.exp(-40.0 * t) * (1.0 / 900.0 + t / 30.0)
+    np.testing.assert_allclose(far, step.max() * load / inertia, rtol=0.05)
+    assert np.abs(e).max() < 1e-3 * far.max()
