@@ -37,6 +37,7 @@ _STUDIES = {
     "tracking": "path following against trajectory tracking",
     "joint_sides": "elastic joints of which both sides, torques, or motors alone are measured",
     "fixture_rules": "printed rules of forbidden regions against the program at an acute edge",
+    "peers": "path following beside impedance control and Toppra",
     IDENTIFICATION: "from robots to their models and back",
     TEACH_IN: "a path taught by hand, and followed",
 }
@@ -65,6 +66,7 @@ def study_command(
     from experiments.studies.fixture_rules import write_fixture_rules
     from experiments.studies.identify import write_identification
     from experiments.studies.joint_sides import write_joint_sides
+    from experiments.studies.peers.study import write_peers
     from experiments.studies.robustness import write_robustness
     from experiments.studies.stiffness import write_study
     from experiments.studies.tracking import write_tracking
@@ -76,6 +78,7 @@ def study_command(
         "tracking": write_tracking,
         "joint_sides": write_joint_sides,
         "fixture_rules": write_fixture_rules,
+        "peers": write_peers,
         IDENTIFICATION: write_identification,
         TEACH_IN: write_teach_in,
     }
